@@ -165,7 +165,7 @@ def sparse_bands(runs, unseen):
 
 def _maxwell():
     from discover.laws import Fluid
-    from discover.laws.maxwell import UpperConvectedMaxwell
+    from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 
     return Fluid.dimensionless(UpperConvectedMaxwell())
 

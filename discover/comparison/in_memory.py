@@ -11,9 +11,9 @@ from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
+from discover.learners.files.provenance import fingerprint_of
 from discover.learners.known_part import known_part
-from discover.learners.provenance import fingerprint_of
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.learners.run_prediction import RunPrediction
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset

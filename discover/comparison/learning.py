@@ -16,7 +16,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.registry import BUILT_IN
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.progress import Progress
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study

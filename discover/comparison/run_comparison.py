@@ -27,7 +27,7 @@ from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
 from discover.forward.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.multimode import Fluid
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.progress import Progress, silent
 from discover.study.data import StudyData, load_study_data

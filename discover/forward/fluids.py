@@ -19,7 +19,7 @@ from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.imposed_stress import answer_to_stress
-from discover.forward.periodic_states import periodic_state
+from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled

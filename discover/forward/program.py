@@ -30,11 +30,11 @@ from discover.forward.batches import (
 )
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
-from discover.forward.half_cycles import first_harmonic
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.integrator import integrate
-from discover.forward.periodic_states import PHASE, complex_modulus
-from discover.forward.steady_states import steady_states
+from discover.forward.starts.half_cycles import first_harmonic
+from discover.forward.starts.periodic_states import PHASE, complex_modulus
+from discover.forward.starts.steady_states import steady_states
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.programs import compiled

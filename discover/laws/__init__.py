@@ -4,15 +4,18 @@ from discover import first_use as first_use  # double precision, before any arra
 from discover.callable_package import answer_calls
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
-from discover.laws.fene_p import FenePeterlin
-from discover.laws.giesekus import Giesekus
-from discover.laws.johnson_segalman import JohnsonSegalman
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.named import NamedLaw
-from discover.laws.phan_thien_tanner import ExponentialPhanThienTanner, LinearPhanThienTanner
 from discover.laws.registry import LAWS, laws_table, make_law, register_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws.textbook.fene_p import FenePeterlin
+from discover.laws.textbook.giesekus import Giesekus
+from discover.laws.textbook.johnson_segalman import JohnsonSegalman
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.phan_thien_tanner import (
+    ExponentialPhanThienTanner,
+    LinearPhanThienTanner,
+)
 
 __all__ = [
     "LAWS",

@@ -1,13 +1,12 @@
 """Named laws, as study files and the command line spell them.
 
-A file in this folder that says ``NAMED = {...}`` is a law that is built in. A user's own are
-registered, by a program or by an installed package: see docs/adding-a-law.md.
+A file in the folder `textbook` that says ``NAMED = {...}`` is a law that is built in. A user's own
+are registered, by a program or by an installed package: see docs/adding-a-law.md.
 """
 
 import importlib
 import math
 import pkgutil
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -17,6 +16,7 @@ import jax
 import jax.numpy as jnp
 
 from discover.errors import InputError
+from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from discover.new_names import require_new_name
@@ -31,12 +31,10 @@ _CLASSICAL = ("maxwell", "johnson_segalman", "giesekus", "phan_thien_tanner", "f
 
 
 def _named_laws() -> dict[str, NamedLaw]:
-    package = sys.modules[__name__.rpartition(".")[0]]
-    files = [module.name for module in pkgutil.iter_modules(package.__path__)]
+    files = [module.name for module in pkgutil.iter_modules(textbook.__path__)]
     laws: dict[str, NamedLaw] = {}
     for file in dict.fromkeys([*_CLASSICAL, *files]):
-        if file != "registry":
-            laws |= getattr(importlib.import_module(f"discover.laws.{file}"), "NAMED", {})
+        laws |= getattr(importlib.import_module(f"{textbook.__name__}.{file}"), "NAMED", {})
     return laws
 
 

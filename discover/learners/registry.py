@@ -7,7 +7,7 @@ from time import perf_counter
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.new_names import require_new_name
 from tensor_library.library import TermLibrary
 from tensor_library.registry import Registry

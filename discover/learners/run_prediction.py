@@ -12,9 +12,9 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
-from discover.learners.estimator_file import EstimatorFile, write_estimator
+from discover.learners.files.estimator_file import EstimatorFile, write_estimator
+from discover.learners.files.provenance import Provenance, provenance_of
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
-from discover.learners.provenance import Provenance, provenance_of
 from discover.learners.runs import as_runs
 from discover.learners.settings import check_settings
 from discover.linear_algebra_threads import in_one_thread
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
-    from discover.learners.result import LearnerResult
+    from discover.learners.results.result import LearnerResult
 
 _Learner = TypeVar(
     "_Learner", bound="RunPrediction"
@@ -151,7 +151,7 @@ class RunPrediction(RegressorMixin, BaseEstimator):
         InputError
             If there is nothing to draw, or xarray is not installed (extra ``xarray``).
         """
-        from discover.learners.labelled import labelled_draws, labelled_members
+        from discover.learners.results.labelled import labelled_draws, labelled_members
 
         check_is_fitted(self, "fluid_")
         if hasattr(self, "members_"):

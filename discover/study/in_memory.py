@@ -112,7 +112,7 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
         If `base` is no fluid.
     """
     if base is None:
-        from discover.laws.maxwell import UpperConvectedMaxwell
+        from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 
         base = Fluid.dimensionless(UpperConvectedMaxwell())
     if not isinstance(base, Fluid):

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 
 from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.outcomes.flows import Flow
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.study.declared_model import DeclaredModel
 

@@ -21,9 +21,9 @@ from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid
-from discover.laws.giesekus import Giesekus
+from discover.laws.textbook.giesekus import Giesekus
 from discover.learners import LearnerResult, weighted_laws
-from discover.learners.weighted_laws import WeightedLaws
+from discover.learners.results.weighted_laws import WeightedLaws
 from discover.protocols import start_up
 from discover.statistics.residual import Expectation
 

@@ -15,7 +15,7 @@ from discover.identify.rivals.bands import bands_of_predictions
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.study.declared_model import DeclaredModel

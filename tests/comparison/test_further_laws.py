@@ -9,7 +9,7 @@ from discover.comparison.fitting.further_laws import fit_further_laws
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.errors import InputError
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.protocols.protocol import start_up
 from discover.study import parse_study
 from discover.study.declared_model import DeclaredModel

@@ -33,7 +33,7 @@ from discover.effects import make_effect
 from discover.inference.constants import ConstantByMode
 from discover.inference.draws_by_mode import ConstantsDrawn
 from discover.laws import Fluid
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
 from discover.report.plots.by_mode import by_mode_in_brief, by_mode_picture

@@ -18,7 +18,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
 from discover.laws.registry import make_law
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import what_is_left

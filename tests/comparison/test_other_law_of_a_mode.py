@@ -9,7 +9,7 @@ from discover.comparison.fitting.coefficients_in_modes import coefficients_in_mo
 from discover.comparison.judging.constants.modes_apart import said_of_each_mode
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up
 from discover.study.declared_model import DeclaredModel

@@ -11,7 +11,7 @@ from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.dataset import Run
 from discover.identify.rivals.bands import PredictionBand
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols import sampled_rate
 from discover.study.declared_model import DeclaredModel

@@ -12,7 +12,7 @@ from discover.comparison.judging.unseen_runs import hold_against_unseen, outlier
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import Expectation

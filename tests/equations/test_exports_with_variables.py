@@ -16,7 +16,7 @@ from test_named_exports import read_latex, value
 from discover.equations import Equation, NamedPart, write_equation
 from discover.errors import InputError
 from discover.laws import make_law
-from discover.laws.pom_pom import _FADES
+from discover.laws.textbook.pom_pom import _FADES
 
 MODULUS, TIME = (40.0, 5.0), (0.3, 1.5)
 TIMES = np.linspace(0.1, 1.5, 8)

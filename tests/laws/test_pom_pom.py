@@ -14,7 +14,7 @@ from discover.closed_loop.law_choice import choose_law
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
-from discover.laws.pom_pom import _FADES
+from discover.laws.textbook.pom_pom import _FADES
 from discover.protocols import imposed_stress, in_flow, oscillations, start_up, steady_rates
 from discover.simulate import simulate
 

@@ -15,7 +15,7 @@ import discover as dc
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.fluids import dynamics_of_fluid
-from discover.forward.half_cycles import first_harmonic, half_cycle
+from discover.forward.starts.half_cycles import first_harmonic, half_cycle
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, oscillations, start_up
 from discover.simulate import simulate

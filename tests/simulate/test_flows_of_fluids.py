@@ -17,8 +17,8 @@ from discover.forward.fluids import (
     observed_on_grid,
     solved_on_grid,
 )
-from discover.laws.giesekus import Giesekus
 from discover.laws.multimode import Fluid
+from discover.laws.textbook.giesekus import Giesekus
 from discover.protocols import imposed_stress, oscillations, start_up, steady_rates
 from discover.protocols.protocol import recording
 from discover.simulate import SimulationError, lay_out, simulate

@@ -14,7 +14,7 @@ from discover import Fluid, make_law
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws.expansion import law_of_terms
-from discover.laws.giesekus import Giesekus
+from discover.laws.textbook.giesekus import Giesekus
 from discover.protocols import in_flow, start_up
 from discover.protocols.control import steady_rates
 from discover.simulate import SimulationError, lay_out, simulate, solve_batch

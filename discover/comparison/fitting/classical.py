@@ -17,9 +17,9 @@ from discover.comparison.outcomes.flows import (
 from discover.comparison.outcomes.truth import true_terms
 from discover.dataset.run import sizes_of
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.tensor_sindy.selection import extended_bic
 from discover.study.declared_model import DeclaredModel
 

@@ -15,7 +15,7 @@ from discover.dataset.records.coarse_rates import (
 )
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import another_between_samples, unknown_between_samples
 
 LARGEST = 5e-3

@@ -9,10 +9,10 @@ import numpy as np
 from discover.comparison.outcomes.expected import expectation_of
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.registry import LearningTask, learn_with
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.plain_json import plain
 from discover.progress import Progress, silent
 from discover.statistics.lack_of_fit import what_is_left

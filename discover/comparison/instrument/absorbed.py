@@ -9,7 +9,7 @@ from discover.effects import ConstitutiveEffect, KnownEffect, ModeEffect, Series
 from discover.errors import InputError
 from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.study.declared_model import DeclaredModel
 
 ONLY_LOOP = (

@@ -17,8 +17,8 @@ from discover.comparison.instrument.fitted_along import FittedAlong
 from discover.comparison.instrument.frame import Frame
 from discover.comparison.outcomes.flows import Flow, of_recorded, predict, relative_errors
 from discover.identify.side_by_side.many_laws import fluid_of
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.tensor_sindy.selection import extended_bic
 
 

@@ -17,9 +17,9 @@ from discover.comparison.outcomes.constant import Constant
 from discover.effects import library_term, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
-from discover.learners.result import LearnerResult
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.learners.results.result import LearnerResult
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model
 from tensor_library.library import TermLibrary

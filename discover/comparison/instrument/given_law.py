@@ -15,7 +15,7 @@ from discover.forward import AugmentedModel, Batch, data_scales
 from discover.forward.least_squares import Fit, fit_batch, intervals, sequences_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
-from discover.learners.result import LearnerResult
+from discover.learners.results.result import LearnerResult
 from discover.statistics import least_squares_covariance, root_of
 
 _SETTLED = 0.5

@@ -11,8 +11,8 @@ from discover.comparison.judging.identifiability import SEPARATED
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.records.repeats import Repeats
-from discover.learners.recovered_term import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit

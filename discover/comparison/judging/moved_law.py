@@ -12,7 +12,7 @@ from discover.laws.each_mode import LawOfEachMode
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 
 _STEP = 1e-3

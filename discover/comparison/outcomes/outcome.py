@@ -11,8 +11,8 @@ from discover.comparison.outcomes.constant import Constant
 from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.term_tables import TermTables
-from discover.learners.weighted_laws import WeightedLaws
+from discover.learners.results.term_tables import TermTables
+from discover.learners.results.weighted_laws import WeightedLaws
 from discover.plain_json import plain
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out

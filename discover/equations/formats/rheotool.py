@@ -20,7 +20,7 @@ from discover.equations.formats.latex_file import header_lines
 from discover.equations.from_law import EXPONENTIAL, combined
 from discover.equations.term import EquationTerm
 from discover.errors import InputError
-from discover.laws.fene_p import fene_p_terms
+from discover.laws.textbook.fene_p import fene_p_terms
 from tensor_library.terms import parse_term
 
 TOLERANCE = 0.01

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol
 from discover.simulate.grid import IntegrationGrid

@@ -24,7 +24,7 @@ from discover.identify.side_by_side.histories import SAME, Difference, differenc
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, joint_library
 from discover.identify.side_by_side.separation import Separation, separations
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.notebook_view import NotebookView
 from discover.words import percent_of
 from tensor_library.library import TermLibrary

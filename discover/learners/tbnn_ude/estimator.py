@@ -21,8 +21,8 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart
-from discover.learners.provenance import Provenance
 from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import PerMode

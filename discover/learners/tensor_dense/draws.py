@@ -9,8 +9,8 @@ from jaxtyping import Float, Int
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
+from discover.learners.results.weighted_laws import WeightedLaws
 from discover.learners.tensor_dense.reference_laws import ReferenceLaw
-from discover.learners.weighted_laws import WeightedLaws
 from tensor_library.library import TermLibrary
 
 

@@ -13,11 +13,12 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart, known_part
-from discover.learners.provenance import Provenance
+from discover.learners.results.weighted_laws import Limits, WeightedLaws
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import PerMode, check_library
 from discover.learners.tensor_dense.draws import DenseDraws
@@ -31,7 +32,6 @@ from discover.learners.tensor_dense.reference_laws import (
 from discover.learners.tensor_dense.term_sizes import term_sizes
 from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
-from discover.learners.weighted_laws import Limits, WeightedLaws
 from discover.progress import Progress, by_lines
 from discover.simulate.enough_steps import in_enough_steps
 from discover.simulate.flow_batch import lay_out

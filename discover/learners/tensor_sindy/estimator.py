@@ -15,8 +15,8 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
+from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart
-from discover.learners.provenance import Provenance
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import PerMode, check_library
 from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays

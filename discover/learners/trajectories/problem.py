@@ -11,8 +11,8 @@ from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.maxwell import UpperConvectedMaxwell
 from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.own_loadings import signals_of, with_likely_factors
 from discover.learners.runs import as_runs
 from discover.programs import on_device

@@ -6,10 +6,10 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.giesekus import NAMED as GIESEKUS
-from discover.laws.johnson_segalman import NAMED as JOHNSON_SEGALMAN
 from discover.laws.named import NamedLaw
-from discover.laws.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
+from discover.laws.textbook.giesekus import NAMED as GIESEKUS
+from discover.laws.textbook.johnson_segalman import NAMED as JOHNSON_SEGALMAN
+from discover.laws.textbook.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
 from tensor_library.algebra import Symmetric, anticommutator
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.terms import TermShare

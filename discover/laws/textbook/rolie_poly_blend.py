@@ -7,8 +7,8 @@ from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, State, as_parameter
 from discover.laws.named import NamedLaw
-from discover.laws.rolie_poly import NAMED as MONODISPERSE
-from discover.laws.rolie_poly import stretch_of
+from discover.laws.textbook.rolie_poly import NAMED as MONODISPERSE
+from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like
 
 _EXPONENT = -0.5  # δ of Likhtman & Graham

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float, Int
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.half_cycles import (
+from discover.forward.starts.half_cycles import (
     HalfCycle,
     counted_half_cycle,
     first_harmonic,

@@ -5,7 +5,7 @@ from typing import Any
 
 import pandas as pd
 
-from discover.learners.recovered_term import RecoveredTerm
+from discover.learners.results.recovered_term import RecoveredTerm
 from discover.notebook_view import NotebookView
 
 

@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
-from discover.laws.rolie_poly import stretch_of
+from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, square
 from tensor_library.isotropic_function import IsotropicFunction, scalars
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from discover._version import __version__
 from discover.errors import InputError
-from discover.learners.plain_values import PlainReader, PlainWriter
+from discover.learners.files.plain_values import PlainReader, PlainWriter
 
 FORMAT, VERSION = "discover estimator", 1
 _HEADER = "estimator.json"

@@ -9,9 +9,9 @@ from jaxtyping import Float, Num
 
 from discover.equations import Equation, EquationTerm, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.learners.recovered_term import RecoveredTerm
-from discover.learners.term_tables import TermTables
-from discover.learners.weighted_laws import WeightedLaws
+from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.results.term_tables import TermTables
+from discover.learners.results.weighted_laws import WeightedLaws
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Laws with an equation of their own, one file a law or a family."""

@@ -1,0 +1,1 @@
+"""Estimators in files: plain values, and where they come from."""

@@ -1,0 +1,1 @@
+"""What a learner answers: terms, their weights, and the table of both."""
