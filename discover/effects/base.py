@@ -61,6 +61,8 @@ class EffectParameter:
     endless
         Of a time: what the effect cannot be told from where no record lasts as long; empty if its
         name says nothing of that time.
+    absent
+        Of a constant that may be `low`: what the effect is there, where its name says otherwise.
     """
 
     name: str
@@ -74,6 +76,7 @@ class EffectParameter:
     range_scale: Scale = field(default="one", kw_only=True)
     ends: tuple[Literal["low", "high"], ...] = field(default=(), kw_only=True)
     endless: str = field(default="", kw_only=True)
+    absent: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -59,6 +59,28 @@ def structure_in_start_up():
     return {f"up{rate}.csv": (times, rate, stress(rate), "") for rate in (0.3, 1.0, 3.0)}
 
 
+def retracting(release):
+    """Start-ups of a law whose strands retract, by scipy, with and without released constraints.
+
+    σ▽ + ⅓ tr(σ·γ̇)[(1 + β)σ + I] + σ = γ̇   [Likhtman & Graham 2003; β = 0, ⅓: Larson 1984].
+    """
+    times = np.linspace(0.05, 6.0, 60)
+
+    def stress(rate):
+        def change(t, y):
+            first, second, shear = y
+            back = 2.0 * rate * shear / 3.0
+            return [
+                2.0 * rate * shear - first - back * ((1.0 + release) * first + 1.0),
+                -second - back * ((1.0 + release) * second + 1.0),
+                rate * (1.0 + second) - shear - back * (1.0 + release) * shear,
+            ]
+
+        return MODULUS * solve_ivp(change, (0.0, 6.0), [0.0] * 3, t_eval=times, rtol=1e-9).y[2]
+
+    return {f"up{rate}.csv": (times, rate, stress(rate), "") for rate in (0.3, 1.0, 3.0)}
+
+
 def giesekus_steps():
     """Relaxation of a Giesekus fluid, whose short times depend on the strain, by scipy."""
     times = np.geomspace(0.02, 6.0, 40)
@@ -90,10 +112,25 @@ def giesekus_steps():
         ),
         pytest.param(structure_in_start_up, "thixotropy", (), marks=pytest.mark.slow),
         (giesekus_steps, "giesekus_mobility", ()),
+        (
+            lambda: retracting(0.0),
+            "convective_constraint_release",
+            ("partly_retracting_strands",),
+        ),
+        (lambda: retracting(0.7), "convective_constraint_release", ()),
     ],
-    ids=["exponential steps", "steps", "start-ups", "steps that do not separate"],
+    ids=[
+        "exponential steps",
+        "steps",
+        "start-ups",
+        "steps that do not separate",
+        "nothing released",
+        "constraints released",
+    ],
 )
-def test_what_shows_only_as_a_damping_by_strain_is_named_so_too(tmp_path, records, name, others):
+def test_an_effect_of_which_only_a_limit_shows_has_the_name_of_the_limit_too(
+    tmp_path, records, name, others
+):
     data = folder(tmp_path, records())
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     loop = dc.close_loop(data, base, effects=CANDIDATES, max_effects=1, explanations=1)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
@@ -21,7 +22,8 @@ def names_of_limits(
 
     A structure that builds up in a time that no run lasts is seen to break only: what it does is a
     damping by the strain since it was at rest, and that it ever builds up, which the effect's name
-    says, is not determined.
+    says, is not determined. Nor is what the name of an effect says of a constant that may be zero,
+    at 95 %.
     And in relaxation after steps of strain an effect that only multiplies each run by a number, to
     within what is left, is any damping function that has these values: stress relaxation whose time
     and strain separate tells no mechanism   [Wagner 1976, Rheol. Acta 15, 136].
@@ -34,11 +36,24 @@ def names_of_limits(
         for parameter, at in zip(effect.parameters, model.positions(effect.name), strict=True):
             if parameter.endless and fit.theta[at] >= batch.longest > 0.0:
                 found[effect.name] = parameter.endless
+            if parameter.absent and _may_be(parameter.low, at, FitProblem(model, batch), fit):
+                found[effect.name] = parameter.absent
         if at_rest and isinstance(effect, ConstitutiveEffect) and effect.name != DAMPING:
             theta, _ = FitProblem(model, batch).without(fit, effect.name)
             if _only_factors(model, batch, fit, theta):
                 found[effect.name] = DAMPING
     return found
+
+
+def _may_be(value: float, at: int, problem: FitProblem, fit: Fit) -> bool:
+    """Return whether the fit with a parameter at a value is within 95 % of the best."""
+    theta = fit.theta.copy()
+    theta[at] = value
+    other = problem.fit(theta, [p for p in fit.free if p != at])
+    if not other.usable:
+        return False
+    worse = problem.independent_samples(fit) * np.log(problem.cost(other) / problem.cost(fit))
+    return bool(worse <= chi2.ppf(0.95, 1))
 
 
 def _only_factors(model: AugmentedModel, batch: Batch, fit: Fit, without: np.ndarray) -> bool:

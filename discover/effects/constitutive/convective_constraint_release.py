@@ -8,7 +8,9 @@ from tensor_library.terms import TermShare
 class ConvectiveConstraintRelease(ConstitutiveEffect):
     """Adds c tr(σ·γ̇)[(1 + β)σ + I]   [Likhtman & Graham 2003, JNNFM 114, 1].
 
-    With c = 1/3 it is the Rolie–Poly law without stretch.
+    With c = 1/3 it is the Rolie–Poly law without stretch. With β = 0 nothing is released, and it
+    is the law of strands that retract partly, of rigid rods where c = 1/3   [Larson 1984, J. Rheol.
+    28, 545].
     """
 
     def extra_term(self, values, stress, rate):
@@ -46,6 +48,7 @@ EFFECT = ConvectiveConstraintRelease(
             range_source="Likhtman & Graham 2003: the share of released constraints that counts, "
             "from none to all",
             ends=("low", "high"),
+            absent="partly_retracting_strands",
         ),
     ),
     equation=(

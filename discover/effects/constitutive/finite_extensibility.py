@@ -1,7 +1,7 @@
 """Chains that cannot be stretched without end."""
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
-from discover.laws.fene_p import fene_p_terms
+from discover.laws.textbook.fene_p import fene_p_terms
 from tensor_library.algebra import identity_like, inner, trace
 
 
