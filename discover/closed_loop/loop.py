@@ -17,7 +17,7 @@ from discover.closed_loop.explanations import (
     explain,
     modes_over_explanations,
     over_explanations,
-    weighed_times,
+    weighed_constants,
     why_untested,
 )
 from discover.closed_loop.final_fit import FinalConstants, FinalFit, final_constants, final_fit
@@ -179,7 +179,7 @@ def run_loop(
     if final.carried:
         side_by_side = explain(
             search, final.beside_benches, tested, final.held_batch, judgement,
-            min((one.criterion for one in verdict.other_times), default=np.inf),
+            min((one.criterion for one in verdict.other_constants), default=np.inf),
         )  # fmt: skip
     beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
     bounds, seen = (
@@ -187,8 +187,8 @@ def run_loop(
         (final.model, final.fit, final.beside_benches, side_by_side),
     )
     by_mode = modes_over_explanations(constants.by_mode, *seen)
-    times = weighed_times(verdict.other_times, final.carried, final.active)
-    over_all = over_explanations(bounds, *seen, times)
+    others = weighed_constants(verdict.other_constants, final.carried, final.active)
+    over_all = over_explanations(bounds, *seen, others)
     differ = {name for name, found in by_mode.items() if found.degree}
     own = declared_parameters(declared, final.fit, (bounds, over_all))
     of_law = {n: with_shared_interval(by_mode[n], one) for n, one in own.items() if n in by_mode}

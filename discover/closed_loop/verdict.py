@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 
 from discover.closed_loop.explanations.limits import names_of_limits
 from discover.closed_loop.explanations.other_benches import BENCH, OtherBench, instead_of
-from discover.closed_loop.explanations.other_times import (
-    FACTOR,
-    OtherTimes,
-    compared_with_times,
-    other_times,
+from discover.closed_loop.explanations.other_constants import (
+    OtherConstants,
+    compared_with_constants,
+    other_constants,
 )
 from discover.closed_loop.final_fit import FinalConstants, FinalFit
 from discover.closed_loop.judging.between_samples import judged_with
@@ -34,13 +33,13 @@ class FinalVerdict:
         The verdict with its reasons.
     silence
         What holds no signal, if anything does.
-    other_times
-        Factors on all relaxation times that explain the runs as well.
+    other_constants
+        Declared constants with other values that explain the runs as well.
     """
 
     judgement: Judgement
     silence: Silence | None
-    other_times: Sequence[OtherTimes]
+    other_constants: Sequence[OtherConstants]
 
 
 def verdict_on(
@@ -86,15 +85,16 @@ def verdict_on(
             judgement, final.model, final.batch, final.fit.theta, active, final.fitted,
             final.fitted_readings, tolerated,
         )  # fmt: skip
-    times = other_times(search, final.carried, judgement) if final.carried else []
-    judgement, instead = compared_with_times(judgement, active, final.carried, times)
+    others = ([] if not final.carried else
+              other_constants(search, final.carried, judgement, final.held_batch))  # fmt: skip
+    judgement, instead = compared_with_constants(judgement, active, final.carried, others)
     benches = instead_of(final.benches, final.carried, active)
     judgement = _with_benches(judgement, benches.values())
-    aliases = [(name, FACTOR) for name in instead] + [(name, BENCH) for name in benches]
+    aliases = [*instead.items(), *((name, BENCH) for name in benches)]
     aliases += names_of_limits(final.model, final.batch, final.fitted, final.fit, active).items()
     for name, other in aliases:
         search.aliases[name] = (*search.aliases.get(name, ()), other)
-    return FinalVerdict(judgement, silence, times)
+    return FinalVerdict(judgement, silence, others)
 
 
 def _with_benches(judgement: Judgement, benches: Iterable[OtherBench]) -> Judgement:

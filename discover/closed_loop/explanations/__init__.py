@@ -6,7 +6,7 @@ from discover.closed_loop.explanations.bands.wider_intervals import (
 )
 from discover.closed_loop.explanations.beam import BEAM_WIDTH, Carried, carry_and_turn
 from discover.closed_loop.explanations.other_benches import FACTORS, OtherBench, other_benches
-from discover.closed_loop.explanations.other_times import weighed_times
+from discover.closed_loop.explanations.other_constants import weighed_constants
 from discover.closed_loop.explanations.proposed_tests import next_tests
 from discover.closed_loop.explanations.report import explain, with_band
 from discover.closed_loop.explanations.untested import why_untested
@@ -22,7 +22,7 @@ __all__ = [
     "next_tests",
     "other_benches",
     "over_explanations",
-    "weighed_times",
+    "weighed_constants",
     "why_untested",
     "with_band",
 ]

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from discover.closed_loop.explanations.beam import Carried
-from discover.closed_loop.explanations.other_times import OtherTimes
+from discover.closed_loop.explanations.other_constants import OtherConstants
 from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
 from discover.forward import AugmentedModel
@@ -35,7 +35,7 @@ def over_explanations(
     fit: Fit,
     carried: Sequence[Carried],
     explanations: Explanations,
-    other: Sequence[tuple[OtherTimes, float]] = (),
+    other: Sequence[tuple[OtherConstants, float]] = (),
 ) -> dict[int, tuple[float, float]]:
     """Return 95 % intervals of constants over all explanations that have them.
 
@@ -53,7 +53,7 @@ def over_explanations(
     carried, explanations
         Sets of effects, and how probable each is.
     other
-        Sets of effects beside other relaxation times, and how much likelier each is than what was
+        Sets of effects beside other declared constants, and how much likelier each is than what was
         found: with a shorter time a coefficient is smaller by the same factor.
     """
     weighed = contenders(carried, explanations)

@@ -1,4 +1,4 @@
-"""A spectrum of another temperature is told from effects of the instrument and of the fluid."""
+"""Declared constants of another temperature or sample are told from effects that are missing."""
 
 import re
 
@@ -11,7 +11,7 @@ from independent.instruments import Instrument
 from independent.maxwell import UpperConvectedMaxwell
 
 import discover as dc
-from discover.closed_loop.explanations.other_times import FACTOR
+from discover.closed_loop.explanations.other_constants import FACTOR
 
 pytestmark = pytest.mark.usefixtures("effects_alone")
 
@@ -25,7 +25,7 @@ FLOWS = {
 EFFECTS = ["wall_slip", "giesekus_mobility", "stress_gain"]
 
 
-def loop_of(folder, material, declared_time, instrument=None):
+def loop_of(folder, material, declared_time, instrument=None, **how):
     """Return the loop over noisy records of a material, told a relaxation time."""
     times, generator = np.linspace(0.0, 8.0, 60), np.random.default_rng(0)
     instrument = instrument or Instrument()
@@ -41,6 +41,7 @@ def loop_of(folder, material, declared_time, instrument=None):
         effects=EFFECTS,
         max_effects=1,
         explanations=3,
+        **how,
     )
 
 
@@ -78,3 +79,21 @@ def test_an_effect_that_no_factor_on_the_times_imitates_stands_alone(tmp_path):
     assert FACTOR not in loop.stages[0].aliases
     assert "relaxation times" not in loop.remaining["description"]
     assert loop.explanations.inclusion["giesekus_mobility"] > 0.8
+
+
+@pytest.mark.parametrize(("declared", "verdict"), [(0.3, "unexplained"), (0.5, "no_effect_needed")])
+def test_a_known_effect_of_another_sample_is_told_with_its_own_constant(
+    tmp_path, declared, verdict
+):
+    known = {"giesekus_mobility": {"alpha": declared}}
+    loop = loop_of(tmp_path, Giesekus(0.5, MODULUS, TIME), TIME, known_effects=known)
+    assert loop.verdict == verdict
+    said = re.search(
+        r"alpha = ([0-9.]+) \(declared: 0\.3\) of giesekus_mobility the fitted",
+        loop.remaining["description"],
+    )
+    if declared == 0.5:
+        assert said is None
+    else:
+        # the standard error of a mobility at this noise is half a per cent
+        assert float(said[1]) == pytest.approx(0.5, rel=0.02)

@@ -1,0 +1,239 @@
+"""Declared constants that differ from what was declared, held against the effects that were found.
+
+A spectrum is measured in another test, at a temperature that may differ, on another filling or
+another batch; a known effect has the constants of an earlier result or of a data sheet. What either
+leaves of the data where it is wrong looks like an effect: of an upper convected Maxwell fluid in
+shear, a slip of s = (1/f − 1)/(Gλ) leaves the same stress at all times as a factor f on all times.
+A factor on all moduli is `stress_gain`, which is a candidate; these are none, since what to do
+about them is to fit the constants along, and to ask again what is missing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.closed_loop.explanations.beam import Carried
+from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.search import Search
+from discover.effects import AbstractEffect
+from discover.forward import AugmentedModel, Batch
+from discover.forward.least_squares import Fit
+from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.words import listed, percent_of
+
+FACTOR = "relaxation_time_factor"
+"""Among the aliases of an effect, that a factor on all declared times does instead."""
+
+_FACTOR_AT = 1  # of its logarithm, in the parameter vector
+_MOST = 4  # sets in which each is tried
+
+Start = tuple[np.ndarray, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Held:
+    """Declared constants that no fit may change.
+
+    Attributes
+    ----------
+    name
+        As an alias of effects: `FACTOR`, or the known effect.
+    positions
+        Of the constants in the parameter vector.
+    effect
+        The known effect; None for the factor.
+    """
+
+    name: str
+    positions: tuple[int, ...]
+    effect: AbstractEffect | None = None
+
+    def said(self, model: AugmentedModel, theta: np.ndarray) -> str:
+        """Return in words what a fit makes of the constants."""
+        if self.effect is None:
+            factor = np.exp(theta[_FACTOR_AT])
+            return f"relaxation times that are all {factor:.3g} times the declared ones"
+        names = dict(zip(model.positions(self.name), self.effect.parameters, strict=True))
+        zero = model.zero()
+        values = [f"{names[p].name} = {theta[p]:.3g} {names[p].unit}".rstrip()
+                  + f" (declared: {zero[p]:.3g})" for p in self.positions]  # fmt: skip
+        return f"{listed(values)} of {self.name}"
+
+    @property
+    def advice(self) -> str:
+        """What to do about it."""
+        if self.effect is None:
+            return (
+                "A sweep at another temperature or of another sample does that: look at it, or fit "
+                'the times along ([model] relaxation_time_s = "fit").'
+            )
+        return (
+            "Another sample than that of the declared value does that: look where it comes from, "
+            f'or fit it along ("fit" for {self.name} in [model] effects).'
+        )
+
+
+@dataclass(frozen=True)
+class OtherConstants:
+    """Declared constants with other values, beside some effects, that explain the records.
+
+    Attributes
+    ----------
+    name
+        Of what was held; see `Held`.
+    effects
+        That stay beside it.
+    sentence
+        What they do, and what to do about it.
+    criterion
+        As of `Carried`; what was held counts as an effect.
+    theta
+        All parameters of the fit.
+    """
+
+    name: str
+    effects: tuple[str, ...]
+    sentence: str
+    criterion: float
+    theta: Float[np.ndarray, " p"]
+
+
+def other_constants(
+    search: Search, carried: Sequence[Carried], judgement: Judgement, unseen: Batch | None
+) -> list[OtherConstants]:
+    """Return sets of effects that explain the fitted runs beside other declared constants.
+
+    Where the runs are explained, the constants take the place of each effect of each explanation;
+    where they are not, they are tried beside what was found, less one effect or not, and beside
+    single effects. Where runs held out refute what was found, only those of a known effect are
+    tried, and have to miss these runs by less.
+    """
+    if not (search.active or judgement.structured):
+        return []
+    tried = _sets(search, carried, judgement)
+    found = []
+    for held in _held(search, judgement.carries_over):
+        # a set that is there without it already has nothing to gain
+        sets = {names: start for names, start in tried.items() if held.name not in names}
+        starts = [theta for theta, _ in sets.values()]
+        free = [(*own, *held.positions) for _, own in sets.values()]
+        for names, fit in zip(sets, search.problem.fits(starts, free, rivals=True), strict=True):
+            usable = fit.usable and _inside(search.model, fit, held)
+            if usable and search.tolerated.explained(fit, names):
+                found.append(_found(search, held, names, fit, unseen))
+    # beside effects that do as well alone the constants do nothing
+    alone = {one.effects: _worth(search, one.cost, one.free, one.effects) for one in search.seen}
+    found = [one for one in found if one.criterion < alone.get(one.effects, np.inf) - BARE_MENTION]
+    if judgement.carries_over or unseen is None:
+        return found
+    refuted = _error(search.model, search.fit.theta, unseen)
+    return [one for one in found if _error(search.model, one.theta, unseen) < refuted]
+
+
+def _held(search: Search, carries_over: bool) -> list[Held]:
+    """Return the declared constants that the search held: times, and those of known effects."""
+    free, model = search.fit.free, search.model
+    times = carries_over and _FACTOR_AT not in free  # a fit says nothing of what else is refuted
+    held = [Held(FACTOR, (_FACTOR_AT,))] if times else []
+    for known in model.declared.effects:
+        if own := tuple(p for p in model.positions(known.name) if p not in free):
+            held.append(Held(known.name, own, known.effect))
+    return held
+
+
+def _sets(
+    search: Search, carried: Sequence[Carried], judgement: Judgement
+) -> dict[tuple[str, ...], Start]:
+    tried: dict[tuple[str, ...], Start] = {}
+    for one in carried[:_MOST]:
+        for name in one.effects:
+            left = tuple(sorted(set(one.effects) - {name}))
+            tried.setdefault(left, search.problem.without(one.fit, name))
+    if judgement.structured:
+        tried.setdefault((), search.problem.without(search.fit, *search.active))
+        tried.setdefault(tuple(sorted(search.active)), (search.fit.theta, search.fit.free))
+        single = sorted((s for s in search.seen if len(s.effects) == 1), key=lambda s: s.cost)
+        for seen in islice(single, _MOST):
+            tried.setdefault(seen.effects, (seen.theta(search.model), seen.free))
+    return tried
+
+
+def _inside(model: AugmentedModel, fit: Fit, held: Held) -> bool:
+    """Return whether a fit stands at no end of what the constants can be."""
+    at = list(held.positions)
+    return bool(np.all((model.low[at] < fit.theta[at]) & (fit.theta[at] < model.high[at])))
+
+
+def _found(
+    search: Search, held: Held, effects: tuple[str, ...], fit: Fit, unseen: Batch | None
+) -> OtherConstants:
+    worth = _worth(search, search.problem.cost(fit), fit.free, (*effects, held.name))
+    missed = f"the fitted runs are missed by {percent_of(float(np.mean(fit.run_errors)))}"
+    if unseen is not None:
+        error = _error(search.model, fit.theta, unseen)
+        missed += f", and those held out by {percent_of(error)}"
+    beside = f" and {' and '.join(effects)}" if effects else ""
+    sentence = f"With {held.said(search.model, fit.theta)}{beside} {missed}. {held.advice}"
+    return OtherConstants(held.name, effects, sentence, worth, fit.theta)
+
+
+def _error(model: AugmentedModel, theta: np.ndarray, runs: Batch) -> float:
+    """Return the relative misfit of runs, mean over them."""
+    residual = np.asarray(model.residuals([theta], runs))[0]
+    return float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
+
+
+def _worth(search: Search, cost: float, free: Sequence[int], effects: Sequence[str]) -> float:
+    """Return the criterion of a fit as the explanations are weighed: by what the search left."""
+    problem = search.problem
+    return problem.criterion(cost, free, effects, problem.independent_samples(search.fit))
+
+
+def weighed_constants(
+    others: Sequence[OtherConstants], carried: Sequence[Carried], active: Sequence[str]
+) -> list[tuple[OtherConstants, float]]:
+    """Return sets beside other constants, and how much likelier each is than what was found.
+
+    Those that the records tell from it are left out.
+    """
+    own = next((one.criterion for one in carried if set(one.effects) == set(active)), np.inf)
+    return [
+        (one, float(np.exp(0.5 * (own - one.criterion))))
+        for one in others
+        if abs(one.criterion - own) < INDISTINGUISHABLE
+    ]
+
+
+def compared_with_constants(
+    judgement: Judgement,
+    active: Sequence[str],
+    carried: Sequence[Carried],
+    others: Sequence[OtherConstants],
+) -> tuple[Judgement, dict[str, str]]:
+    """Return the judgement, and what constants do as well instead of effects that were found.
+
+    Where other constants explain the runs clearly better than what was found, that is no finding.
+    """
+    if not others:
+        return judgement, {}
+    best = min(others, key=lambda one: one.criterion)
+    own = next(one.criterion for one in carried if set(one.effects) == set(active))
+    if judgement.structured or best.criterion < own - INDISTINGUISHABLE:
+        return _with_sentence(replace(judgement, structured=True, verdict="unexplained"), best), {}
+    # the best last, which stays
+    instead = {
+        name: one
+        for one in sorted(others, key=lambda one: -one.criterion)
+        for name in set(active) - set(one.effects)
+        if one.criterion < own + INDISTINGUISHABLE
+    }
+    if instead:
+        judgement = _with_sentence(judgement, min(instead.values(), key=lambda one: one.criterion))
+    return judgement, {name: one.name for name, one in instead.items()}
+
+
+def _with_sentence(judgement: Judgement, other: OtherConstants) -> Judgement:
+    return replace(judgement, description=f"{judgement.description} {other.sentence}")
