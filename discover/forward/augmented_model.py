@@ -27,7 +27,8 @@ from discover.forward.batches import (
 )
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
-from discover.forward.program import Numbers, Structure, program_of
+from discover.forward.program import program_of
+from discover.forward.structure import Numbers, Structure
 from discover.programs import in_threads
 
 # Of the upper end of its range, to which the first trial of a parameter is kept

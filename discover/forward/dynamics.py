@@ -9,7 +9,7 @@ from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_runge_kutta import (
+from discover.simulate.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,

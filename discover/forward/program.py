@@ -1,16 +1,12 @@
 """What is compiled of a model: predictions for one structure of law and effects."""
 
 from functools import lru_cache
-from typing import NamedTuple
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
 
 from discover.effects import (
-    AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
     ModeDependence,
@@ -35,6 +31,7 @@ from discover.forward.integrator import integrate
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
 from discover.forward.starts.steady_states import steady_states
+from discover.forward.structure import Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.programs import compiled
@@ -46,31 +43,6 @@ from tensor_library.kinematics import rate_of_deformation
 # eight runs and all candidates a prediction takes 2.0 ms so and 6.3 otherwise for 3 modes, 4.8 and
 # 7.5 for 6, 10 and 7.8 for 9: arithmetic on many numbers is faster in pieces of its own
 _FEW_MODES = 6
-
-
-class Numbers(eqx.Module):
-    """What of a declared model is data to the compiled program."""
-
-    law: AbstractConstitutiveLaw
-    modulus: Float[Array, " k"]
-    relaxation_time: Float[Array, " k"]
-    solvent_viscosity: Float[Array, ""]
-
-
-class Structure(NamedTuple):
-    """What decides which program is compiled; models that share it share the program."""
-
-    effects: tuple[AbstractEffect, ...]
-    free_parameters: tuple[str, ...]
-    law_name: str
-    parameters: tuple[tuple[str, float], ...]
-    fit_modulus: bool
-    by_mode: tuple[tuple[str, int, int], ...] = ()
-    """Constants that may differ from mode to mode, and where what varies them begins and ends."""
-    step_instants: int = 0
-    """How many instants of steps of the rate are fitted, each as a share of its interval."""
-    added_modes: int = 0
-    """How many modes that effects add have constants by mode of their own."""
 
 
 class Program:

@@ -12,7 +12,8 @@ from discover.laws import (
     LinearPhanThienTanner,
     make_law,
 )
-from discover.learners.distillation import STUDENTS, MaxwellSurrogate, compare_fluids, distil
+from discover.learners.distillation import compare_fluids, distil
+from discover.learners.students import STUDENTS, MaxwellSurrogate
 from discover.protocols import in_flow, oscillatory_shear, paper_training_protocols, start_up
 from discover.simulate import simulate
 

@@ -11,7 +11,7 @@ from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate
 from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.exponential_runge_kutta import turned
+from discover.simulate.exponential_weights import turned
 from discover.simulate.flow_batch import lay_out
 from discover.simulate.solve import solve_batch
 

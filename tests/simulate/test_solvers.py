@@ -23,7 +23,7 @@ from discover.simulate import (
     solve_on_grid,
     synthetic_dataset,
 )
-from discover.simulate.exponential_runge_kutta import phi_functions
+from discover.simulate.exponential_weights import phi_functions
 
 SPECTRUM = (np.logspace(5, 3, 13), np.logspace(-3, 4, 13))  # 1 ms to 10,000 s
 

@@ -1,0 +1,310 @@
+"""Weights of a step that treats linear relaxation exactly."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+_TAYLOR_TERMS = 14
+
+
+def phi_functions(
+    z: Float[Array, " ..."],
+) -> tuple[Float[Array, " ..."], Float[Array, " ..."], Float[Array, " ..."]]:
+    """Return φ₁, φ₂, φ₃ with φ₁(z) = (eᶻ − 1)/z and φₖ₊₁(z) = (φₖ(z) − 1/k!)/z.
+
+    The recurrence loses digits near zero, so a Taylor series serves there: with 14 terms its
+    remainder at |z| = 1 is below 1e-15, and the recurrence loses less than three digits beyond.
+    """
+    small = jnp.abs(z) < 1.0
+    safe = jnp.where(small, 1.0, z)
+    first = jnp.expm1(safe) / safe
+    second = (first - 1.0) / safe
+    third = (second - 0.5) / safe
+    near = jnp.where(small, z, 0.0)
+    series = jnp.zeros_like(z)
+    factorial = [1.0]
+    for n in range(1, _TAYLOR_TERMS + 4):
+        factorial.append(factorial[-1] * n)
+    for n in reversed(range(_TAYLOR_TERMS)):
+        series = series * near + 1.0 / factorial[n + 3]
+    series_second = 0.5 + near * series
+    series_first = 1.0 + near * series_second
+    return (
+        jnp.where(small, series_first, first),
+        jnp.where(small, series_second, second),
+        jnp.where(small, series, third),
+    )
+
+
+def with_shares(state, shares, factor: float, axis: int):
+    """Return states whose first tensor has shares of the further ones more, times a factor.
+
+    Parameters
+    ----------
+    state
+        Components along an axis: four of each tensor, and what stands behind.
+    shares
+        Of each further tensor, or of each and of each mode along the last axis of `state`; None or
+        none leaves states as they are.
+    factor
+        1, or −1 to undo it.
+    axis
+        Of the components.
+    """
+    if shares is None or not len(shares):
+        return state
+    moved = jnp.moveaxis(state, axis, 0)
+    for i, share in enumerate(shares, start=1):
+        moved = moved.at[:4].add(factor * share * moved[4 * i : 4 * i + 4])
+    return jnp.moveaxis(moved, 0, axis)
+
+
+class KrogstadWeights(NamedTuple):
+    """What one step of Krogstad's method multiplies state and remainders with.
+
+    The stages are Y2 = half y + a21 N1, Y3 = half y + a31 N1 + a32 N2 and Y4 = full y + a41 N1 +
+    a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y.
+    A parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle, in which m4
+    is the weight of N4; those of the others follow from it and from the stages.
+    """
+
+    half: Float[Array, " ..."]
+    full: Float[Array, " ..."]
+    a21: Float[Array, " ..."]
+    a31: Float[Array, " ..."]
+    a32: Float[Array, " ..."]
+    a41: Float[Array, " ..."]
+    a43: Float[Array, " ..."]
+    b1: Float[Array, " ..."]
+    b23: Float[Array, " ..."]
+    b4: Float[Array, " ..."]
+    m4: Float[Array, " ..."]
+
+    def tableau(self) -> tuple[Float[Array, "4 ..."], Float[Array, "4 4 ..."]]:
+        """Return what each stage multiplies the state with, and the remainders of all stages."""
+        none = jnp.zeros_like(self.a21)
+        rows = (
+            (none, none, none, none),
+            (self.a21, none, none, none),
+            (self.a31, self.a32, none, none),
+            (self.a41, none, self.a43, none),
+        )
+        kept = jnp.stack([jnp.ones_like(self.half), self.half, self.half, self.full])
+        return kept, jnp.stack([jnp.stack(row) for row in rows])
+
+    def second(self, y, n1):
+        """Return Y2, of the state and the remainder there; shapes that broadcast, as below."""
+        return self.half * y + self.a21 * n1
+
+    def third(self, y, n1, n2):
+        """Return Y3."""
+        return self.half * y + self.a31 * n1 + self.a32 * n2
+
+    def fourth(self, y, n1, n3):
+        """Return Y4."""
+        return self.full * y + self.a41 * n1 + self.a43 * n3
+
+    def end(self, y, n1, n2, n3, n4):
+        """Return the state after the step."""
+        return self.full * y + self.b1 * n1 + self.b23 * (n2 + n3) + self.b4 * n4
+
+    def middle(self, y, n1, n2, n3, n4):
+        """Return the state in the middle of the step, as exact as that after it."""
+        m1 = self.a21 - 0.5 * self.a32 + self.m4
+        m23 = 0.25 * self.a32 - self.m4
+        return self.half * y + m1 * n1 + m23 * (n2 + n3) + self.m4 * n4
+
+
+class StressWeights(NamedTuple):
+    """The same for stresses of modes, (4, k), whose trace may relax faster than the rest.
+
+    Attributes
+    ----------
+    whole
+        Weights of each mode.
+    trace
+        Those of its trace; None where it relaxes as the rest does.
+    faster
+        By how much the trace relaxes faster, over 1/λ, shape (k,).
+    beside
+        The same of each further tensor of the law, each with by how much it relaxes as a whole
+        faster than −1; for a law with one tensor none.
+    shares
+        What σ has of each of these, of which only the rest is followed; None for none.
+    """
+
+    whole: KrogstadWeights
+    trace: KrogstadWeights | None = None
+    faster: Float[Array, " k"] | float = 0.0
+    beside: tuple[tuple["StressWeights", Float[Array, " k"]], ...] = ()
+    shares: Float[Array, "tensors k"] | None = None
+
+    def remainder(self, stress, change, decay: float):
+        """Return what of a change is not relaxation at the rates of these weights."""
+        stress, change = (with_shares(one, self.shares, -1.0, axis=0) for one in (stress, change))
+        if decay:
+            change = change + decay * stress
+        if self.trace is not None:
+            change = change.at[:3].add(self.faster * _mean_normal(stress))
+        for i, (own, faster) in enumerate(self.beside, start=1):
+            at = slice(4 * i, 4 * i + 4)
+            left = own.remainder(stress[at], change[at] + faster * stress[at], 0.0)
+            change = change.at[at].set(left)
+        return with_shares(change, self.shares, 1.0, axis=0)
+
+    def step(
+        self,
+        stress: Float[Array, "s k"],
+        stage: Callable[[Float[Array, "s k"], Any], tuple[Float[Array, "s k"], Any]],
+        inputs: Any,
+        at_once: int = 1,
+    ) -> tuple[Float[Array, "s k"], Any]:
+        """Return the stress after a step, and what else each stage says.
+
+        A scan and not four lines: what a stage does is then compiled once and not four times.
+
+        Parameters
+        ----------
+        stress
+            Before the step.
+        stage
+            Of the stress in a stage and of its share of `inputs`; returns `remainder` and more.
+        inputs
+            A tree with a leading axis of four stages.
+        at_once
+            Stages that are compiled one after another: with 4 a small one takes a quarter less.
+        """
+        if self.beside:
+            return self._step_by_step(stress, stage, inputs)
+        rows = [self.whole.tableau()]
+        if self.trace is not None:
+            rows.append(self.trace.tableau())
+
+        def one(remainders, given):
+            number, tableau, own = given
+            (kept, weights), *of_trace = tableau
+            state = kept * stress + jnp.sum(weights[:, None] * remainders, axis=0)
+            for other_kept, other in of_trace:
+                mean = (other_kept - kept) * _mean_normal(stress)
+                means = jax.vmap(_mean_normal)(remainders)
+                state = state.at[:3].add(mean + jnp.sum((other - weights) * means, axis=0))
+            found, more = stage(state, own)
+            return remainders.at[number].set(found), more
+
+        start = jnp.zeros((4, *stress.shape), stress.dtype)
+        remainders, more = jax.lax.scan(one, start, (jnp.arange(4), rows, inputs), unroll=at_once)
+        return self.end(stress, *remainders), more
+
+    def _step_by_step(self, stress, stage, inputs):
+        """Return what `step` does, where each tensor of the law has weights of its own."""
+        given = [jax.tree.map(lambda leaf, i=i: leaf[i], inputs) for i in range(4)]
+        n1, first = stage(stress, given[0])
+        n2, second = stage(self.second(stress, n1), given[1])
+        n3, third = stage(self.third(stress, n1, n2), given[2])
+        n4, fourth = stage(self.fourth(stress, n1, n3), given[3])
+        more = jax.tree.map(lambda *leaves: jnp.stack(leaves), first, second, third, fourth)
+        return self.end(stress, n1, n2, n3, n4), more
+
+    def second(self, y, n1):
+        """Return Y2, as `KrogstadWeights` does."""
+        return self._applied("second", y, n1)
+
+    def third(self, y, n1, n2):
+        """Return Y3."""
+        return self._applied("third", y, n1, n2)
+
+    def fourth(self, y, n1, n3):
+        """Return Y4."""
+        return self._applied("fourth", y, n1, n3)
+
+    def end(self, y, n1, n2, n3, n4):
+        """Return the state after the step."""
+        return self._applied("end", y, n1, n2, n3, n4)
+
+    def middle(self, y, n1, n2, n3, n4):
+        """Return the state in the middle of the step."""
+        return self._applied("middle", y, n1, n2, n3, n4)
+
+    def _applied(self, stage: str, *parts):
+        parts = [with_shares(part, self.shares, -1.0, axis=0) for part in parts]
+        found = getattr(self.whole, stage)(*parts)
+        if self.trace is not None:
+            means = [_mean_normal(part) for part in parts]
+            apart = getattr(self.trace, stage)(*means) - getattr(self.whole, stage)(*means)
+            found = found.at[:3].add(apart)
+        for i, (own, _) in enumerate(self.beside, start=1):
+            at = slice(4 * i, 4 * i + 4)
+            found = found.at[at].set(getattr(own, stage)(*(part[at] for part in parts)))
+        return with_shares(found, self.shares, 1.0, axis=0)
+
+
+def _mean_normal(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
+    return jnp.sum(stress[:3], axis=0) / 3.0
+
+
+def krogstad_weights(
+    z: Float[Array, " ..."], step: Float[Array, " ..."] | Float[Array, ""]
+) -> KrogstadWeights:
+    """Return the weights of a step   [Krogstad 2005, JCP 203, 72].
+
+    Parameters
+    ----------
+    z
+        Minus the decay over the step.
+    step
+        Its length, in the unit of time of the remainders.
+    """
+    half_first, half_second, half_third = phi_functions(0.5 * z)
+    first, second, third = phi_functions(z)
+    return KrogstadWeights(
+        half=jnp.exp(0.5 * z),
+        full=jnp.exp(z),
+        a21=0.5 * step * half_first,
+        a31=step * (0.5 * half_first - half_second),
+        a32=step * half_second,
+        a41=step * (first - 2.0 * second),
+        a43=2.0 * step * second,
+        b1=step * (first - 3.0 * second + 4.0 * third),
+        b23=step * (2.0 * second - 4.0 * third),
+        b4=step * (4.0 * third - second),
+        m4=step * (0.5 * half_third - 0.25 * half_second),
+    )
+
+
+def relax(
+    source: Float[Array, "*levels"],
+    decay: Float[Array, "*levels"],
+    state: Float[Array, "*levels"],
+    width: Float[Array, ""],
+) -> Float[Array, "*levels"]:
+    """Return s after a step of ds/dt = source − decay · s with both of them constant, exactly."""
+    z = -decay * width
+    return state * jnp.exp(z) + source * width * phi_functions(z)[0]
+
+
+_NORMAL = np.array([1.0 - 3.0**0.5, 1.0, 1.0])
+_TURN = np.eye(3) - 2.0 * np.outer(_NORMAL, _NORMAL) / np.sum(_NORMAL**2)
+"""The reflection that takes (1, 1, 1) to the first axis; it is its own inverse."""
+
+
+def turned(state: Float[Array, "k s *columns"], tensors: int = 1) -> Float[Array, "k s *columns"]:
+    """Return states whose normal stresses are told as their sum over √3 and two of a deviator.
+
+    Done twice it changes nothing.
+
+    Parameters
+    ----------
+    state
+        Of each mode.
+    tensors
+        How many stand first in it, four components each.
+    """
+    for first in range(0, 4 * tensors, 4):
+        normals = slice(first, first + 3)
+        normal = jnp.tensordot(jnp.asarray(_TURN, state.dtype), state[:, normals], axes=(1, 1))
+        state = state.at[:, normals].set(jnp.moveaxis(normal, 0, 1))
+    return state
