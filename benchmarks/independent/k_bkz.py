@@ -26,6 +26,10 @@ class KBKZ(Material):
     modulus: float = 1.0
     relaxation_time: float = 1.0
 
+    def damped(self, strain: np.ndarray) -> np.ndarray:
+        """Return h(γ)."""
+        return np.exp(-self.damping * np.abs(strain))
+
     def respond(self, flow: Flow, times: np.ndarray) -> Stresses:
         """Return the stresses in a flow from rest, by Gauss–Legendre quadrature between knots."""
         times = np.asarray(times, float)
@@ -46,6 +50,6 @@ class KBKZ(Material):
             memory = np.append(
                 weight[seen] / lam * np.exp(-(time - past[seen]) / lam), np.exp(-time / lam)
             )
-            kernel = self.modulus * memory * np.exp(-self.damping * np.abs(strain)) * strain
+            kernel = self.modulus * memory * self.damped(strain) * strain
             shear[i], first[i] = np.sum(kernel), np.sum(kernel * strain)
         return Stresses(shear, first, self.normal_ratio * first)
