@@ -25,7 +25,7 @@ from independent.worlds import MODULUS, TIME, draw_world
 import discover as dc
 from discover.comparison import judgement
 from discover.comparison.judging.bands.dense_library import DENSE
-from discover.learners import weighted_laws
+from discover.learners.results import weighted_laws
 
 DEVELOPMENT = range(1, 10)
 """Seeds of worlds that may decide a rule; any other judges."""

@@ -9,12 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from discover.closed_loop.search import Search
+from discover.effects import make_effect
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Prior, intervals
+from discover.forward.least_squares import Fit, Prior, intervals
 from discover.forward.modulus_errors import modulus_shifts
 from discover.inference.by_mode import constants_by_mode
-from discover.inference.constants import ConstantByMode
+from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.inference.degrees import Degree, choose_degrees
+from discover.inference.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.varying_constant import freer_fits
 
@@ -57,6 +59,54 @@ def modes_apart(
     bounds = intervals(model, search.batch, fit, shifts)
     freer = freer_fits(model, search.batch, fit, alike, known)
     return constants_by_mode(model, search.batch, fit, bounds, alike, freer)
+
+
+def with_other_laws(
+    search: Search, found: Mapping[str, ConstantByMode], scales: Mapping[str, float]
+) -> dict[str, ConstantByMode]:
+    """Return constants by mode, those left open whose mode may follow another law.
+
+    It is asked where one classical law of one constant explains the runs, beside whatever else.
+
+    Parameters
+    ----------
+    search
+        A finished search in a fluid of several modes.
+    found
+        What it left open of each mode.
+    scales
+        Of the data, as the model of the search has them.
+    """
+    before, told = search.model, dict(found)
+    laws = [name for name in found if name in ONE_CONSTANT]
+    known = {one.name for one in before.declared.effects}
+    if len(laws) != 1 or known & set(ONE_CONSTANT) or laws[0] not in search.active:
+        return told
+    (name,) = laws
+    added = 1 if len(before.declared.modulus) == 1 else 0
+    declared = replace(before.declared, by_mode=ONE_CONSTANT, added_modes=added)
+    effects = {one: effect_of(before, one) for one in search.active}
+    effects |= {one: make_effect(one) for one in ONE_CONSTANT if one not in effects}
+    model = AugmentedModel(declared, list(effects.values()), scales)
+    places = places_in(before, model, search.active)
+    problem = FitProblem(model, search.batch, 1, prior_in(search.prior, places))
+    start = model.zero()
+    start[[*places.values()]] = search.fit.theta[[*places]]
+    same = problem.fit(start, [places[at] for at in search.fit.free])
+    if same.usable:
+        modes = tuple(
+            one if one.ci95 is None else _open_to(one, laws_as_good(problem, same, name, at))
+            for at, one in enumerate(told[name].modes)
+        )
+        told[name] = replace(told[name], modes=modes)
+    return told
+
+
+def _open_to(mode: ModeConstant, others: Mapping[str, Fit]) -> ModeConstant:
+    """Return a mode that may follow other laws; if there are any, its constant says nothing."""
+    if not others:
+        return mode
+    return replace(mode, ci95=None, left_open=True, other_laws=tuple(others))
 
 
 def places_in(

@@ -15,7 +15,7 @@ from discover.closed_loop.explanations import FACTORS, Carried, carry_and_turn
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.law_choice import choose_law, law_beside_effects, taken_first
-from discover.closed_loop.modes_apart import modes_apart
+from discover.closed_loop.modes_apart import modes_apart, with_other_laws
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.search import Search
 from discover.closed_loop.search.checkpoint import SearchCheckpoint, Store
@@ -164,8 +164,9 @@ class SearchTask:
         """Return what runs say of each mode's constants; None where these differ."""
         self.say(f"what the runs say of {', '.join(names)} in each mode")
         found = modes_apart(search, names, data_scales(self.fitted))
-        alike = all(max(one.evidence) <= INDISTINGUISHABLE for one in found.values())
-        return found if alike else None
+        if any(max(one.evidence) > INDISTINGUISHABLE for one in found.values()):
+            return None
+        return with_other_laws(search, found, data_scales(self.fitted))
 
     def one_degree_more(self, before: SearchResult) -> SearchResult | None:
         """Search once more with constants by mode of one degree more; None where there is none.

@@ -89,12 +89,15 @@ class ModeConstant:
         Whether these data leave it open: the interval leaves hardly a value out, the runs are as
         well described whatever this mode's constant, or it stands at the upper end of its range.
         What stands here then comes from the other modes and the smooth function alone.
+    other_laws
+        Effects which this mode alone may follow instead, as far as these data tell.
     """
 
     relaxation_time_s: float
     value: float
     ci95: tuple[float, float] | None
     left_open: bool
+    other_laws: tuple[str, ...] = ()
 
     @property
     def width(self) -> float:

@@ -22,7 +22,8 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid
 from discover.laws.textbook.giesekus import Giesekus
-from discover.learners import LearnerResult, weighted_laws
+from discover.learners import LearnerResult
+from discover.learners.results import weighted_laws
 from discover.learners.results.weighted_laws import WeightedLaws
 from discover.protocols import start_up
 from discover.statistics.residual import Expectation

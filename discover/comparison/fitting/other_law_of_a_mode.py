@@ -1,8 +1,4 @@
-"""Another law in one mode alone, where the same one in all modes explains the runs.
-
-Of a mode that the flow hardly stretches records tell how large the first departure from linear
-viscoelasticity is, and not of which law it is.
-"""
+"""What laws of which one mode follows another leave open in a comparison."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -16,18 +12,14 @@ from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel
-from discover.forward.by_mode import DEGREE, LARGEST
 from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.degrees import Degree
 from discover.inference.draws_by_mode import ConstantsDrawn
-from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.varying_constant import varying_constants
 from discover.study.declared_model import DeclaredModel
-
-_ONE_CONSTANT = ("giesekus_mobility", "ptt_linear", "non_affine_motion")
-"""The classical laws with one constant by mode, between which slow flows do not decide."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +58,6 @@ def other_laws_of_modes(
 ) -> OtherLaws:
     """Return the laws of which one mode follows another, that describe the runs as well.
 
-    As well as that whose constant is free in this mode: both have two constants.
-
     Parameters
     ----------
     model
@@ -82,9 +72,9 @@ def other_laws_of_modes(
     flows
         In which the laws predict.
     """
-    if name not in _ONE_CONSTANT:
+    if name not in ONE_CONSTANT:
         return OtherLaws()
-    problem = problem_by_mode(model, _ONE_CONSTANT, fitted, 1)
+    problem = problem_by_mode(model, ONE_CONSTANT, fitted, 1)
     forward = problem.model
     start = forward.zero()
     amplitude = forward.positions(name)[0]
@@ -97,39 +87,11 @@ def other_laws_of_modes(
     fits = [same]
     for time in told_times_s:
         mode = int(np.argmin(np.abs(np.log(modes / time))))
-        as_well = _as_good(problem, same, name, mode)
+        as_well = laws_as_good(problem, same, name, mode)
         if as_well:
             found[float(time)] = tuple(as_well)
             fits.extend(as_well.values())
     return OtherLaws(found, _moved(problem, fits, model, flows) if found else {})
-
-
-def _as_good(problem: FitProblem, same: Fit, name: str, mode: int) -> dict[str, Fit]:
-    """Return the fits of other laws in one mode, by their name, that are as good as any of its."""
-    forward = problem.model
-    amplitude = forward.positions(name)[0]
-    deviations = forward.varying(name)[DEGREE:]
-    own = problem.fit(same.theta, [amplitude, deviations[mode]])
-    own = own if own.usable and problem.cost(own) < problem.cost(same) else same
-    effective = problem.independent_samples(own)
-    found = {}
-    for other in _ONE_CONSTANT:
-        if other == name:
-            continue
-        start = same.theta.copy()
-        start[deviations[mode]] = -LARGEST
-        at = forward.positions(other)[0]
-        start[at] = same.theta[amplitude]
-        elsewhere = np.delete(forward.varying(other)[DEGREE:], mode)
-        start[elsewhere] = -LARGEST
-        fit = problem.fit(start, [amplitude, at])
-        if not fit.usable:
-            continue
-        # of the same number of constants
-        behind = effective * np.log(problem.cost(fit) / problem.cost(own))
-        if behind < INDISTINGUISHABLE:
-            found[other] = fit
-    return found
 
 
 def _moved(
@@ -137,11 +99,11 @@ def _moved(
 ) -> dict[str, Float[np.ndarray, "laws n 3"]]:
     """Return by how much predictions of all fits but the first differ from it."""
     forward = problem.model
-    values = np.array([[_of_modes(forward, fit, one) for one in _ONE_CONSTANT] for fit in fits])
-    drawn = [ConstantsDrawn(_ONE_CONSTANT, row[None], (1,)) for row in values]
-    effects = [effect_of(forward, one) for one in _ONE_CONSTANT]
+    values = np.array([[_of_modes(forward, fit, one) for one in ONE_CONSTANT] for fit in fits])
+    drawn = [ConstantsDrawn(ONE_CONSTANT, row[None], (1,)) for row in values]
+    effects = [effect_of(forward, one) for one in ONE_CONSTANT]
     effects = [one for one in effects if isinstance(one, ConstitutiveEffect)]
-    none = {one: np.zeros(0) for one in _ONE_CONSTANT}
+    none = {one: np.zeros(0) for one in ONE_CONSTANT}
     told = [bands_by_mode(one, effects, none, model.fluid, flows) for one in drawn]
     first, *others = told
     return {

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from discover.inference.constants import ConstantByMode
+from discover.inference.other_law_of_a_mode import other_laws_said
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,
@@ -128,8 +129,10 @@ def _allowed(constant: ConstantByMode) -> str:
         for mode in constant.told
         if mode.ci95 is not None
     ]
+    laws = {mode.relaxation_time_s: mode.other_laws for mode in constant.modes if mode.other_laws}
     if not ranges:
-        return f"{said}, and determine it in no single mode."
+        return f"{said}, and determine it in no single mode.{other_laws_said(laws)}"
     text = f"{said}, and allow {' and '.join(ranges)}"
-    left = [significant(time, 2) for time in constant.open_times_s]
-    return f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."
+    left = [significant(time, 2) for time in constant.open_times_s if time not in laws]
+    text = f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."
+    return text + other_laws_said(laws)

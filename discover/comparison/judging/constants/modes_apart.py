@@ -13,6 +13,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.constants import ConstantByMode
+from discover.inference.other_law_of_a_mode import other_laws_said
 from discover.words import listed, percent_of, plainly
 
 
@@ -130,16 +131,8 @@ def said_of_each_mode(
         if mode.ci95 is not None and mode.relaxation_time_s not in names
     ]
     if not told:
-        return f"{text}. These runs determine it in no single one.{_other_laws(names)}"
+        return f"{text}. These runs determine it in no single one.{other_laws_said(names)}"
     text = f"{text}. If it may differ, these runs allow {listed(told)}"
     left = len(constant.open_times_s)
     text = f"{text}, and leave it open in {left} of them." if left else f"{text}."
-    return text + _other_laws(names)
-
-
-def _other_laws(names: Mapping[float, Sequence[str]]) -> str:
-    return "".join(
-        f" The law of the mode of {plainly(time)} s is not determined by these data: with "
-        f"{' or '.join(others)} in it alone they are described as well."
-        for time, others in sorted(names.items())
-    )
+    return text + other_laws_said(names)
