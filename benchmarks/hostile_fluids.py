@@ -87,7 +87,12 @@ def write(case: Case, noisy: Records, folder: Path, seed: int) -> dict[str, Path
 
 def run(name: str, task: str, out: Path, seed: int, pages: bool) -> dict:
     """Return the row of one case and task."""
-    case, folder = CASES[name], out / name
+    return ask(CASES[name], name, task, out, seed, pages)
+
+
+def ask(case: Case, name: str, task: str, out: Path, seed: int, pages: bool = False) -> dict:
+    """Return the row of a case with this name."""
+    folder = out / name
     clean, noisy = make(case, seed)
     study = write(case, noisy, folder, seed)[task]
     row = {"case": name, "task": task, "truth": case.truth}

@@ -226,7 +226,7 @@ FOLDERS = {
                                  "wave.csv": (1.0, 1.0), "held.csv": (0.52, 0.5)}),
                         planted=MOBILITY, terms=SQUARE, outside=True,
                         told={"clock_factor": "a_T"}),
-    "two_geometries": Case("Giesekus, the wave between plates, torque not corrected, cone else",
+    "wave_of_plates": Case("Giesekus, the wave between plates, torque not corrected, cone else",
                            of_two_geometries(GIESEKUS, ("wave.csv",)), planted=MOBILITY,
                            terms=SQUARE, outside=True),
     "weak_rolie_poly": Case("stretching Rolie–Poly, λγ̇ up to 0.2, held out 0.3, 0.5 % noise",
