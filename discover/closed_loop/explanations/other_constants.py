@@ -116,11 +116,9 @@ def other_constants(
     tried = _sets(search, carried, judgement)
     found = []
     for held in _held(search, judgement.carries_over):
-        # a set that is there without it already has nothing to gain
-        sets = {names: start for names, start in tried.items() if held.name not in names}
-        starts = [theta for theta, _ in sets.values()]
-        free = [(*own, *held.positions) for _, own in sets.values()]
-        for names, fit in zip(sets, search.problem.fits(starts, free, rivals=True), strict=True):
+        starts = [theta for theta, _ in tried.values()]
+        free = [(*own, *held.positions) for _, own in tried.values()]
+        for names, fit in zip(tried, search.problem.fits(starts, free, rivals=True), strict=True):
             usable = fit.usable and _inside(search.model, fit, held)
             if usable and search.tolerated.explained(fit, names):
                 found.append(_found(search, held, names, fit, unseen))
