@@ -21,7 +21,11 @@ FIRST = {
 LATER = {
     "the_same": (GIESEKUS, "giesekus", {}),
     "other_mobility": (Giesekus(0.5, **SCALE), "giesekus", {"terms": {"sigma.sigma": 0.2}}),
-    "other_scale": (Giesekus(0.3, 120.0, 0.8), "giesekus", {"outside": True}),
+    "other_scale": (
+        Giesekus(0.3, 120.0, 0.8),
+        "giesekus",
+        {"outside": True, "same_as": ("relaxation_time_factor", "stress_gain")},
+    ),
     "other_law": (
         PhanThienTanner(0.3, **SCALE),
         "giesekus",
