@@ -8,11 +8,18 @@ import numpy as np
 import pytest
 from made_up_comparison import TIMES, left, made_up, page_of
 
+from discover.comparison.judging.band_check import unbounded
 from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.statements import IN_LIBRARY, Statement, no_flow_left
+from discover.comparison.judging.statements import (
+    IN_LIBRARY,
+    Statement,
+    no_flow_left,
+)
 from discover.dataset.records.repeats import Repeats
+from discover.identify.rivals.bands import PredictionBand
 from discover.protocols.control import oscillations, steady_rates
 from discover.protocols.kinematics import ONLY_STATES
+from discover.protocols.protocol import start_up
 from discover.report.comparison.verdict import comparison_verdict
 from discover.report.wording import QUESTIONS
 from discover.statistics.residual import Expectation
@@ -56,7 +63,7 @@ def test_an_unexplained_verdict_leads_and_claims_nothing(tmp_path, no_pictures):
 def test_a_law_of_states_alone_is_fitted_and_not_tested(tmp_path, no_pictures):
     curve = steady_rates(np.linspace(0.1, 10.0, len(TIMES)))
     flows = [replace(one, protocol=curve) for one in made_up().flows]
-    open_ = Statement("sigma12", "no", "No.", in_transients=True)
+    open_ = Statement("sigma12", "no", "No.", where="transients")
     comparison = made_up(flows=flows, statements=[open_, *UNEXPLAINED], warnings=(ONLY_STATES,))
     found, sure, following = comparison_verdict(comparison)
     assert found.startswith("Fitted, not tested: sparse regression's law and")
@@ -81,12 +88,29 @@ def test_a_sweep_at_small_strain_is_no_flow_that_a_law_could_fail_in(strain, unt
 
 
 def test_in_flows_that_nothing_tested_a_fitted_law_leaves_the_shear_stress_open_too():
-    statement = Statement("sigma12", "no", "No.", in_others=True)
+    statement = Statement("sigma12", "no", "No.", where="others")
     fitted, held_out = made_up().flows
     assert not statement.leaves_open("sigma12", fitted)
     assert not statement.leaves_open("sigma12", held_out)
     assert statement.leaves_open("sigma12", replace(fitted, kind="test"))
     assert statement.title == "σ12 in other flows"
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_where_laws_run_away_the_shear_stress_is_open_too(ends):
+    fitted, held_out = made_up().flows
+    held_out = replace(held_out, protocol=start_up(2.0))
+    width = np.full((len(TIMES), 3), 1.0 if ends else np.inf)
+    chosen = np.ones((len(TIMES), 3))
+    band = PredictionBand(TIMES, chosen, -width, width, -width, width, runaways=0.5)
+    narrow = replace(band, rivals_low=-chosen, rivals_high=chosen)
+    said = unbounded([fitted, held_out], {fitted.key: narrow, held_out.key: band})
+    assert bool(said) is not ends
+    if not ends:
+        assert held_out.title in said
+        assert fitted.title not in said
+        statement = Statement("sigma12", "no", said, where="unbounded")
+        assert statement.title == "σ12 where laws run away"
 
 
 def test_an_explained_verdict_is_conditional_everywhere(tmp_path, no_pictures):

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from discover.comparison.judging.band_check import BandCheck, check_band, unbounded
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import EXACT, SEPARATED, Rival, law_structure
 from discover.comparison.outcomes.flows import MEASURED, QUANTITIES, Flow
@@ -29,15 +30,16 @@ _TITLES = {
     "relaxation_time_s": "Declared relaxation time",
     "modulus_Pa": "Declared modulus",
 }
-WIDEST = 1.0
-"""Half of a band over the quantity, from which on it says nothing of it."""
-
 _ONLY_EXTENSION = (
     "Only extension was measured, which does not say what a fluid does in shear; what is shown is "
     "the choice of the law that fits."
 )
-_IN_TRANSIENTS = "σ12 in transients"
-_IN_OTHERS = "σ12 in other flows"
+Where = Literal["", "transients", "others", "unbounded"]
+_WHERE = {
+    "transients": "σ12 in transients",
+    "others": "σ12 in other flows",
+    "unbounded": "σ12 where laws run away",
+}
 _UNTESTED = (
     "No run was held out, and no more flows were fitted than the law has terms, so no other flow "
     "tested the law, and {} is not determined. Fit another run, or hold one out."
@@ -52,8 +54,6 @@ _AS_MANY_LOADINGS = (
     "loading of its own and tells no level, so it tests half as much, and {} is not determined. "
     "Fit more runs."
 )
-IN_NOISE = 2.0
-"""A measurement may stand off a band by so many times the noise of the records."""
 
 
 @dataclass(frozen=True)
@@ -70,27 +70,21 @@ class Statement:
         The reason, for a reader.
     brief
         What the verdict says of it; empty where that needs no words of its own.
-    in_transients
-        Whether it is of transients only, and not of steady and periodic states.
-    in_others
-        Whether it is only of flows that were neither fitted nor held out.
+    where
+        Of which flows it is, if not of all: of transients, and not of steady and periodic states;
+        of those that were neither fitted nor held out; of those in which no band has an end.
     """
 
     quantity: str
     determined: Determined
     text: str
     brief: str = ""
-    in_transients: bool = False
-    in_others: bool = False
+    where: Where = ""
 
     @property
     def title(self) -> str:
         """The quantity as a reader knows it."""
-        if self.in_transients:
-            return _IN_TRANSIENTS
-        if self.in_others:
-            return _IN_OTHERS
-        return _TITLES.get(self.quantity, self.quantity)
+        return _WHERE.get(self.where, _TITLES.get(self.quantity, self.quantity))
 
     def leaves_open(self, quantity: str, flow: Flow) -> bool:
         """Return whether it says that a quantity is not determined in a flow.
@@ -101,9 +95,10 @@ class Statement:
             return False
         if quantity != "sigma12":
             return True
-        if self.in_others and flow.kind in MEASURED:
+        # without an end a band is none, and says nothing already
+        if self.where == "unbounded" or (self.where == "others" and flow.kind in MEASURED):
             return False
-        return flow.in_shear and not (self.in_transients and flow.is_of_states)
+        return flow.in_shear and not (self.where == "transients" and flow.is_of_states)
 
     @property
     def of_law(self) -> bool:
@@ -123,61 +118,6 @@ class Statement:
             "determined": self.determined,
             "text": self.text,
         }
-
-
-@dataclass(frozen=True)
-class BandCheck:
-    """What a band says of a quantity, over the flows that were looked at.
-
-    Attributes
-    ----------
-    half_width
-        Half of the widest band over the prediction's norm, N2's over that of N1; None without a
-        band.
-    missed
-        Title of a flow whose truth or measurement stands outside the band; empty if none does.
-    off
-        How far outside, root-mean-square over that of the reference.
-    """
-
-    half_width: float | None
-    missed: str = ""
-    off: float = 0.0
-
-    @property
-    def holds(self) -> bool:
-        """Whether there is a band that is narrower than the quantity and that nothing refutes."""
-        return self.half_width is not None and self.half_width < WIDEST and not self.missed
-
-
-def check_band(
-    quantity: str,
-    flows: Sequence[Flow],
-    bands: Mapping[str, PredictionBand],
-    noise: float,
-) -> BandCheck:
-    """Return how wide the bands of a quantity are, and whether what is known lies inside."""
-    column = QUANTITIES.index(quantity)
-    relative_to = QUANTITIES.index("N1") if quantity == "N2" else column
-    half_width, missed, off = None, "", 0.0
-    for flow in flows:
-        band = bands.get(flow.key)
-        # of moduli there is no normal stress to have a band: that of zeros would hold them all
-        if band is None or not np.any(band.chosen[:, relative_to]):
-            continue
-        width = 0.5 * band.widths()[quantity]
-        half_width = max(half_width or 0.0, width if np.isfinite(width) else np.inf)
-        reference = flow.reference.get(quantity)
-        scale = flow.reference.get("N1" if quantity == "N2" else quantity)
-        size = 0.0 if scale is None else float(np.linalg.norm(scale))
-        if reference is None or size == 0.0:
-            continue
-        low, high = band.rivals_low[:, column], band.rivals_high[:, column]
-        outside = float(np.linalg.norm(reference - np.clip(reference, low, high))) / size
-        allowed = SEPARATED if flow.is_truth else max(SEPARATED, IN_NOISE * noise)
-        if not outside <= allowed and outside > off:
-            missed, off = flow.title, outside
-    return BandCheck(half_width, missed, off)
 
 
 def make_statements(
@@ -221,7 +161,7 @@ def make_statements(
     if training and not any(flow.in_shear for flow in training):
         return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
     states = only_states(flows)
-    found = [Statement("sigma12", "no", ONLY_STATES, in_transients=True)] if states else []
+    found = [Statement("sigma12", "no", ONLY_STATES, where="transients")] if states else []
     at = law_structure(structure)
     if at is None:
         return found + _without_structure(explanation, flows, rivals, normal_stresses_used)
@@ -229,7 +169,9 @@ def make_statements(
     few = _few_flows(_flows_measured(flows), n_terms, own_loadings)
     if (untested or few) and not states:
         text = (_UNTESTED if untested else few).format("σ12 in them")
-        found = [Statement("sigma12", "no", text, in_others=True)]
+        found = [Statement("sigma12", "no", text, where="others")]
+    if not found and (away := unbounded(flows, bands or {})):
+        found = [Statement("sigma12", "no", away, where="unbounded")]
     for quantity in at.quantities:
         if quantity.verdict == "measured":
             continue

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
+from discover.comparison.judging.band_check import IN_NOISE
 from discover.comparison.judging.explanation import ARITHMETIC, Explanation, least_seen
-from discover.comparison.judging.statements import IN_NOISE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import PredictionBand

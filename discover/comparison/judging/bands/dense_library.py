@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from discover.comparison.judging.band_check import WIDEST
 from discover.comparison.judging.constants.declared_constants import OtherConstant, other_gain
 from discover.comparison.judging.explanation import what_it_leaves
 from discover.comparison.judging.identifiability import SEPARATED
-from discover.comparison.judging.statements import WIDEST, Statement
+from discover.comparison.judging.statements import Statement
 from discover.comparison.judging.unseen_runs import misses
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
