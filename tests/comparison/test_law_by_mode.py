@@ -156,6 +156,7 @@ def test_the_constant_of_each_mode_is_found_and_predicts_a_run_that_no_fit_saw(l
     assert len(said["constants"]["giesekus_mobility"]["modes"]) == 3
 
 
+@pytest.mark.slow
 def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
     monkeypatch.setattr(law_by_mode, "_NAMED", FEW[:2])
     kept, fit = [], law_by_mode._best_first
@@ -183,6 +184,7 @@ def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
         assert one.value == pytest.approx(other.value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_of_more_degrees_no_law_is_told_that_runs_away_in_a_run_held_out(monkeypatch, law):
     monkeypatch.setattr(law_by_mode, "_NAMED", FEW[:1])
     freer = laws_of(MOBILITIES)
