@@ -186,6 +186,7 @@ def _leave_out_other_readings(patch: pytest.MonkeyPatch) -> None:
     # each of these is asked on functions and in comparisons of its own (`tests/comparison`)
     for name in ("hold_against_late_answers", "hold_against_misreading"):
         patch.setattr(judgement, name, lambda explanation, *_: explanation)
+    patch.setattr(judgement, "holding_other_records", lambda own, bands, *_, **__: (own, bands, ()))
 
 
 def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:

@@ -276,6 +276,7 @@ def test_bands_hold_the_normal_stress_of_modes_that_the_runs_leave_open(of_slow_
     assert off(held, truth, "N1") < IN_INTEGRATION
 
 
+@pytest.mark.slow
 def test_control_bands_and_intervals_stay_narrow_where_the_runs_determine_every_mode():
     equal = (0.25, 0.25, 0.25)
     runs, fast = records(equal, (1.0, 5.0, 25.0)), records(equal, (3.0,))
@@ -312,6 +313,7 @@ def test_there_is_no_band_where_laws_that_differ_from_mode_to_mode_run_away(law)
     assert np.all(np.isnan(held.rivals_low))
 
 
+@pytest.mark.slow
 def test_coefficients_of_equal_modes_hold_whatever_the_loadings():
     term = RecoveredTerm("sigma.sigma", 0.25)
     loaded = [

@@ -62,6 +62,7 @@ def test_laws_in_one_library_are_simulated_as_each_alone():
         )
 
 
+@pytest.mark.slow
 def test_extension_separates_the_slip_twin_before_a_second_normal_stress_difference():
     some = candidate_experiments(1.0, ("start_up", "uniaxial"), (1.0,))
     best, *_ = propose_experiments(JOHNSON_SEGALMAN, [TWIN], MAXWELL, some, NOISE, n_draws=8)
@@ -70,6 +71,7 @@ def test_extension_separates_the_slip_twin_before_a_second_normal_stress_differe
     assert best.experiment.title == "uniaxial extension at Wi = 1"
 
 
+@pytest.mark.slow
 def test_a_maxwell_fluid_relaxes_flows_and_creeps_in_the_experiments_as_on_paper():
     some = candidate_experiments(0.5, ("step_strain", "flow_curve", "creep"), (2.0,), modulus=3.0)
     fluids = fluid_of([Contender("none", {})], Fluid(UpperConvectedMaxwell(), 3.0, 0.5))
