@@ -123,7 +123,6 @@ def test_compare_writes_what_the_contract_names_and_resumes(tmp_path, trained, m
     assert "--overwrite" in other.stderr
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_says_so_and_goes_on_quietly_if_told(
     tmp_path, monkeypatch, trained, undrawn
 ):

@@ -102,7 +102,6 @@ def test_the_penalty_shrinks_what_the_polish_restores(trained):
     assert abs(float(trained.law.constants[3]) - 0.3) < abs(shrunk - 0.3)
 
 
-@pytest.mark.slow
 def test_constants_without_a_network_are_those_beside_one_that_is_zero(giesekus_problem, trained):
     whole = initial_law(jax.random.key(0), SMALL.width, True, jnp.ones(8))
     _, law = Session(giesekus_problem, SMALL, None).constants(whole)

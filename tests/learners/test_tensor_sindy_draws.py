@@ -140,6 +140,7 @@ def test_without_draws_the_law_has_no_band_and_it_is_not_a_narrow_one(exchanged)
     assert (chosen.drawn is not None) == (exchanged.draws.method == "weighed")
 
 
+@pytest.mark.slow
 def test_the_amplitude_of_the_right_term_has_its_interval(exact):
     found = Fitted(exact[linear_ptt], 0, ONE, 0.1)
     low, high = found.term.ci95
