@@ -168,6 +168,7 @@ def test_a_loop_leaves_as_its_fluid_without_the_instrument(tmp_path):
 XPP = {"q": 4.0, "stretch_time_ratio": 0.25, "alpha": 0.1}
 
 
+@pytest.mark.slow
 def test_a_loop_from_a_law_with_a_name_leaves_with_what_was_added_to_it(tmp_path):
     result = loop_result(("non_affine_motion", 0.2), ("rate_gain", 0.1), base=("xpp", XPP))
     result.write_json(tmp_path / "loop.json")

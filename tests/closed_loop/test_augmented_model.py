@@ -37,6 +37,7 @@ def test_an_effect_in_the_model_is_the_law_with_that_term():
         np.testing.assert_allclose(row, reference, atol=1e-4 * np.max(np.abs(reference)))
 
 
+@pytest.mark.slow
 def test_a_slow_rise_of_the_rate_is_the_flow_with_that_rate():
     model = AugmentedModel(DECLARED, [make_effect("rate_rise_time")])
     theta = model.zero()

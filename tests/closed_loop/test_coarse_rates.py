@@ -57,6 +57,7 @@ def test_a_mobility_comes_back_from_few_samples_a_cycle(samples):
     assert "too coarsely" not in " ".join(loop_verdict(loop))
 
 
+@pytest.mark.slow
 def test_what_a_rate_did_between_its_samples_widens_constants_of_the_declared_model_too():
     tables = [
         pd.DataFrame({"run": f"{a:g}", "time_s": t, "shear_rate_1_s": r, "stress_Pa": s})

@@ -60,6 +60,7 @@ def test_slow_shear_of_a_giesekus_fluid_does_not_exclude_the_law_that_made_it(tm
     assert any(one.effects == ("giesekus_mobility",) for one in told)
 
 
+@pytest.mark.slow
 def test_a_slow_structure_is_not_taken_for_a_fast_one(tmp_path):
     """Broken as much and healed as fast, it thins alike in steady flow: a minimum far off."""
     flows = {f"at_{rate:g}.csv": start_up(rate) for rate in (0.5, 2.0, 5.0)}

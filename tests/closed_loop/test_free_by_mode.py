@@ -81,6 +81,7 @@ def test_control_a_smooth_function_keeps_its_few_constants_and_its_intervals_hol
     assert len(drawn.sizes) == 2
 
 
+@pytest.mark.slow
 def test_a_mode_that_no_run_tells_is_left_open_and_follows_the_others():
     found, _ = constants(ROUGH, rates=(0.03, 0.1, 0.3, 1.0))
     assert found.modes[0].left_open

@@ -1,6 +1,8 @@
 """What is in no dictionary, found as a curve: on records by scipy with a flaw put in by hand."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc
+from discover.closed_loop import free_form
 from discover.closed_loop.beyond_the_search import predicts_worse
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
@@ -93,6 +96,28 @@ def test_no_curve_is_found_in_a_sound_record(tmp_path):
     assert loop.free_form == ()
 
 
+@pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
+def test_of_a_few_rates_no_curve_is_drawn_and_of_a_wave_one_is(monkeypatch):
+    times, left = np.linspace(0.05, 5.0, 80), np.zeros((1, 3, 80))
+    model = SimpleNamespace(residuals=lambda *_: left)
+    batch = SimpleNamespace(weight=np.ones((3, 80)), recorded=np.ones((3, 80)))
+    search: Any = SimpleNamespace(model=model, batch=batch, positions=lambda effects: [])
+    monkeypatch.setattr(free_form, "jacobians", lambda *_: np.zeros((1, 0, 3, 80)))
+
+    def drawn(slot, course):
+        runs = [
+            dc.Run(f"{rate}", times, dc.start_up(rate), rate * course, np.ones(80))
+            for rate in (0.5, 1.0, 2.0)
+        ]
+        return free_form._fitted(search, runs, slot, (), np.zeros(2), free_form.KNOTS[0])
+
+    assert drawn("rate", np.ones(80)) is None
+    # controls: of the time there is one in the same runs, and of the rate in a wave
+    assert drawn("drift", np.ones(80)) is not None
+    assert drawn("rate", np.cos(times)) is not None
+
+
+@pytest.mark.slow
 def test_start_ups_at_a_few_rates_hold_no_function_of_the_rate(tmp_path):
     generator, runs = np.random.default_rng(0), {}
     for rate in (0.5, 1.0, 2.0):

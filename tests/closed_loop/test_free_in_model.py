@@ -1,6 +1,8 @@
 """What is in no dictionary, found as a curve inside the model: on records by scipy alone."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -12,10 +14,13 @@ from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc
-from discover.effects.free_function import INTERVALS, ONSET, spline_basis
+from discover.closed_loop import free_in_model
+from discover.effects.free_function import FREE_RELAXATIONS, INTERVALS, ONSET, spline_basis
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.report.loop.verdict import loop_verdict
 
 MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
+TIMES = np.linspace(0.05, 6.0, 80)
 SCALE = {"modulus": MODULUS, "relaxation_time": TIME}
 FLOWS = {
     "up.csv": (start_up(1.5), 6.0),
@@ -48,6 +53,7 @@ def held_in(found, true, widths=2.0):
     return np.mean(np.abs(found.value - true) <= widths * half + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_relaxation_that_quickens_with_the_rate_is_found_as_that_function(tmp_path):
     loop, _ = loop_on(tmp_path, WhiteMetzner(0.5, 1.0, **SCALE))
     assert loop.verdict == "unexplained"
@@ -90,6 +96,53 @@ def test_a_fluid_that_stretches_is_no_function_of_one_variable(tmp_path):
     loop, _ = loop_on(tmp_path, PomPom(5.0, 0.4, **SCALE))
     assert loop.verdict == "unexplained"
     assert not any(one.explains for one in loop.free_form)
+
+
+def runs_at(*rates, times=TIMES):
+    return [
+        dc.Run(f"{i}", times, dc.start_up(1.0), rate + 0.0 * times, 100.0 + 0.0 * times)
+        for i, rate in enumerate(rates)
+    ]
+
+
+def variables(runs):
+    """Return of what functions are tried in a model of one mode of 1 s."""
+    declared = SimpleNamespace(relaxation_time=np.array([1.0]))
+    search: Any = SimpleNamespace(model=SimpleNamespace(declared=declared))
+    return {curve.effect.variable: curve.largest for curve in free_in_model._curves(search, runs)}
+
+
+@pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
+def test_start_ups_at_a_few_rates_hold_no_function_of_the_rate_in_the_model():
+    of_few = variables(runs_at(0.5, 1.0, 2.0))
+    # upper convected Maxwell at Wi = 2 has a trace of 2 Wi²
+    assert of_few == {"trace of the stress": 8.0, "stress": 100.0}
+    # control: a wave goes through all rates between
+    assert variables(runs_at(2.0 * np.cos(TIMES)))["rate of deformation"] == pytest.approx(
+        2.0, rel=1e-4
+    )
+
+
+def test_a_function_of_the_rate_relaxes_a_fluid_as_white_and_metzner_have_it():
+    rate, times = 2.0, np.linspace(0.05, 4.0, 40)
+    fluid = WhiteMetzner(0.5, 1.0, **SCALE)
+    (of_rate,) = (e for e in FREE_RELAXATIONS if e.variable == "rate of deformation")
+    declared = DeclaredModel.maxwell(MODULUS, TIME)
+    model = AugmentedModel(declared, [of_rate])
+    switch, largest, end, *coefficients = model.positions(of_rate.name)
+    theta = model.zero()
+    theta[[switch, largest, end]] = 1.0, 4.0, 4.0
+    runs = make_batch([dc.Run("a", times, dc.start_up(rate), rate + 0.0 * times, 0.0 * times + 1)])
+    maxwell = model.predict(theta, runs)[0]
+    # 1/λ(γ̇) = (1 + (k λ γ̇)^(1−n))/λ   [White & Metzner 1963], at its knots
+    grid = np.geomspace(0.05, 4.0, 60)
+    basis = np.asarray(spline_basis(jnp.asarray(grid), 4.0, ONSET))
+    theta[coefficients] = np.linalg.lstsq(basis, grid**0.5, rcond=None)[0]
+    found = model.predict(theta, runs)[0]
+    exact = fluid.respond(start_up(rate), times).sigma12
+    # the spline is off by up to some thousandths of the root
+    np.testing.assert_allclose(found, exact, rtol=1e-2)
+    assert np.max(np.abs(maxwell / exact - 1.0)) > 0.5
 
 
 @pytest.mark.parametrize("largest", [0.5, 20.0])

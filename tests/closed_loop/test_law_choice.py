@@ -164,6 +164,12 @@ def test_a_law_that_stood_for_a_structure_is_asked_again_beside_it():
     stays, lines = asked_beside_a_structure(material, "giesekus", "ucm")
     assert stays is None
     assert [one.law for one in lines] == ["giesekus", "ucm"]
+    # its constant is the one beside the structure; without, it was at the end of its range
+    best, other = lines
+    assert best.parameters["alpha"] == pytest.approx(0.3, abs=0.03)
+    assert best.at_end == ()
+    assert best.behind == 0.0
+    assert other.is_told_apart
 
 
 def test_of_laws_about_as_likely_the_one_taken_stands_first_and_is_not_told_from_them():
@@ -185,6 +191,7 @@ def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
     assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
 
 
+@pytest.mark.slow
 def test_control_a_law_that_is_there_stays_beside_an_effect():
     material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
     found = found_beside(material, ("ucm", "giesekus"), ["thixotropy"])

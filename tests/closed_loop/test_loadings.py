@@ -97,8 +97,12 @@ def test_error_of_a_run_held_out_is_that_of_a_prediction_without_its_factor(load
     assert loaded.held_in_band > 0.9
 
 
-def test_page_says_that_it_holds_if_loadings_differ_so(loaded, tmp_path):
+def test_it_is_said_to_hold_if_loadings_differ_so(loaded):
     assert "if each run is a loading of its own, 3 %" in how_sure(loaded)
+
+
+@pytest.mark.slow
+def test_page_has_the_factors_of_loadings(loaded, tmp_path):
     page = loaded.to_html(tmp_path / "page.html").read_text()
     assert 'id="loadings"' in page
     assert "loading /" not in page

@@ -174,6 +174,7 @@ def test_bad_input_is_refused_with_one_message(options, message):
         loop(make_dataset(UpperConvectedMaxwell()), **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("factor", "tried"), [(2.0, True), (20.0, False)])
 def test_terms_that_name_the_rate_are_not_tried_where_the_loop_must_extrapolate_far(factor, tried):
     flow = start_up(1.5 * factor)

@@ -60,6 +60,7 @@ def test_strain_is_counted_from_the_start_of_the_run_and_not_of_the_flow_before_
     np.testing.assert_allclose(record.total_strain, [0.0, 0.0, 0.0, 1.0, 2.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", [False, True])
 def test_what_shapes_a_command_is_no_candidate_where_the_rate_was_measured(measured):
     runs = [replace(run, rate_is_measured=measured) for run in start_ups(0.3)]

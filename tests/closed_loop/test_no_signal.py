@@ -79,6 +79,7 @@ def test_an_effect_that_switches_the_fluid_off_explains_nothing():
     assert "as good as absent" in loop_verdict(result)[0]
 
 
+@pytest.mark.slow
 def test_a_good_record_with_an_offset_is_a_signal():
     result = loop(drawn(lambda rate: maxwell(rate) + 200.0, 2.0))
     assert result.verdict == "effects_added"

@@ -75,6 +75,7 @@ def test_runs_that_other_searches_leave_out_in_turn_test_a_name():
     assert alone == pytest.approx(2.0 / 3.0 * left_out, rel=0.01)
 
 
+@pytest.mark.slow
 def test_two_effects_that_two_flows_of_another_fluid_show_are_less_likely_than_not():
     # an integral law of K-BKZ is neither a structure nor a drift, and two start-ups do not say so
     runs = []

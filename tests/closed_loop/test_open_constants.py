@@ -31,11 +31,13 @@ def constants(folder, observe):
     return [loop.declared_parameters[name].ci95 for name in free]
 
 
+@pytest.mark.slow
 def test_a_flow_curve_of_constant_viscosity_leaves_modulus_and_time_open(tmp_path):
     for (low, high), truth in zip(constants(tmp_path, ["sigma12"]), (MODULUS, TIME), strict=True):
         assert low < 1e-2 * truth < 1e2 * truth < high
 
 
+@pytest.mark.slow
 def test_with_its_normal_stress_both_are_told(tmp_path):
     found = constants(tmp_path, ["sigma12", "N1"])
     for (low, high), truth in zip(found, (MODULUS, TIME), strict=True):

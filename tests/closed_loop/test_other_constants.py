@@ -66,6 +66,7 @@ def test_slip_of_a_maxwell_fluid_is_not_told_from_a_shorter_time(tmp_path, decla
     assert float(said[1]) == pytest.approx(expected, rel=0.02)
 
 
+@pytest.mark.slow
 def test_times_that_no_effect_makes_up_for_are_named_where_nothing_is_explained(tmp_path):
     loop = loop_of(tmp_path, Giesekus(0.3, MODULUS, TIME), 2.0 * TIME)
     assert loop.verdict == "unexplained"

@@ -86,6 +86,7 @@ def test_a_mobility_is_found_in_a_flow_curve_and_its_n1(tmp_path):
     assert [record.name for record in loop.records] == ["flow_curve.csv", "flow_curve.csv (N1)"]
 
 
+@pytest.mark.slow
 def test_nothing_is_found_in_the_flow_curve_of_the_declared_fluid(tmp_path):
     loop = dc.close_loop(curve_folder(tmp_path, 0.0), BASE, effects=EFFECTS, explanations=1)
     assert loop.verdict == "no_effect_needed"

@@ -24,7 +24,9 @@ def read_with_gain(gain):
     return dc.Dataset("giesekus", tuple(runs))
 
 
-@pytest.mark.parametrize(("gain", "low", "high"), [(0.08, 0.5, 0.8), (0.4, 0.8, 0.9)])
+@pytest.mark.parametrize(
+    ("gain", "low", "high"), [(0.08, 0.5, 0.8), pytest.param(0.4, 0.8, 0.9, marks=pytest.mark.slow)]
+)
 def test_a_set_is_no_likelier_than_the_shape_of_its_smallest_effect_was_tested(gain, low, high):
     loop = dc.close_loop(
         read_with_gain(gain), dc.Fluid(dc.make_law("ucm"), 100.0, 1.0),

@@ -1,10 +1,13 @@
 """A loop beside a sweep excuses what its moduli can change, and no mode beyond it: closed forms."""
 
 import numpy as np
+import pytest
 
 from discover.closed_loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, LinearSweep, Run, relaxation_spectrum
 from discover.protocols import start_up
+
+pytestmark = pytest.mark.usefixtures("effects_alone")
 
 TIMES = np.geomspace(0.02, 8.0, 80)
 MODES = ((20.0, 10.0), (60.0, 1.0))

@@ -156,6 +156,7 @@ def test_the_constant_of_each_mode_is_found_and_predicts_a_run_that_no_fit_saw(l
     assert len(said["constants"]["giesekus_mobility"]["modes"]) == 3
 
 
+@pytest.mark.slow
 def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
     monkeypatch.setattr(law_by_mode, "_NAMED", FEW[:2])
     kept, fit = [], law_by_mode._best_first
@@ -183,6 +184,7 @@ def test_terms_ranked_on_few_samples_are_fitted_on_all(monkeypatch):
         assert one.value == pytest.approx(other.value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_of_more_degrees_no_law_is_told_that_runs_away_in_a_run_held_out(monkeypatch, law):
     monkeypatch.setattr(law_by_mode, "_NAMED", FEW[:1])
     freer = laws_of(MOBILITIES)
@@ -274,6 +276,7 @@ def test_bands_hold_the_normal_stress_of_modes_that_the_runs_leave_open(of_slow_
     assert off(held, truth, "N1") < IN_INTEGRATION
 
 
+@pytest.mark.slow
 def test_control_bands_and_intervals_stay_narrow_where_the_runs_determine_every_mode():
     equal = (0.25, 0.25, 0.25)
     runs, fast = records(equal, (1.0, 5.0, 25.0)), records(equal, (3.0,))
@@ -310,6 +313,7 @@ def test_there_is_no_band_where_laws_that_differ_from_mode_to_mode_run_away(law)
     assert np.all(np.isnan(held.rivals_low))
 
 
+@pytest.mark.slow
 def test_coefficients_of_equal_modes_hold_whatever_the_loadings():
     term = RecoveredTerm("sigma.sigma", 0.25)
     loaded = [

@@ -60,6 +60,7 @@ def test_the_law_is_found_with_its_modulus_and_its_time():
     assert np.max(fitted.before.classical["giesekus"].run_errors) > 0.05
 
 
+@pytest.mark.slow
 def test_a_coefficient_beyond_the_range_of_the_loop_lies_in_its_own_interval(monkeypatch):
     own = {"ptt_linear": CLASSICAL_EFFECTS["ptt_linear"]}
     monkeypatch.setattr(before_learning, "CLASSICAL_EFFECTS", own)

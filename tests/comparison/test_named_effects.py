@@ -106,10 +106,11 @@ def holds(limits, exact):
             marks=pytest.mark.slow,
         ),
         # a lag and a rate that rises late give a Maxwell fluid one σ12, and two N1
-        (
+        pytest.param(
             UpperConvectedMaxwell(),
             Instrument(rise_time=0.1),
             {("transducer_lag",), ("rate_rise_time",)},
+            marks=pytest.mark.slow,
         ),
     ],
 )

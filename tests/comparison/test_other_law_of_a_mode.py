@@ -71,3 +71,8 @@ def test_control_runs_that_stretch_both_modes_tell_the_law_of_each():
     said = said_of_each_mode("sigma.sigma", found.constants["sigma.sigma"], 2, found.others)
     assert "at 0.2 s" in said
     assert "not determined" not in said
+    # and leave neither intervals nor bands wide
+    constant = found.constants["sigma.sigma"]
+    assert constant.degree == 0
+    assert all(mode.ci95[1] - mode.ci95[0] < 0.1 for mode in constant.modes)
+    assert all(0.5 * band.widths()["N1"] < 0.02 for band in found.bands.values())  # the noise: 1 %

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, PhanThienTanner, oscillation, start_up
+from independent import Giesekus, PhanThienTanner, start_up
 from independent.instruments import Instrument
 
 from discover.comparison.judging.explanation import Explanation
@@ -17,7 +17,6 @@ from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws.registry import make_law
 from discover.learners.results.recovered_term import RecoveredTerm
-from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import what_is_left
 from discover.study.declared_model import DeclaredModel
@@ -27,7 +26,6 @@ GROWTH, WAVE = np.linspace(0.1, 8.0, 60), np.linspace(0.1, 12.0, 60)
 FLOWS = {
     "slow": (start_up(0.5), protocol(0.5), GROWTH),
     "fast": (start_up(2.0), protocol(2.0), GROWTH),
-    "wave": (oscillation(2.0, 1.0), oscillatory_shear(2.0, 1.0), WAVE),
 }
 GIESEKUS = Giesekus(0.3, MODULUS, 1.0)
 LINEAR = ("gammadot", "sigma.sigma")

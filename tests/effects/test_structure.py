@@ -121,7 +121,12 @@ def test_times_a_hundred_times_shorter_need_no_shorter_steps():
     np.testing.assert_allclose(found[settled], truth[settled], rtol=1e-3)
 
 
-@pytest.mark.parametrize("name", FAMILY)
+STEADY = "thixotropic_modulus", "thixotropic_relaxation_two_times"
+
+
+@pytest.mark.parametrize(
+    "name", [n if n in STEADY else pytest.param(n, marks=pytest.mark.slow) for n in FAMILY]
+)
 def test_a_steady_flow_has_the_structure_of_crosss_equation(name):
     rates = np.geomspace(1e-2, 10.0, 5)
     run = Run("curve", np.arange(1.0, 6.0), steady_rates(rates), rates, np.ones(5))
@@ -141,6 +146,7 @@ def alternating(law, cycles=40):
     return within, law.respond(oscillation(*SWING), times).sigma12[1:]
 
 
+@pytest.mark.slow
 def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     name = "thixotropic_relaxation_two_times"
     times, truth = alternating(independent_of(name))

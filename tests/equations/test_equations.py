@@ -130,6 +130,7 @@ def test_json_gives_back_the_same_equation():
     assert write_equation(again, "json") == text
 
 
+@pytest.mark.slow
 def test_what_json_and_rheotool_give_back_simulates_what_the_package_simulates(simulated):
     from_json = equation_from_json(json.loads(write_equation(MIXED, "json")))
     assert agree(by_stress_rate(from_json.fluid()), simulated)

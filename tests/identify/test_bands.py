@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from independent import Giesekus
 from independent.sweeps import modulus_of
 from scipy.stats import norm
@@ -85,6 +86,7 @@ def test_draws_have_the_covariance_of_constants_that_exchange_each_other():
     np.testing.assert_allclose(np.cov(values.T), covariance, atol=0.1)
 
 
+@pytest.mark.slow
 def test_laws_in_a_sweep_have_the_moduli_that_scipy_gives_each():
     strains, alphas = np.array([0.1, 1.0, 4.0]), (0.1, 0.4)
     sweep = oscillations(strains, np.ones(3))

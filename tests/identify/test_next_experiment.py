@@ -62,6 +62,7 @@ def test_laws_in_one_library_are_simulated_as_each_alone():
         )
 
 
+@pytest.mark.slow
 def test_extension_separates_the_slip_twin_before_a_second_normal_stress_difference():
     some = candidate_experiments(1.0, ("start_up", "uniaxial"), (1.0,))
     best, *_ = propose_experiments(JOHNSON_SEGALMAN, [TWIN], MAXWELL, some, NOISE, n_draws=8)
@@ -70,6 +71,29 @@ def test_extension_separates_the_slip_twin_before_a_second_normal_stress_differe
     assert best.experiment.title == "uniaxial extension at Wi = 1"
 
 
+def test_experiments_put_on_what_their_names_say():
+    """At λ = 0.5 s and G = 3 Pa; what a fluid then does is asked in the slow test below."""
+    classes = ("step_strain", "flow_curve", "creep")
+    found = candidate_experiments(0.5, classes, (1.0, 2.0), modulus=3.0)
+    kinds = [e.kind for e in found]
+    assert kinds == ["step_strain"] * 2 + ["flow_curve"] + ["creep"] * 2
+    assert [e.protocol.quantity for e in found] == ["sigma12"] * 3 + ["strain"] * 2
+    tables = [
+        (np.asarray(e.protocol.table_times), np.asarray(e.protocol.table_rates)) for e in found
+    ]
+    for strain, (times, rates) in zip((1.0, 2.0), tables, strict=False):
+        # put on before the clock starts, at Wi = 2 and no faster, and held from there on
+        assert np.sum(np.diff(times) * 0.5 * (rates[1:] + rates[:-1])) == pytest.approx(strain)
+        assert np.max(rates) == pytest.approx(2.0 / 0.5)
+        assert rates[-1] == 0.0 == times[-1]
+    np.testing.assert_allclose(tables[2][1], np.geomspace(0.1, 2.0, 10) / 0.5)
+    for level, (times, stress) in zip((1.0, 2.0), tables[3:], strict=True):
+        # a stress in units of the modulus, reached as an elastic solid would at Wi = 2
+        assert stress[-1] == pytest.approx(3.0 * level)
+        assert np.max(np.diff(stress) / np.diff(times)) == pytest.approx(3.0 * 2.0 / 0.5)
+
+
+@pytest.mark.slow
 def test_a_maxwell_fluid_relaxes_flows_and_creeps_in_the_experiments_as_on_paper():
     some = candidate_experiments(0.5, ("step_strain", "flow_curve", "creep"), (2.0,), modulus=3.0)
     fluids = fluid_of([Contender("none", {})], Fluid(UpperConvectedMaxwell(), 3.0, 0.5))

@@ -41,6 +41,7 @@ TIMES = np.linspace(0.1, 8.0, 80)
 RUNS = [Run(str(r), TIMES, start_up(r), np.full(80, r), np.ones(80)) for r in (0.5, 2.0)]
 
 
+@pytest.mark.slow
 def test_a_law_that_stands_for_another_is_left_more_open_than_a_simple_one():
     # two terms that fitted a stretching Rolie–Poly fluid at 6 % noise, N1 off by 22 %
     laws = {

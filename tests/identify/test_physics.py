@@ -70,6 +70,7 @@ def test_slip_stretches_without_bound_beyond_its_own_rate(slip):
     assert slip[EXTENSION].value == pytest.approx(1 / 1.2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_enough_solvent_makes_slip_monotonic():
     # dσ/dγ̇ is least at −1/8 of the polymer's viscosity
     assert report(JohnsonSegalman(0.4), solvent=0.126)[FLOW_CURVE].passed

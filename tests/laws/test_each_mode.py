@@ -59,6 +59,7 @@ def test_the_stresses_are_those_of_the_modes_by_scipy():
     assert apart(other.components[:, 3], true.sigma12) > 0.05
 
 
+@pytest.mark.slow
 def test_of_a_law_with_a_stretch_too():
     arms = (5.0, 7.0, 9.0)
     law = law_of_each_mode(

@@ -54,7 +54,7 @@ def predicted(name, protocol, times, rate, modes=(), **columns):
     ("name", "kind", "rate"),
     [
         ("pom_pom", "shear", 5.0),
-        ("pom_pom_drag_strain", "uniaxial", 1.5),
+        pytest.param("pom_pom_drag_strain", "uniaxial", 1.5, marks=pytest.mark.slow),
         pytest.param("pom_pom_drag_strain", "shear", 5.0, marks=pytest.mark.slow),
         pytest.param("pom_pom", "uniaxial", 1.5, marks=pytest.mark.slow),
         pytest.param("pom_pom", "planar", 1.0, marks=pytest.mark.slow),
@@ -108,7 +108,9 @@ def test_the_stress_of_a_flow_brings_its_strain_back(name):
     np.testing.assert_allclose(found, 2.0 * times, atol=0.02 * 6.0)
 
 
-@both
+@pytest.mark.parametrize(
+    "name", ["pom_pom_drag_strain", pytest.param("pom_pom", marks=pytest.mark.slow)]
+)
 def test_steady_shear_is_the_closed_form_that_has_a_maximum(name):
     """A is upper convected Maxwell's: A11 = 1 + 2 Wi², A12 = Wi; McLeish & Larson 1998, eq. 39."""
     # at the fastest the logarithm of tr A used to run away, and a stress of a wrong sign was steady

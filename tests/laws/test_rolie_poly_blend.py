@@ -71,7 +71,7 @@ def by_the_loop(protocol, rate, modulus=(1.0,), time=(1.0,), times=TIMES, **colu
 @pytest.mark.parametrize(
     ("kind", "rate"),
     [
-        ("shear", 8.0),
+        pytest.param("shear", 8.0, marks=pytest.mark.slow),
         pytest.param("uniaxial", 2.5, marks=pytest.mark.slow),
         pytest.param("planar", 1.5, marks=pytest.mark.slow),
         pytest.param("biaxial", 1.0, marks=pytest.mark.slow),

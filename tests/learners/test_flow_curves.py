@@ -41,6 +41,7 @@ def start(rate=2.0):
     return dc.Run("start.csv", times, dc.start_up(rate), np.full(times.size, rate), stress)
 
 
+@pytest.mark.slow
 def test_sensitivities_of_a_flow_curve_beside_a_transient_are_its_differences():
     problem = make_problem([flow_curve(rates=SLOW), start()], FEW)
     at = jnp.zeros(len(FEW)).at[FEW.names.index("sigma.sigma")].set(0.2)

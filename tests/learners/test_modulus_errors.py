@@ -135,6 +135,7 @@ def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(l
     assert np.sqrt(np.mean(np.square(narrow))) > 1.5
 
 
+@pytest.mark.slow
 def test_parameters_move_with_the_moduli_as_the_response_says():
     problem = problem_of(0)
     fit = fit_of(problem)

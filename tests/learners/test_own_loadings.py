@@ -114,6 +114,7 @@ def test_a_network_sees_no_misfit_in_the_factor_of_a_loading():
     assert left(OWN) < 0.01 * unaware
 
 
+@pytest.mark.slow
 def test_derivatives_of_a_network_are_those_with_the_factors_let_go():
     problem = network_problem(runs_of(FACTORS), np.array([100.0]), np.array([1.0]))
     change = jax.random.normal(jax.random.key(0), (*problem.target.shape, 1))

@@ -86,6 +86,7 @@ def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
     np.testing.assert_allclose(value[1, :40], only[0, :40], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_what_a_law_predicts_is_what_scipy_finds_after_many_cycles():
     run = swing(2.0)
     problem = make_problem([run], FEW, MODULUS, TIME)

@@ -46,6 +46,7 @@ def problem_of(runs, **limits):
     return make(runs, strain_step=0.2, **limits)
 
 
+@pytest.mark.slow
 def test_a_rough_grid_ranks_laws_by_nearly_the_misfit_of_the_fine_one(monkeypatch):
     monkeypatch.setattr(of_search, "AFFORDABLE", 0.0)
     runs = records()

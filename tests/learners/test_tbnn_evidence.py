@@ -117,6 +117,7 @@ def test_a_law_that_runs_away_at_twice_the_rate_is_taken_only_for_want_of_anothe
     assert np.isfinite(surprises([wild], own)[0])
 
 
+@pytest.mark.slow
 def test_draws_of_the_posterior_fit_alike_and_are_other_laws(own, law):
     fits = 1.25
     drawn = posterior_draws(law, own, jax.random.split(jax.random.key(2), 3), fits)

@@ -73,6 +73,7 @@ def test_where_a_named_law_fits_the_band_is_of_the_laws_at_hand_alone(maxwell):
     assert maxwell.draws_.optima is None
 
 
+@pytest.mark.slow
 def test_where_no_named_law_fits_the_band_allows_for_one_more_also_from_a_file(tmp_path):
     # K-BKZ of scipy, to which none of the five named laws is fitted to the noise
     law = KBKZ(0.3, -0.15)

@@ -110,6 +110,7 @@ def exchanged(exact):
     return Fitted(exact[linear_ptt], 0, OTHER, 0.5)
 
 
+@pytest.mark.slow
 def test_amplitude_and_exponent_of_a_nearly_linear_law_have_no_linearised_interval(exchanged):
     assert exchanged.draws.method != "linear"
     assert exchanged.draws.linear_share < 0.5
@@ -125,6 +126,7 @@ def test_amplitude_and_exponent_of_a_nearly_linear_law_have_no_linearised_interv
         assert term.ci95[0] * term.ci95[1] > 0.0
 
 
+@pytest.mark.slow
 def test_without_draws_the_law_has_no_band_and_it_is_not_a_narrow_one(exchanged):
     details = {
         "covariance": exchanged.uncertainty.total_covariance.tolist(),
@@ -138,6 +140,7 @@ def test_without_draws_the_law_has_no_band_and_it_is_not_a_narrow_one(exchanged)
     assert (chosen.drawn is not None) == (exchanged.draws.method == "weighed")
 
 
+@pytest.mark.slow
 def test_the_amplitude_of_the_right_term_has_its_interval(exact):
     found = Fitted(exact[linear_ptt], 0, ONE, 0.1)
     low, high = found.term.ci95

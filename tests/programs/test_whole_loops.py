@@ -30,7 +30,9 @@ def compiled_with(flags):
     return whole == "True", options
 
 
-@pytest.mark.parametrize("flags", ["", "--xla_cpu_enable_fast_math=false"])
+@pytest.mark.parametrize(
+    "flags", [pytest.param("", marks=pytest.mark.slow), "--xla_cpu_enable_fast_math=false"]
+)
 def test_a_loop_is_one_piece_beside_what_the_user_chose(flags):
     whole, options = compiled_with(flags)
     assert whole

@@ -47,7 +47,7 @@ def giesekus(rate, times):
     return Giesekus(0.3).respond(of_rate(rate, times[-1]), times).sigma12
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 0.01])
 def test_the_stress_of_a_coarse_wave_is_right_to_what_noise_in_the_rate_does(noise):
     times, rates = wave(7, noise=noise)
     truth = Giesekus(0.3).respond(oscillation(AMPLITUDE, 1.0), times[1:]).sigma12

@@ -356,6 +356,7 @@ def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path, few_pi
     assert '<tr><td>gain</td><td class="text">–</td>' in page  # named as nobody names it
 
 
+@pytest.mark.slow
 def test_no_latex_shows_in_the_page_of_a_yield_stress(tmp_path):
     effect = make_effect("yield_stress")
     result = loop_result()

@@ -82,6 +82,7 @@ def test_what_needs_time_or_strain_does_not_act_on_steady_states():
     np.testing.assert_allclose(gained, 1.1 * plain, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stress", [10.0, 400.0])
 def test_a_maxwell_fluid_creeps_by_its_closed_form(stress):
     strain = predicted(MAXWELL, at_stress(TIMES, np.full(60, stress)))[0]

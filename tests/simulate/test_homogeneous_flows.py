@@ -83,6 +83,7 @@ def test_relaxation_after_a_step_of_strain_is_that_of_scipy():
     np.testing.assert_allclose(in_the_loop([held])[0], exact, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_step_of_strain_at_once_leaves_the_elastic_stress_of_maxwell():
     maxwell = Fluid(make_law("ucm"), 100.0, 1.0)
     held = after_step_strain(start_up(0.0), 1.5, 0.01)

@@ -79,6 +79,7 @@ def test_a_mode_of_a_thousand_periods_takes_no_more_than_a_fast_one():
     np.testing.assert_allclose(found, exact, atol=1e-4 * np.max(exact))
 
 
+@pytest.mark.slow
 def test_a_structure_that_heals_over_many_cycles_is_periodic_too():
     declared = DeclaredModel.maxwell(MODULUS, 1.0)
     swing = alternating(2.0)
@@ -97,6 +98,7 @@ def test_a_structure_that_heals_over_many_cycles_is_periodic_too():
     np.testing.assert_allclose(found[:65], found[64:], atol=1e-3 * np.max(np.abs(found)))
 
 
+@pytest.mark.slow
 def test_runs_that_begin_otherwise_are_as_they_were_beside_it():
     declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, 5.0)
     times = np.linspace(0.1, 6.0, 40)
@@ -108,6 +110,7 @@ def test_runs_that_begin_otherwise_are_as_they_were_beside_it():
     np.testing.assert_allclose(beside, alone, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_a_record_in_samples_begins_as_the_wave_that_they_are_of():
     declared = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, 100.0)
     times = np.linspace(3.0, 3.0 + 2.0 * PERIOD, 257)

@@ -35,6 +35,7 @@ def predicted(declared, run, effects=(), **values):
     return storage + 1j * loss
 
 
+@pytest.mark.slow
 def test_moduli_of_a_giesekus_fluid_are_those_that_scipy_ends_at():
     pairs = zip(STRAINS, FREQUENCIES, strict=True)
     exact = np.array([giesekus_modulus(MOBILITY, MODULUS, TIME, *pair) for pair in pairs])

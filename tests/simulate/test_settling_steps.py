@@ -56,7 +56,9 @@ def error(law, time, told):
     return max(np.max(np.abs(a - b)) for a, b in pairs) / size, flows.n_steps
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", [n if n == "giesekus" else pytest.param(n, marks=pytest.mark.slow) for n in LAWS]
+)
 def test_growing_steps_are_as_accurate_as_short_ones(law):
     grown, few = error(law, TIME, TIME)
     assert grown < 1e-6  # what the default grid promises

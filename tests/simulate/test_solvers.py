@@ -59,6 +59,7 @@ def test_small_oscillation_gives_the_maxwell_moduli(frequency):
     assert out_of_phase / amplitude == pytest.approx(frequency * viscosity, rel=1e-4)
 
 
+@pytest.mark.slow
 def test_stiff_spectrum_matches_the_analytic_start_up():
     modulus, relaxation_time = SPECTRUM
     times = np.concatenate([[0.0], np.logspace(-3, 3.5, 40)])

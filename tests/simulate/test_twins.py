@@ -16,7 +16,13 @@ HISTORIES = {
 }
 
 
-@pytest.mark.parametrize("flow", HISTORIES.values(), ids=HISTORIES.keys())
+@pytest.mark.parametrize(
+    "flow",
+    [
+        pytest.param(flow, id=name, marks=[pytest.mark.slow] if name == "reversal" else [])
+        for name, flow in HISTORIES.items()
+    ],
+)
 @pytest.mark.parametrize("slip", [0.2, 0.6])
 def test_johnson_segalman_has_a_twin_with_the_same_stress_and_n1_but_no_n2(slip, flow):
     times = np.linspace(0, 6, 31)

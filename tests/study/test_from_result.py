@@ -179,27 +179,28 @@ def of_scipy(mobilities, times, rate=5.0):
     return fluid.respond(independent_start_up(rate), times).sigma12
 
 
-def test_constants_by_mode_of_a_loop_are_taken_with_those_of_every_mode(tmp_path):
-    """Of the declared law, and of what the loop added to it."""
+@pytest.mark.parametrize("added", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_constants_by_mode_of_a_loop_are_taken_with_those_of_every_mode(tmp_path, added):
+    """Of the declared law, and of what the loop added to it (which is asked below too)."""
     named = {"law": "giesekus", "constants": [{"alpha": 0.1}, {"alpha": 0.5}]}
     law = {**LAW, "terms": [], "named": named}
     of_law = {**LOOP, "declared": {"law": law, "effects": [GAIN]}, "stages": []}
     plain = {"law": {**LAW, "terms": []}, "effects": [GAIN]}
-    added = {**LOOP, "declared": plain, "stages": [MOBILITY_BY_MODE]}
-    for content in (of_law, added):
-        found = declared(write(tmp_path, "loop.json", content))
-        assert [known.name for known in found.effects] == ["stress_gain"]
-        assert not found.free_constants
-        times, stress = shear(found)
-        assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
-        # control: the constant at the mean time in both is another fluid
-        assert np.max(np.abs(stress / of_scipy((0.2, 0.2), times) - 1.0)) > 0.02
-        # the loop starts from it
-        model = AugmentedModel(forward_model(found), [])
-        run = Run("r", times, start_up(5.0), np.full(len(times), 5.0), stress)
-        predicted = model.predict(model.zero(), make_batch([run]))[0]
-        assert predicted == pytest.approx(0.9 * stress, rel=1e-5)
-    assert "in each mode its own giesekus mobility (alpha = 0.5) at 0.1 s to" in found.source
+    of_effect = {**LOOP, "declared": plain, "stages": [MOBILITY_BY_MODE]}
+    found = declared(write(tmp_path, "loop.json", of_effect if added else of_law))
+    assert [known.name for known in found.effects] == ["stress_gain"]
+    assert not found.free_constants
+    times, stress = shear(found)
+    assert stress == pytest.approx(of_scipy((0.1, 0.5), times), rel=1e-5)
+    # control: the constant at the mean time in both is another fluid
+    assert np.max(np.abs(stress / of_scipy((0.2, 0.2), times) - 1.0)) > 0.02
+    # the loop starts from it
+    model = AugmentedModel(forward_model(found), [])
+    run = Run("r", times, start_up(5.0), np.full(len(times), 5.0), stress)
+    predicted = model.predict(model.zero(), make_batch([run]))[0]
+    assert predicted == pytest.approx(0.9 * stress, rel=1e-5)
+    if added:
+        assert "in each mode its own giesekus mobility (alpha = 0.5) at 0.1 s to" in found.source
 
 
 def test_a_mode_that_a_loop_added_has_the_constant_that_it_found_for_it(tmp_path):

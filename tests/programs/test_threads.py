@@ -1,0 +1,33 @@
+"""Calls side by side: in their order, in threads of their own, the first alone if need be."""
+
+import threading
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from discover.programs import in_threads, threads
+
+
+@pytest.fixture(autouse=True)
+def in_threads_whoever_runs_the_tests(monkeypatch):
+    monkeypatch.setattr(threads, "ThreadPoolExecutor", ThreadPoolExecutor)
+    monkeypatch.setattr(threads, "_WORKERS", 2)
+
+
+@pytest.mark.parametrize("is_compiled", [False, True])
+def test_what_comes_back_is_in_the_order_of_the_jobs(is_compiled):
+    assert in_threads(lambda job: 10 * job, range(7), is_compiled) == [*range(0, 70, 10)]
+    assert in_threads(lambda job: job, [], is_compiled) == []
+
+
+def test_two_calls_of_a_compiled_program_run_at_once():
+    both = threading.Barrier(2)
+    # each waits for the other; one after the other would end in an error
+    assert in_threads(lambda job: both.wait(30.0) in (0, 1), range(2), True) == [True, True]
+
+
+def test_the_first_call_runs_alone_where_nothing_is_compiled_yet():
+    seen = []
+    in_threads(lambda job: seen.append((job, threading.current_thread())), range(3))
+    assert seen[0] == (0, threading.main_thread())
+    assert all(thread is not threading.main_thread() for _, thread in seen[1:])
