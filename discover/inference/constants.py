@@ -150,3 +150,8 @@ class ConstantByMode(StageParameter):
     def open_times_s(self) -> list[float]:
         """Relaxation times of the modes that are left open, the fastest first."""
         return sorted(mode.relaxation_time_s for mode in self.modes if mode.ci95 is None)
+
+    @property
+    def other_laws(self) -> dict[float, tuple[str, ...]]:
+        """Effects which one mode alone may follow instead, by its relaxation time in s."""
+        return {mode.relaxation_time_s: mode.other_laws for mode in self.modes if mode.other_laws}

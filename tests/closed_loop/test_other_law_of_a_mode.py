@@ -7,6 +7,7 @@ from independent.folders import write_folder
 from independent.instruments import Instrument
 
 import discover as dc
+from discover.report.loop.certainty import how_sure
 from discover.report.plots.by_mode import by_mode_sentence
 
 pytestmark = pytest.mark.usefixtures("effects_alone")
@@ -29,21 +30,22 @@ def mobility_by_mode(folder, fluid, rates):
         dc.load_dataset(write_folder(folder, runs)), base,
         effects=["giesekus_mobility"], max_effects=1, explanations=1,
     )  # fmt: skip
-    return loop.by_mode["giesekus_mobility"]
+    return loop.by_mode["giesekus_mobility"], how_sure(loop)
 
 
 def test_a_mode_that_the_flow_hardly_stretches_may_follow_another_law(tmp_path):
-    found = mobility_by_mode(tmp_path, MIXED, (0.5, 1.0, 2.0))
+    found, sure = mobility_by_mode(tmp_path, MIXED, (0.5, 1.0, 2.0))
     slow, fast = found.modes
     assert slow.ci95[0] < 0.3 < slow.ci95[1]
     assert not slow.other_laws
     assert fast.left_open
     assert "ptt_linear" in fast.other_laws
-    said = by_mode_sentence("giesekus_mobility", found)
-    assert "The law of the mode of 0.2 s is not determined by these data" in said
+    for said in (by_mode_sentence("giesekus_mobility", found), sure):
+        assert "The law of the mode of 0.2 s is not determined by these data" in said
 
 
 def test_control_runs_that_stretch_both_modes_tell_the_law_of_each(tmp_path):
-    found = mobility_by_mode(tmp_path, ALIKE, (1.0, 5.0, 12.0))
+    found, sure = mobility_by_mode(tmp_path, ALIKE, (1.0, 5.0, 12.0))
     assert not any(mode.other_laws or mode.left_open for mode in found.modes)
-    assert "not determined" not in by_mode_sentence("giesekus_mobility", found)
+    for said in (by_mode_sentence("giesekus_mobility", found), sure):
+        assert "not determined" not in said

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from discover.closed_loop.results.loop_result import LoopResult
+from discover.inference.other_law_of_a_mode import other_laws_said
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.loop.asked import EXPLAINED, MOST_NAMES, coarse_rates, several, untested_by
 from discover.report.wording import effect_title, percent, sentence, significant
@@ -32,6 +33,9 @@ def how_sure(result: LoopResult) -> str:
             f"The rate of {runs} steps between two samples, which do not tell "
             "when: the instants are fitted along, those of a run held out to that run itself."
         )
+    if result.verdict in EXPLAINED:
+        told = [other_laws_said(one.other_laws).strip() for one in result.by_mode.values()]
+        sentences += [one for one in told if one]
     doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
 

@@ -129,7 +129,7 @@ def _allowed(constant: ConstantByMode) -> str:
         for mode in constant.told
         if mode.ci95 is not None
     ]
-    laws = {mode.relaxation_time_s: mode.other_laws for mode in constant.modes if mode.other_laws}
+    laws = constant.other_laws
     if not ranges:
         return f"{said}, and determine it in no single mode.{other_laws_said(laws)}"
     text = f"{said}, and allow {' and '.join(ranges)}"
