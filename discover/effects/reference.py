@@ -1,5 +1,7 @@
 """The dictionary as a page to read: docs/effects.md is what this writes."""
 
+from collections.abc import Iterator
+
 from discover.effects.base import AbstractEffect, EffectParameter
 from discover.effects.registry import named_effects
 
@@ -53,7 +55,16 @@ def _entry(effect: AbstractEffect) -> list[str]:
         f"- Visible from: {effect.visible}",
         f"- To confirm: {effect.check}",
         f"- Source: {effect.source.rstrip('.')}.",
+        *(line for parameter in effect.parameters for line in _other_names(parameter)),
     ]
+
+
+def _other_names(parameter: EffectParameter) -> Iterator[str]:
+    """Yield which alias the effect has in a limit of a constant."""
+    if parameter.endless:
+        yield f"- Also `{parameter.endless}` where no run lasts as long as ${parameter.symbol}$."
+    if parameter.absent:
+        yield f"- Also `{parameter.absent}` where ${parameter.symbol}$ may be {parameter.low:g}."
 
 
 _PROPERTIES = {
