@@ -98,3 +98,13 @@ def test_a_known_effect_of_another_sample_is_told_with_its_own_constant(
     else:
         # the standard error of a mobility at this noise is half a per cent
         assert float(said[1]) == pytest.approx(0.5, rel=0.02)
+
+
+def test_a_known_effect_that_is_not_there_is_left_out(tmp_path):
+    known = {"giesekus_mobility": {"alpha": 0.3}}
+    loop = loop_of(tmp_path, UpperConvectedMaxwell(MODULUS, TIME), TIME, known_effects=known)
+    assert loop.verdict == "unexplained"
+    assert (
+        "Without giesekus_mobility the fitted runs are missed by 1"
+        in (loop.remaining["description"])
+    )

@@ -29,6 +29,7 @@ FACTOR = "relaxation_time_factor"
 
 _FACTOR_AT = 1  # of its logarithm, in the parameter vector
 _MOST = 4  # sets in which each is tried
+_MOST_BESIDE_EFFECT = 16  # a known effect that is wrong puts the right single one far down
 
 Start = tuple[np.ndarray, tuple[int, ...]]
 
@@ -55,12 +56,20 @@ class Held:
         """Return in words what a fit makes of the constants."""
         if self.effect is None:
             factor = np.exp(theta[_FACTOR_AT])
-            return f"relaxation times that are all {factor:.3g} times the declared ones"
+            return f"With relaxation times that are all {factor:.3g} times the declared ones"
+        if self.is_gone(model, theta):
+            return f"Without {self.name}"
         names = dict(zip(model.positions(self.name), self.effect.parameters, strict=True))
         zero = model.zero()
         values = [f"{names[p].name} = {theta[p]:.3g} {names[p].unit}".rstrip()
                   + f" (declared: {zero[p]:.3g})" for p in self.positions]  # fmt: skip
-        return f"{listed(values)} of {self.name}"
+        return f"With {listed(values)} of {self.name}"
+
+    def is_gone(self, model: AugmentedModel, theta: np.ndarray) -> bool:
+        """Return whether a fit does without the known effect: its amplitude is zero."""
+        if self.effect is None:
+            return False
+        return bool(theta[model.positions(self.name)[0]] == 0.0)
 
     @property
     def advice(self) -> str:
@@ -71,8 +80,8 @@ class Held:
                 'the times along ([model] relaxation_time_s = "fit").'
             )
         return (
-            "Another sample than that of the declared value does that: look where it comes from, "
-            f'or fit it along ("fit" for {self.name} in [model] effects).'
+            f"Another sample than the one that {self.name} was found on does that: look where it "
+            'comes from, leave it out, or fit it along ("fit" in [model] effects).'
         )
 
 
@@ -107,15 +116,15 @@ def other_constants(
     """Return sets of effects that explain the fitted runs beside other declared constants.
 
     Where the runs are explained, the constants take the place of each effect of each explanation;
-    where they are not, they are tried beside what was found, less one effect or not, and beside
-    single effects. Where runs held out refute what was found, only those of a known effect are
-    tried, and have to miss these runs by less.
+    where they are not, they are tried beside nothing, beside what was found, less one effect or
+    not, and beside single effects. Where runs held out refute what was found, only those of a known
+    effect are tried, and have to miss these runs by less.
     """
     if not (search.active or judgement.structured):
         return []
-    tried = _sets(search, carried, judgement)
     found = []
     for held in _held(search, judgement.carries_over):
+        tried = _sets(search, carried, judgement, held)
         starts = [theta for theta, _ in tried.values()]
         free = [(*own, *held.positions) for _, own in tried.values()]
         for names, fit in zip(tried, search.problem.fits(starts, free, rivals=True), strict=True):
@@ -143,7 +152,7 @@ def _held(search: Search, carries_over: bool) -> list[Held]:
 
 
 def _sets(
-    search: Search, carried: Sequence[Carried], judgement: Judgement
+    search: Search, carried: Sequence[Carried], judgement: Judgement, held: Held
 ) -> dict[tuple[str, ...], Start]:
     tried: dict[tuple[str, ...], Start] = {}
     for one in carried[:_MOST]:
@@ -154,15 +163,16 @@ def _sets(
         tried.setdefault((), search.problem.without(search.fit, *search.active))
         tried.setdefault(tuple(sorted(search.active)), (search.fit.theta, search.fit.free))
         single = sorted((s for s in search.seen if len(s.effects) == 1), key=lambda s: s.cost)
-        for seen in islice(single, _MOST):
+        for seen in islice(single, _MOST if held.effect is None else _MOST_BESIDE_EFFECT):
             tried.setdefault(seen.effects, (seen.theta(search.model), seen.free))
     return tried
 
 
 def _inside(model: AugmentedModel, fit: Fit, held: Held) -> bool:
-    """Return whether a fit stands at no end of what the constants can be."""
+    """Return whether no constant is at an end of what it can be, or the effect is gone."""
     at = list(held.positions)
-    return bool(np.all((model.low[at] < fit.theta[at]) & (fit.theta[at] < model.high[at])))
+    inside = (model.low[at] < fit.theta[at]) & (fit.theta[at] < model.high[at])
+    return held.is_gone(model, fit.theta) or bool(np.all(inside))
 
 
 def _found(
@@ -173,8 +183,9 @@ def _found(
     if unseen is not None:
         error = _error(search.model, fit.theta, unseen)
         missed += f", and those held out by {percent_of(error)}"
-    beside = f" and {' and '.join(effects)}" if effects else ""
-    sentence = f"With {held.said(search.model, fit.theta)}{beside} {missed}. {held.advice}"
+    along = " and with " if held.is_gone(search.model, fit.theta) else " and "
+    beside = along + " and ".join(effects) if effects else ""
+    sentence = f"{held.said(search.model, fit.theta)}{beside} {missed}. {held.advice}"
     return OtherConstants(held.name, effects, sentence, worth, fit.theta)
 
 
