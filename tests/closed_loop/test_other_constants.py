@@ -104,7 +104,9 @@ def test_a_known_effect_that_is_not_there_is_left_out(tmp_path):
     known = {"giesekus_mobility": {"alpha": 0.3}}
     loop = loop_of(tmp_path, UpperConvectedMaxwell(MODULUS, TIME), TIME, known_effects=known)
     assert loop.verdict == "unexplained"
-    assert (
-        "Without giesekus_mobility the fitted runs are missed by 1"
-        in (loop.remaining["description"])
+    said = re.search(
+        r"Without giesekus_mobility the fitted runs are missed by ([0-9.]+) %",
+        loop.remaining["description"],
     )
+    assert said is not None
+    assert float(said[1]) < 1.1  # the noise, and a tenth more than its 180 samples may have
