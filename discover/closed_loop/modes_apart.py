@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from discover.closed_loop.search import Search
-from discover.effects import make_effect
+from discover.effects import AbstractEffect, make_effect
 from discover.forward import AugmentedModel
 from discover.forward.least_squares import Fit, Prior, intervals
 from discover.forward.modulus_errors import modulus_shifts
@@ -39,25 +39,16 @@ def modes_apart(
     scales
         Of the data, as the model of the search has them.
     """
-    before = search.model
-    # one declared mode has another beside it that was found, or known
-    added = 1 if len(before.declared.modulus) == 1 else 0
-    declared = replace(before.declared, by_mode=tuple(names), added_modes=added)
-    active = [effect_of(before, name) for name in search.active]
-    model = AugmentedModel(declared, active, scales)
-    places = places_in(before, model, search.active)
-    known = prior_in(search.prior, places)
-    problem = FitProblem(model, search.batch, 1, known)
-    start = model.zero()
-    start[[*places.values()]] = search.fit.theta[[*places]]
-    fit = problem.fit(start, [places[at] for at in search.fit.free])
+    active = [effect_of(search.model, name) for name in search.active]
+    problem, fit = _fitted_again(search, names, active, scales)
+    model = problem.model
     if not fit.usable:
         return {}
     _, chosen = choose_degrees(problem, fit, {name: Degree() for name in names})
     alike = {name: Degree(0, one.evidence) for name, one in chosen.items()}
     shifts = modulus_shifts(model, fit.theta, search.batch)
     bounds = intervals(model, search.batch, fit, shifts)
-    freer = freer_fits(model, search.batch, fit, alike, known)
+    freer = freer_fits(model, search.batch, fit, alike, problem.prior)
     return constants_by_mode(model, search.batch, fit, bounds, alike, freer)
 
 
@@ -77,22 +68,15 @@ def with_other_laws(
     scales
         Of the data, as the model of the search has them.
     """
-    before, told = search.model, dict(found)
+    told = dict(found)
     laws = [name for name in found if name in ONE_CONSTANT]
-    known = {one.name for one in before.declared.effects}
+    known = {one.name for one in search.model.declared.effects}
     if len(laws) != 1 or known & set(ONE_CONSTANT) or laws[0] not in search.active:
         return told
     (name,) = laws
-    added = 1 if len(before.declared.modulus) == 1 else 0
-    declared = replace(before.declared, by_mode=ONE_CONSTANT, added_modes=added)
-    effects = {one: effect_of(before, one) for one in search.active}
+    effects = {one: effect_of(search.model, one) for one in search.active}
     effects |= {one: make_effect(one) for one in ONE_CONSTANT if one not in effects}
-    model = AugmentedModel(declared, list(effects.values()), scales)
-    places = places_in(before, model, search.active)
-    problem = FitProblem(model, search.batch, 1, prior_in(search.prior, places))
-    start = model.zero()
-    start[[*places.values()]] = search.fit.theta[[*places]]
-    same = problem.fit(start, [places[at] for at in search.fit.free])
+    problem, same = _fitted_again(search, ONE_CONSTANT, list(effects.values()), scales)
     if same.usable:
         modes = tuple(
             one if one.ci95 is None else _open_to(one, laws_as_good(problem, same, name, at))
@@ -100,6 +84,28 @@ def with_other_laws(
         )
         told[name] = replace(told[name], modes=modes)
     return told
+
+
+def _fitted_again(
+    search: Search,
+    names: Sequence[str],
+    effects: Sequence[AbstractEffect],
+    scales: Mapping[str, float],
+) -> tuple[FitProblem, Fit]:
+    """Return what a search found, fitted where constants with these names may differ by mode.
+
+    They do not differ in the fit. The effects hold those that the search found.
+    """
+    before = search.model
+    # one declared mode has another beside it that was found, or known
+    added = 1 if len(before.declared.modulus) == 1 else 0
+    declared = replace(before.declared, by_mode=tuple(names), added_modes=added)
+    model = AugmentedModel(declared, list(effects), scales)
+    places = places_in(before, model, search.active)
+    problem = FitProblem(model, search.batch, 1, prior_in(search.prior, places))
+    start = model.zero()
+    start[[*places.values()]] = search.fit.theta[[*places]]
+    return problem, problem.fit(start, [places[at] for at in search.fit.free])
 
 
 def _open_to(mode: ModeConstant, others: Mapping[str, Fit]) -> ModeConstant:

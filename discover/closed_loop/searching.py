@@ -163,10 +163,11 @@ class SearchTask:
     def _alike(self, search: Search, names: list[str]) -> dict[str, ConstantByMode] | None:
         """Return what runs say of each mode's constants; None where these differ."""
         self.say(f"what the runs say of {', '.join(names)} in each mode")
-        found = modes_apart(search, names, data_scales(self.fitted))
+        scales = data_scales(self.fitted)
+        found = modes_apart(search, names, scales)
         if any(max(one.evidence) > INDISTINGUISHABLE for one in found.values()):
             return None
-        return with_other_laws(search, found, data_scales(self.fitted))
+        return with_other_laws(search, found, scales)
 
     def one_degree_more(self, before: SearchResult) -> SearchResult | None:
         """Search once more with constants by mode of one degree more; None where there is none.

@@ -101,6 +101,8 @@ class OtherConstants:
         As of `Carried`; what was held counts as an effect.
     theta
         All parameters of the fit.
+    unseen_error
+        Relative misfit of the runs held out; None where there is none.
     """
 
     name: str
@@ -108,6 +110,7 @@ class OtherConstants:
     sentence: str
     criterion: float
     theta: Float[np.ndarray, " p"]
+    unseen_error: float | None
 
 
 def other_constants(
@@ -137,7 +140,7 @@ def other_constants(
     if judgement.carries_over or unseen is None:
         return found
     refuted = _error(search.model, search.fit.theta, unseen)
-    return [one for one in found if _error(search.model, one.theta, unseen) < refuted]
+    return [one for one in found if one.unseen_error is not None and one.unseen_error < refuted]
 
 
 def _held(search: Search, carries_over: bool) -> list[Held]:
@@ -180,13 +183,13 @@ def _found(
 ) -> OtherConstants:
     worth = _worth(search, search.problem.cost(fit), fit.free, (*effects, held.name))
     missed = f"the fitted runs are missed by {percent_of(float(np.mean(fit.run_errors)))}"
-    if unseen is not None:
-        error = _error(search.model, fit.theta, unseen)
+    error = None if unseen is None else _error(search.model, fit.theta, unseen)
+    if error is not None:
         missed += f", and those held out by {percent_of(error)}"
     along = " and with " if held.is_gone(search.model, fit.theta) else " and "
     beside = along + " and ".join(effects) if effects else ""
     sentence = f"{held.said(search.model, fit.theta)}{beside} {missed}. {held.advice}"
-    return OtherConstants(held.name, effects, sentence, worth, fit.theta)
+    return OtherConstants(held.name, effects, sentence, worth, fit.theta, error)
 
 
 def _error(model: AugmentedModel, theta: np.ndarray, runs: Batch) -> float:
