@@ -15,35 +15,18 @@ from independent.material import (
     integrate,
     rate_tensor,
     stretched,
-    velocity_gradient,
 )
 
 ONE = np.eye(3)
 
 
-@dataclass(frozen=True)
-class Leonov(RateLaw):
-    """c▽ = −(c·c − I)/(2λ), σ = G (c − I), in shear   [Leonov 1976, Rheol. Acta 15, 85].
+def leonov(a: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Return −(A·A − I)/2, in shear   [Leonov 1976, Rheol. Acta 15, 85].
 
-    The traces of c and of its inverse are equal in plane flow, so that this is Giesekus with ½.
+    The traces of A and of its inverse are equal in plane flow, so that this is Giesekus with ½.
     """
-
-    modulus: float = 100.0
-    relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        """Return c = I."""
-        return ONE.ravel()
-
-    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return dc/dt."""
-        c = state.reshape(3, 3)
-        return (stretched(c, rate) - (c @ c - ONE) / (2 * self.relaxation_time)).ravel()
-
-    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return G (c − I)."""
-        del rate
-        return self.modulus * (state.reshape(3, 3) - ONE)
+    del gradient
+    return -(a @ a - ONE) / 2
 
 
 @dataclass(frozen=True)
@@ -125,35 +108,15 @@ class Acierno(RateLaw):
         return state[:9].reshape(3, 3)
 
 
-@dataclass(frozen=True)
-class Drops(RateLaw):
-    """Ṡ = Ω·S − S·Ω + f (D·S + S·D) − (S − g I)/λ, σ = G (S − I)/f.
+def drops(a: np.ndarray, gradient: np.ndarray, affinity: float) -> np.ndarray:
+    """Return −(1 − f)(D·A + A·D) − (A − g I), g = 3 det A/II keeping the volume of an ellipsoid.
 
-    g = 3 det S/II keeps the volume of an ellipsoid   [Maffettone & Minale 1998, J. Non-Newtonian
-    Fluid Mech. 78, 227].
+    [Maffettone & Minale 1998, J. Non-Newtonian Fluid Mech. 78, 227].
     """
-
-    affinity: float = 0.8  # f
-    modulus: float = 100.0
-    relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        """Return a sphere."""
-        return ONE.ravel()
-
-    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return dS/dt."""
-        s, gradient = state.reshape(3, 3), velocity_gradient(rate)
-        turn, strain = (gradient - gradient.T) / 2, (gradient + gradient.T) / 2
-        second = (np.trace(s) ** 2 - np.trace(s @ s)) / 2
-        back = (s - 3 * np.linalg.det(s) / second * ONE) / self.relaxation_time
-        pulled = self.affinity * (strain @ s + s @ strain)
-        return (turn @ s - s @ turn + pulled - back).ravel()
-
-    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return G (S − I)/f."""
-        del rate
-        return self.modulus / self.affinity * (state.reshape(3, 3) - ONE)
+    strain = (gradient + gradient.T) / 2
+    second = (np.trace(a) ** 2 - np.trace(a @ a)) / 2
+    slipping = (1 - affinity) * (strain @ a + a @ strain)
+    return -slipping - (a - 3 * np.linalg.det(a) / second * ONE)
 
 
 @dataclass(frozen=True)

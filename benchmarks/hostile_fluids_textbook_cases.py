@@ -25,14 +25,15 @@ from hostile_fluids_textbook import (
     Acierno,
     Banding,
     Damped,
-    Drops,
     FeneCR,
-    Leonov,
     PartlyRetracting,
     Waves,
+    drops,
+    leonov,
     of_doi_edwards,
     of_papanastasiou,
 )
+from independent.by_authors import ByAuthors
 from independent.material import RateLaw
 
 _LEONOV = {"planted": {"giesekus_mobility": {"alpha": 0.5}}, "terms": {"sigma.sigma": 0.5}}
@@ -62,16 +63,17 @@ def _case(name: str, words: str = "", records=recorded, **how) -> Case:
     return Case(truth + words, records(fluid), **{"outside": not what, **what, **how})
 
 
+_DROPS = ByAuthors(drops, {"affinity": 0.8}, SCALE["modulus"] / 0.8, SCALE["relaxation_time"])
 _DAMPED = {"same_as": tuple(DAMPED), "outside": True}
 """Damped by strain, though not as e^{−nγ}: the name is right all the same."""
 _FLUIDS = {
-    "leonov": ("Leonov, in shear Giesekus with ½", Leonov(), _LEONOV),
+    "leonov": ("Leonov, in shear Giesekus with ½", ByAuthors(leonov, **SCALE), _LEONOV),
     "pec": ("Larson's partly retracting strands, ξ = 0.5", PartlyRetracting(), _RETRACTING),
     "rods": ("rigid rods, quadratic closure", PartlyRetracting(1.0), _RETRACTING),
     "fene_cr": ("FENE-CR, b = 20", FeneCR(), {}),
     "fene_cr_50": ("FENE-CR, b = 50", FeneCR(50.0), {}),
     "acierno": ("Acierno: modulus and time follow a structure", Acierno(), {}),
-    "drops": ("drops that stay ellipsoids", Drops(), {}),
+    "drops": ("drops that stay ellipsoids", _DROPS, {}),
     "doi_edwards": ("Doi–Edwards tubes", Damped(**SCALE, function=of_doi_edwards), _DAMPED),
     "psm": ("K-BKZ, h = 1/(1 + γ²/6)", Damped(**SCALE, function=of_papanastasiou), _DAMPED),
     "banding": ("Johnson–Segalman, bands across the gap", Banding(), {}),
