@@ -92,3 +92,26 @@ def test_what_gives_way_at_the_end_is_no_outlier():
     record = WAVE + correlated(0.0, np.random.default_rng(2))
     record[-4:] -= 30.0 * 0.02 * np.arange(1.0, 5.0)
     assert not np.any(stray(WAVE - record, record))
+
+
+@pytest.mark.parametrize("at", [1, 2, -3, -2, -1])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_knock_near_an_end_is_an_outlier_of_the_record_alone(at, sign):
+    record = WAVE + correlated(0.0, np.random.default_rng(3))
+    record[at] += sign * 30.0 * 0.02
+    assert np.flatnonzero(isolated(record)).tolist() == [at % 200]
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_noise_and_what_ends_suddenly_are_no_outliers_near_an_end(correlation):
+    """A motor that stops two samples before the end, a stress that levels off, a first sample."""
+    generator = np.random.default_rng(5)
+    growing = np.exp(0.3 * np.arange(40.0))
+    growing[-1] = growing[-2]
+    stopped = np.append(1.0 - np.exp(-TIMES[:-2]), [0.4, 0.2])
+    started = np.append([0.7], 1.0 - np.exp(-TIMES))
+    for record in (WAVE, 1.0 - np.exp(-TIMES), growing, stopped, started):
+        size = 0.02 * np.minimum(np.abs(record), 1.0)
+        for _ in range(50):
+            noise = size * correlated(correlation, generator, 1.0, len(record))
+            assert not np.any(isolated(record + noise)[[0, 1, 2, -3, -2, -1]])

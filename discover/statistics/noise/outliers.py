@@ -16,6 +16,7 @@ _ABOVE_SPREAD = 8.0
 times the median's."""
 _ABOVE_BENDS = 2.0
 """Times the sharpest bend of what remains: a real peak, or step, leaves a record that is bent."""
+_BENDS_BEFORE = 8  # samples whose bends are compared with what stands apart near an end
 _NEIGHBOURHOOD = 31
 _PASSES = 5
 _SMOOTH = 5
@@ -28,15 +29,18 @@ def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     those after it do, and what lies between both are all missed to the same side, by far more than
     noise, which is told by third differences in the neighbourhood   [after Hampel 1974, J. Am.
     Stat. Assoc. 69, 383, with lines for his median], and by more than the record without it bends.
-    So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. The
-    first and last three samples cannot be judged.
+    So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. Of
+    the last three samples, the second and the third, one alone is an outlier if it is off twice as
+    far, for there is less beside it. The first is none: it may be what an instrument needs to
+    settle.
     """
     values = np.asarray(record, dtype=float)
 
     def apart(left):
         return np.any([_apart(values[left], width) for width in range(1, _WIDEST + 1)], axis=0)
 
-    return _set_aside(np.arange(len(values)), len(values), apart)
+    left = np.flatnonzero(~_apart_near_ends(values))
+    return _set_aside(left, len(values), apart)
 
 
 def stray(
@@ -120,6 +124,49 @@ def _apart(values: Float[np.ndarray, " n"], width: int) -> Bool[np.ndarray, " n"
     for i in range(width):
         off[chosen + i] = True
     return off
+
+
+def _apart_near_ends(values: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Return which single samples near an end stand apart: the second, third and last three."""
+    off = np.zeros(len(values), dtype=bool)
+    if len(values) < _NEIGHBOURHOOD:
+        return off
+    noise = _local_noise(values)
+    for turned, nearest in ((slice(None), 0), (slice(None, None, -1), 1)):
+        toward, quiet, found = values[turned], noise[turned], off[turned]
+        # from the inside: what is beside a knock is off the line through it
+        for beyond in range(_BESIDE - 1, nearest - 1, -1):  # samples from here to the end
+            at = len(values) - 1 - beyond
+            before, after = toward[at - _BENDS_BEFORE : at], toward[at + 1 :]
+            found[at] = _is_apart(before, toward[at], after, quiet[at])
+            if found[at]:
+                break
+    return off
+
+
+def _is_apart(
+    before: Float[np.ndarray, " n"], own: float, after: Float[np.ndarray, " m"], noise: float
+) -> bool:
+    """Return whether a sample with so few after it that they have no line is off them and others.
+
+    What settles, or gives way, is off in the samples after it as well.
+    """
+    one, two, three = before[-1], before[-2], before[-3]
+    missed = [own - 2.0 * one + two, own - 3.0 * (one - two) - three]  # a line, and a parabola
+    bends = np.abs(np.diff(before, 2))
+    if len(after):
+        missed.append(own - 0.5 * (one + after[0]))
+        # the bend across the gap, as if there were none
+        bends = np.append(bends, np.abs(0.5 * (after[0] - one) - (one - two)))
+    else:
+        missed.append(own - one)  # what levels off at the end is no knock
+    size = np.min(np.abs(missed))
+    off_line = after - one - (one - two) * np.arange(2, len(after) + 2)
+    return bool(
+        np.ptp(np.sign(missed)) == 0
+        and size > max(2.0 * _ABOVE_NOISE * noise, _ABOVE_BENDS * np.max(bends))
+        and np.all(np.abs(off_line) < 0.5 * size)
+    )
 
 
 def _excess(values: Float[np.ndarray, " n"], width: int):
