@@ -32,9 +32,9 @@ from pathlib import Path
 
 import numpy as np
 from bad_days import answer
+from hostile_fluids_noises_cases import CASES
 from hostile_fluids_records import Case
 from hostile_fluids_rules import Records, judge
-from hostile_fluids_textbook_cases import CASES
 from independent.folders import write_study, write_table
 
 TASKS = ("compare", "close-loop")
