@@ -115,3 +115,19 @@ def test_noise_and_what_ends_suddenly_are_no_outliers_near_an_end(correlation):
         for _ in range(50):
             noise = size * correlated(correlation, generator, 1.0, len(record))
             assert not np.any(isolated(record + noise)[[0, 1, 2, -3, -2, -1]])
+
+
+def test_samples_that_read_zero_side_by_side_are_outliers_where_the_stress_is_not_zero():
+    record = 1.0 - np.exp(-TIMES) + correlated(0.0, np.random.default_rng(6))
+    dropped = [20, 21, 30, 32, 33, 34, 100]
+    record[dropped] = 0.0
+    assert np.flatnonzero(isolated(record)).tolist() == dropped
+
+
+def test_a_stress_that_passes_or_rests_at_zero_has_no_outlier():
+    """Records without noise that read exactly zero: a wave, a cusp, a rest before the flow."""
+    wave = np.round(np.sin(0.1 * np.pi * np.arange(200)), 12)
+    cusp = np.abs(np.arange(-100.0, 100.0)) / 100.0
+    rest = np.append(np.zeros(30), 1.0 - np.exp(-TIMES))
+    for record in (wave, cusp, rest):
+        assert not np.any(isolated(record))

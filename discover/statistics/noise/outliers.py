@@ -17,6 +17,7 @@ times the median's."""
 _ABOVE_BENDS = 2.0
 """Times the sharpest bend of what remains: a real peak, or step, leaves a record that is bent."""
 _BENDS_BEFORE = 8  # samples whose bends are compared with what stands apart near an end
+_MOST_DROPPED = 0.2  # of the samples of a record
 _NEIGHBOURHOOD = 31
 _PASSES = 5
 _SMOOTH = 5
@@ -32,14 +33,14 @@ def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. Of
     the last three samples, the second and the third, one alone is an outlier if it is off twice as
     far, for there is less beside it. The first is none: it may be what an instrument needs to
-    settle.
+    settle. Samples that read exactly zero are held against those that do not.
     """
     values = np.asarray(record, dtype=float)
 
     def apart(left):
         return np.any([_apart(values[left], width) for width in range(1, _WIDEST + 1)], axis=0)
 
-    left = np.flatnonzero(~_apart_near_ends(values))
+    left = np.flatnonzero(~(_apart_near_ends(values) | _dropped(values)))
     return _set_aside(left, len(values), apart)
 
 
@@ -141,6 +142,23 @@ def _apart_near_ends(values: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
             found[at] = _is_apart(before, toward[at], after, quiet[at])
             if found[at]:
                 break
+    return off
+
+
+def _dropped(values: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Return which samples read zero though those around them do not, for want of a reading.
+
+    Each is judged as if it were the only one, for several hide one another.
+    """
+    zero = values == 0.0
+    off = np.zeros(len(values), dtype=bool)
+    if np.count_nonzero(zero) > _MOST_DROPPED * len(values):
+        return off  # of a record that rests, or has few values
+    for at in np.flatnonzero(zero):
+        kept = np.flatnonzero(~zero | (np.arange(len(values)) == at))
+        own = int(np.searchsorted(kept, at))
+        alone = values[kept]
+        off[at] = _apart(alone, 1)[own] or _apart_near_ends(alone)[own]
     return off
 
 
