@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.noise.converter_steps import step_of_converter
+from discover.statistics.noise.running_mean import averaged_over
 from discover.statistics.noise.wandering import wandering
 from discover.words import percent_of
 
@@ -18,7 +19,7 @@ _HARDLY_MORE = 1.05  # half steps
 def likeness(
     residuals: Sequence[Float[np.ndarray, " _"]], measured: Sequence[Float[np.ndarray, " _"]]
 ) -> str:
-    """Return what a residual looks like, as a clause; empty where it looks like neither.
+    """Return what a residual looks like, as a clause; empty where it looks like nothing of these.
 
     That is no finding: a law that errs by less than a step, or at random, looks the same.
 
@@ -31,7 +32,14 @@ def likeness(
     if steps and all(steps):
         return _of_steps(residuals, measured, steps)
     sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
-    far = wandering([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
+    rows = [np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)]
+    if width := averaged_over(rows):
+        return (
+            f"what is left looks like noise of which each sample is the mean of {width}, and no "
+            "test of such noise tells it from a small error of the law: record the stress without "
+            "this smoothing"
+        )
+    far = wandering(rows)
     if far is None:
         return ""
     return (

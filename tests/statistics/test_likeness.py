@@ -1,4 +1,4 @@
-"""What a residual may be of the instrument's: zeros that wander, and steps of a converter."""
+"""What a residual may be of the instrument's: zeros that wander, means, a converter's steps."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from discover.closed_loop.judging.reasons import Grounds, reasons
 from discover.closed_loop.judging.unseen_runs import UnseenRuns
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.likeness import likeness
+from discover.statistics.noise.running_mean import averaged_over
 from discover.statistics.noise.wandering import wandering
 from discover.statistics.residual import Expectation
 
@@ -72,6 +73,36 @@ def test_what_a_law_lacks_does_not_wander(make):
 def test_runs_of_a_few_samples_say_nothing_of_a_walk():
     lot = np.random.default_rng(0)
     assert wandering([np.cumsum(lot.standard_normal(30)) for _ in range(4)]) is None
+
+
+def mean_of(width, n, lot):
+    return np.convolve(lot.standard_normal(n + width - 1), np.full(width, 1.0 / width), "valid")
+
+
+@pytest.mark.parametrize("width", [2, 3, 5, 9])
+def test_noise_that_is_a_running_mean_is_told_with_its_width(width):
+    lots = (np.random.default_rng(seed) for seed in range(20))
+    told = [averaged_over([mean_of(width, n, lot) for n in LENGTHS]) for lot in lots]
+    assert told.count(width) >= 18
+
+
+@pytest.mark.parametrize("make", [smooth, start, wave, white, correlated, walk])
+def test_what_is_no_running_mean_is_not_told_as_one(make):
+    lots = (np.random.default_rng(seed) for seed in range(DRAWS))
+    assert not any(averaged_over([make(n, lot) for n in LENGTHS]) for lot in lots)
+
+
+def test_a_mean_over_a_third_of_a_run_is_not_told_from_a_misfit():
+    lot = np.random.default_rng(0)
+    assert averaged_over([mean_of(27, 80, lot) for _ in range(4)]) is None
+
+
+def test_a_fit_that_leaves_a_running_mean_says_so():
+    lot = np.random.default_rng(1)
+    records = [np.sin(np.linspace(0.0, 9.0, n)) for n in LENGTHS]
+    left = lack_of_fit([0.03 * mean_of(9, n, lot) for n in LENGTHS], records)
+    assert left.verdict == "unexplained"
+    assert "each sample is the mean of 9" in left.likeness
 
 
 def residual_in_steps(told, share=0.04):

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Float
-from scipy.fft import dct
 
 from discover.statistics.noise.whiteness import FEWEST_TESTED
+from discover.statistics.noise.whittle import cosine_power, whittle_likelihood
 
 _SHARES = np.append(0.0, np.geomspace(1e-3, 1e5, 60))  # of the slow part, over the noise's
 _HALF_SWINGS = np.array([1.0, 2.0, 4.0, 8.0])  # of a smooth misfit along a run
@@ -42,7 +42,7 @@ def wandering(rows: Sequence[Float[np.ndarray, " _"]]) -> float | None:
     after_start, _ = _gain([row[len(row) // _AFTER_START :] for row in long])
     if gain < _CLEAR or after_start < 0.5 * _CLEAR:
         return None
-    level = [np.mean(_power(row) / (1.0 + share * _walk(len(row)))) for row in long]
+    level = [np.mean(cosine_power(row) / (1.0 + share * _walk(len(row)))) for row in long]
     return float(np.sqrt(share * np.mean([n * len(r) for n, r in zip(level, long, strict=True)])))
 
 
@@ -50,24 +50,13 @@ def _gain(rows: Sequence[np.ndarray]) -> tuple[float, float]:
     """Return how much likelier a walk is than a smooth misfit, and its share, in logarithms."""
     walk, smooth = 0.0, 0.0
     for row in rows:
-        power, k = _power(row), np.arange(1, len(row))
-        walk = walk + _likelihood(power, 1.0 + _SHARES[:, None] * _walk(len(row)))
+        power, k = cosine_power(row), np.arange(1, len(row))
+        walk = walk + whittle_likelihood(power, 1.0 + _SHARES[:, None] * _walk(len(row)))
         slow = 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
-        each = _likelihood(power, 1.0 + _SHARES[:, None, None] * slow)
+        each = whittle_likelihood(power, 1.0 + _SHARES[:, None, None] * slow)
         smooth = smooth + np.max(each, axis=0)
     return float(np.max(walk) - np.max(smooth)), float(_SHARES[int(np.argmax(walk))])
 
 
-def _power(row: np.ndarray) -> np.ndarray:
-    # without the mean: where a walk began is anywhere
-    return np.square(np.asarray(dct(row, type=2, norm="ortho")))[1:]
-
-
 def _walk(n: int) -> np.ndarray:
     return 0.25 / np.sin(0.5 * np.pi * np.arange(1, n) / n) ** 2
-
-
-def _likelihood(power: np.ndarray, spectra: np.ndarray) -> np.ndarray:
-    """Return the logarithm of the likelihood under each spectrum, its level fitted."""
-    level = np.maximum(np.mean(power / spectra, axis=-1), 1e-300)
-    return -0.5 * len(power) * np.log(level) - 0.5 * np.sum(np.log(spectra), axis=-1)
