@@ -36,8 +36,8 @@ def likeness(
     if width := averaged_over(rows):
         return (
             f"what is left looks like noise of which each sample is the mean of {width}, and no "
-            "test of such noise tells it from a small error of the law: record the stress without "
-            "this smoothing"
+            "test tells such noise from a small error of the law: record the stress without this "
+            "smoothing, or give the size of the noise, as by noise = 0.01"
         )
     far = wandering(rows)
     if far is None:
