@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.likeness import likeness
+from discover.statistics.likeness import Likeness, likeness
 from discover.statistics.noise.dead_records import holds_signal
 from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
@@ -74,7 +74,8 @@ class LackOfFit:
         Of one that does not: what of the instrument's what is left looks like, as a clause; empty
         where it looks like nothing that has a word.
     advice
-        Of one that something else refutes: what to do about that, as a clause.
+        Of one that something else refutes, or leaves what looks like something: what to do about
+        that, as a clause.
     """
 
     verdict: FitVerdict
@@ -210,6 +211,7 @@ def what_is_left(
         reason = f"what is left ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
     else:
         reason = f"what is left ({percent_of(misfit)}) has {pattern}"
+    like = likeness(residuals, measured) if verdict == "unexplained" else Likeness()
     count = sum(len(where) for where in outliers)
     if count:
         reason += f"; outliers that do not count: {count}"
@@ -226,7 +228,8 @@ def what_is_left(
         pattern,
         float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
         rest,
-        likeness(residuals, measured) if verdict == "unexplained" else "",
+        str(like),
+        like.remedy,
     )
 
 

@@ -103,6 +103,7 @@ def test_a_fit_that_leaves_a_running_mean_says_so():
     left = lack_of_fit([0.03 * mean_of(9, n, lot) for n in LENGTHS], records)
     assert left.verdict == "unexplained"
     assert "each sample is the mean of 9" in left.likeness
+    assert "without this smoothing" in left.advice
 
 
 def residual_in_steps(told, share=0.04):
@@ -118,17 +119,17 @@ def residual_in_steps(told, share=0.04):
 
 
 def test_steps_of_a_converter_are_told_where_they_may_be_all_that_is_left():
-    text = likeness(*residual_in_steps(Giesekus(0.3, **SCALE)))
+    text = str(likeness(*residual_in_steps(Giesekus(0.3, **SCALE))))
     assert "steps of 4 % of their largest value" in text
     assert "100 % of what is left stands within half of one" in text
     assert "hide as much of a law" in text
 
 
 def test_steps_are_not_told_where_more_is_left_or_where_there_are_none():
-    assert likeness(*residual_in_steps(WhiteMetzner(0.5, **SCALE))) == ""
+    assert str(likeness(*residual_in_steps(WhiteMetzner(0.5, **SCALE)))) == ""
     rows, records = residual_in_steps(Giesekus(0.3, **SCALE), share=1e-9)
     lot = np.random.default_rng(0)
-    assert likeness(rows, [row + lot.standard_normal(len(row)) for row in records]) == ""
+    assert str(likeness(rows, [row + lot.standard_normal(len(row)) for row in records])) == ""
 
 
 def test_only_what_is_not_explained_is_said_to_look_like_something():
