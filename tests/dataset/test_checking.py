@@ -134,6 +134,31 @@ def test_each_doubt_is_raised_by_the_fault_it_is_for(folder, subject):
     assert {f.file for f in mine} <= {"r0.csv", ""}
 
 
+def held_record(groups):
+    """Return a start-up of 90 samples with 1 % noise, of which groups show one value each."""
+    table = start_up(0.5, np.linspace(0.05, 9.0, 90))
+    noise = 1.0 + 0.01 * np.random.default_rng(7).standard_normal(90)
+    table["stress_Pa"] = (table["stress_Pa"] * noise)[np.repeat(groups, np.diff([*groups, 90]))]
+    return table
+
+
+def test_a_transducer_that_is_read_three_times_for_each_value_is_told(folder):
+    findings = check_folder(folder(held_record(np.arange(0, 90, 3)), start_up(0.5)))
+    (told,) = [f for f in findings if "looks like a lag" in f.text]
+    assert told.file == "r0.csv"
+    assert "stands in 3 samples" in told.text
+
+
+@pytest.mark.parametrize("kept", [1.0, 0.6], ids=["every", "by chance"])
+def test_values_that_are_new_or_repeat_by_chance_are_not_told_as_held(folder, kept):
+    lot = np.random.default_rng(8)
+    groups = np.flatnonzero(np.append(True, lot.random(89) < kept))
+    rounded = start_up(1.0, np.linspace(0.05, 9.0, 90))
+    rounded["stress_Pa"] = np.round(rounded["stress_Pa"], -1)
+    findings = check_folder(folder(held_record(groups), rounded))
+    assert not any("looks like a lag" in f.text for f in findings)
+
+
 @pytest.mark.parametrize(("column", "factor"), [("time_s", 1e3), ("stress_Pa", 1e-3)])
 def test_another_unit_in_one_run_is_doubted_beside_the_others(folder, column, factor):
     runs = [start_up(rate) for rate in (0.2, 0.5, 1.0, 5.0)]

@@ -19,6 +19,8 @@ _SPIKE_SHARE = 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
+# Values of a record, and the share of them that are read equally often, from which on they are held
+_FEWEST_HELD, _HELD_ALIKE = 10, 0.8
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 
 
@@ -60,6 +62,7 @@ def doubts_of_run(run: Run) -> Iterator[Finding]:
         )
         return
     yield from _outliers(run)
+    yield from _held_values(run)
     yield from _clock_start(run)
     yield from _strain(run)
     if np.ptp(run.rate) <= 1e-6 * np.max(np.abs(run.rate)):
@@ -136,6 +139,24 @@ def _outliers(run: Run) -> Iterator[Finding]:
             run.name,
             f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
             "them; remove them if the instrument made them.",
+        )
+
+
+def _held_values(run: Run) -> Iterator[Finding]:
+    """Yield that each value is read several times, where all are read as often."""
+    begins = np.flatnonzero(np.diff(run.stress)) + 1
+    lengths = np.diff(begins)
+    if len(lengths) < _FEWEST_HELD:
+        return
+    often = int(np.median(lengths))
+    if often > 1 and np.mean(lengths == often) > _HELD_ALIKE:
+        yield Finding(
+            "warning",
+            "stress",
+            run.name,
+            f"Each value of the stress in {run.name} stands in {often} samples: the "
+            "transducer is read more often than it has values. Keep the first sample of each "
+            "value, or what is late in the others looks like a lag.",
         )
 
 
