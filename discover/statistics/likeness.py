@@ -50,8 +50,8 @@ def likeness(
         return Likeness(
             f"what is left looks like noise of which each sample is the mean of {width}, and no "
             "test tells such noise from a small error of the law",
-            "record the stress without this smoothing, or give the size of its noise, as by "
-            "noise = 0.01",
+            f"record the stress without smoothing it over {width} samples, or give the size of its "
+            "noise, as by noise = 0.01",
         )
     far = wandering(rows)
     if far is None:

@@ -103,7 +103,7 @@ def test_a_fit_that_leaves_a_running_mean_says_so():
     left = lack_of_fit([0.03 * mean_of(9, n, lot) for n in LENGTHS], records)
     assert left.verdict == "unexplained"
     assert "each sample is the mean of 9" in left.likeness
-    assert "without this smoothing" in left.advice
+    assert "without smoothing it over 9 samples" in left.advice
 
 
 def residual_in_steps(told, share=0.04):
