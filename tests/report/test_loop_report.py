@@ -194,6 +194,25 @@ def test_what_passes_for_slow_noise_is_said_to_look_like_a_slow_effect():
     assert "slowly" not in loop_verdict(missing)[1]
 
 
+def said_of(probability, **inclusion):
+    gain = Explanation(("stress_gain",), probability, ErrorPair(0.01, 0.2), {})
+    told = Explanations((gain,), 1.0 - probability, inclusion)
+    return " ".join(loop_verdict(replace(loop_result(), explanations=told))[:2])
+
+
+def test_what_is_less_probable_than_not_is_not_said_to_explain_the_data():
+    text = said_of(0.44, stress_gain=0.44)
+    assert text.startswith("The declared model lacked something, but what that is stays open;")
+    assert "with a probability of 44 % it is, in the instrument's signal: stress gain" in text
+    assert "That it is nothing that was tried has a probability of 56 %." in text
+    assert "explains the data" not in text
+    sure = said_of(0.89, stress_gain=0.89)
+    assert "explains the data; added in the" in sure
+    assert "probability" not in sure
+    # in all that fits alike, of which no set has half
+    assert "explains the data; added in the" in said_of(0.44, stress_gain=0.86)
+
+
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():
     unexplained = replace(loop_result(), verdict="unexplained")
     text = loop_verdict(unexplained)[0]

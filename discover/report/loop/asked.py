@@ -9,6 +9,8 @@ MOST_NAMES = 3
 
 EXPLAINED = ("effects_added", "no_effect_needed")
 
+_EVEN = 0.5
+
 
 def several(names: Sequence[str], word: str) -> str:
     """Return the first of several names, and how many more there are."""
@@ -26,3 +28,20 @@ def coarse_rates(result: LoopResult) -> CoarseRates | None:
 def untested_by(result: LoopResult) -> str:
     """Return why nothing tested what explains the records, `Untested`; empty where it was."""
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
+
+
+def doubted(result: LoopResult) -> float | None:
+    """Return how probable what was added is, where that is less than even; None otherwise.
+
+    Effects each of which is likelier there than not are not doubted, however many others may stand
+    beside them.
+    """
+    if result.verdict != "effects_added":
+        return None
+    told, names = result.explanations, [stage.effect for stage in result.stages]
+    own = told.holding(names)
+    if own is None or own.probability >= _EVEN:
+        return None
+    if all(told.inclusion.get(name, 0.0) >= _EVEN for name in names):
+        return None
+    return own.probability

@@ -5,7 +5,14 @@ from collections.abc import Iterator
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.inference.other_law_of_a_mode import other_laws_said
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.loop.asked import EXPLAINED, MOST_NAMES, coarse_rates, several, untested_by
+from discover.report.loop.asked import (
+    EXPLAINED,
+    MOST_NAMES,
+    coarse_rates,
+    doubted,
+    several,
+    untested_by,
+)
 from discover.report.wording import effect_title, percent, sentence, significant
 from discover.words import listed
 
@@ -94,6 +101,8 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
         yield "no run was held out to judge by"
     if untested == "states" and result.stages:
         yield nothing
+    elif not untested and doubted(result) is not None:
+        yield f"that it is nothing that was tried has a probability of {none}"
 
 
 def _samples_that_count(result: LoopResult) -> Iterator[str]:

@@ -8,11 +8,12 @@ from discover.closed_loop.results.stages import Stage
 from discover.inference.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
-from discover.report.loop.asked import coarse_rates, several, untested_by
+from discover.report.loop.asked import coarse_rates, doubted, several, untested_by
 from discover.report.wording import (
     effect_title,
     estimate,
     interval,
+    percent,
     readable,
     sentence,
     significant,
@@ -31,6 +32,8 @@ _LOOP = {
     "unexplained": "What is left still has structure that no candidate explains",
     "no_signal": "The records hold no signal that a law could be told from",
 }
+
+_OPEN = "The declared model lacked something, but what that is stays open"
 
 _UNTESTED = {
     "effects_added": "Fitted, not tested: with what is added the declared model describes",
@@ -72,6 +75,8 @@ def what_was_found(result: LoopResult) -> str:
     if parts:
         # what comes near without explaining is not called added
         lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
+        if (share := doubted(result)) is not None:
+            lead = f"with a probability of {percent(share)} it is, "
         parts[0] = lead + parts[0]
     if result.verdict == "unexplained" and result.free_form:
         curve = result.free_form[0]
@@ -96,7 +101,7 @@ def _how_it_stands(result: LoopResult) -> str:
             return (
                 f"Nothing is explained, for the records follow this model clearly better {read_as}"
             )
-    return _LOOP[result.verdict]
+    return _LOOP[result.verdict] if doubted(result) is None else _OPEN
 
 
 def _values(stage: Stage) -> str:
