@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.noise.converter_steps import step_of_converter
+from discover.statistics.noise.held_values import read_times
 from discover.statistics.noise.running_mean import averaged_over
 from discover.statistics.noise.wandering import wandering
 from discover.words import percent_of
@@ -44,6 +45,12 @@ def likeness(
     steps = [step_of_converter(np.asarray(record)) for record in measured]
     if steps and all(steps):
         return _of_steps(residuals, measured, steps)
+    often = [read_times(np.asarray(record)) for record in measured]
+    if often and min(often) > 1:
+        return Likeness(
+            f"each value of the records stands in {max(often)} samples, which looks like a lag",
+            "record a sample for each value of the transducer, or keep the first of those alike",
+        )
     sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
     rows = [np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)]
     if width := averaged_over(rows):

@@ -106,6 +106,18 @@ def test_a_fit_that_leaves_a_running_mean_says_so():
     assert "without smoothing it over 9 samples" in left.advice
 
 
+def test_records_that_repeat_each_value_are_told_and_those_that_do_not_are_not():
+    lot = np.random.default_rng(3)
+    records = [np.sin(np.linspace(0.0, 9.0, n)) + white(n, lot) for n in LENGTHS]
+    held = [row[3 * (np.arange(len(row)) // 3)] for row in records]
+    left = [true - row for true, row in zip(records, held, strict=True)]
+    told = likeness(left, held)
+    assert "stands in 3 samples" in told.looks
+    assert "keep the first" in told.remedy
+    assert "stands in" not in str(likeness(left, records))
+    assert "stands in" not in str(likeness(left, [*held[:2], records[2]]))
+
+
 def residual_in_steps(told, share=0.04):
     """Return what a Giesekus law leaves of records of a fluid that are read in steps."""
     law = Giesekus(0.3, **SCALE)

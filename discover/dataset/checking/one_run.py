@@ -7,6 +7,7 @@ from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
 from discover.dataset.run import Run
+from discover.statistics.noise.held_values import read_times
 
 FEWEST_SAMPLES = 10
 """Runs with fewer samples than this say little about a law."""
@@ -19,8 +20,6 @@ _SPIKE_SHARE = 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
-# Values of a record, and the share of them that are read equally often, from which on they are held
-_FEWEST_HELD, _HELD_ALIKE = 10, 0.8
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 
 
@@ -144,12 +143,7 @@ def _outliers(run: Run) -> Iterator[Finding]:
 
 def _held_values(run: Run) -> Iterator[Finding]:
     """Yield that each value is read several times, where all are read as often."""
-    begins = np.flatnonzero(np.diff(run.stress)) + 1
-    lengths = np.diff(begins)
-    if len(lengths) < _FEWEST_HELD:
-        return
-    often = int(np.median(lengths))
-    if often > 1 and np.mean(lengths == often) > _HELD_ALIKE:
+    if (often := read_times(run.stress)) > 1:
         yield Finding(
             "warning",
             "stress",
