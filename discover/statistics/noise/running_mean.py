@@ -5,18 +5,25 @@ law lacks does.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.noise.whiteness import FEWEST_TESTED
-from discover.statistics.noise.whittle import cosine_power, whittle_likelihood
+from discover.statistics.noise.whittle import (
+    Spectra,
+    correlated,
+    cosine_power,
+    smooth,
+    spectra,
+    whittle_likelihood,
+)
 
 _WIDTHS = np.arange(2, 31)  # samples, of a running mean
 _FLOORS = np.geomspace(1e-4, 0.3, 6)  # of noise that comes after the filter, over that before it
 _CORRELATIONS = np.linspace(0.0, 0.95, 12)
 _SHARES = np.append(0.0, np.geomspace(1e-3, 1e5, 40))  # of the slow part, over the noise's variance
-_HALF_SWINGS = np.array([1.0, 2.0, 4.0, 8.0])  # of a smooth misfit along a run
 _CLEAR = 8.0
 """Gain in log likelihood over correlated noise with a smooth misfit from which on rows are said to
 be means. Of 750 sets of one to six rows that are none, misfits of four shapes in white and in
@@ -42,11 +49,9 @@ def averaged_over(rows: Sequence[Float[np.ndarray, " _"]]) -> int | None:
         return None
     means, misfit = 0.0, 0.0
     for row in long:
-        n = len(row)
         power = cosine_power(row)
-        angle = np.pi * np.arange(1, n) / n
-        means = means + whittle_likelihood(power, _means(angle))
-        each = whittle_likelihood(power, _correlated(angle))
+        means = means + whittle_likelihood(power, _means(len(row)))
+        each = whittle_likelihood(power, _correlated(len(row)))
         misfit = misfit + np.max(each, axis=-1)  # a smooth part of its own
     gain = np.max(means, axis=1) - np.max(misfit)
     widest = min(map(len, long)) / _SLOWEST
@@ -55,17 +60,17 @@ def averaged_over(rows: Sequence[Float[np.ndarray, " _"]]) -> int | None:
     return int(_WIDTHS[best]) if gain[best] > _CLEAR else None
 
 
-def _means(angle: Float[np.ndarray, " m"]) -> Float[np.ndarray, "widths floors m"]:
-    """Return spectra of white noise behind running means, with less of it beside them."""
-    width = _WIDTHS[:, None]
+@lru_cache(maxsize=8)
+def _means(n: int) -> Spectra:
+    """Return spectra of white noise behind running means with less beside, (widths, floors)."""
+    angle, width = np.pi * np.arange(1, n) / n, _WIDTHS[:, None]
     mean = (np.sin(0.5 * width * angle) / (width * np.sin(0.5 * angle))) ** 2
-    return mean[:, None] + _FLOORS[:, None]
+    return spectra(mean[:, None] + _FLOORS[:, None])
 
 
-def _correlated(angle: Float[np.ndarray, " m"]) -> Float[np.ndarray, "swings rho shares m"]:
-    """Return spectra of noise with one first-order correlation and a smooth misfit."""
-    rho = _CORRELATIONS[:, None]
-    noise = (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)
-    swings = np.arange(1, len(angle) + 1) / _HALF_SWINGS[:, None]
-    smooth = 1.0 / (1.0 + swings**4)
-    return noise[None, :, None] + _SHARES[:, None] * smooth[:, None, None]
+@lru_cache(maxsize=8)
+def _correlated(n: int) -> Spectra:
+    """Return spectra of correlated noise with smooth misfits, (swings, correlations, sizes)."""
+    k = np.arange(1, n)
+    noise = correlated(_CORRELATIONS, np.pi * k / n)
+    return spectra(noise[None, :, None] + _SHARES[:, None] * smooth(k)[:, None, None])

@@ -10,10 +10,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.statistics.noise.whiteness import FEWEST_TESTED
-from discover.statistics.noise.whittle import cosine_power, whittle_likelihood
+from discover.statistics.noise.whittle import cosine_power, smooth, spectra, whittle_likelihood
 
 _SHARES = np.append(0.0, np.geomspace(1e-3, 1e5, 60))  # of the slow part, over the noise's
-_HALF_SWINGS = np.array([1.0, 2.0, 4.0, 8.0])  # of a smooth misfit along a run
 _CLEAR = 2.0
 """Gain in log likelihood over a smooth misfit from which on a row is said to wander."""
 
@@ -48,14 +47,14 @@ def wandering(rows: Sequence[Float[np.ndarray, " _"]]) -> float | None:
 
 def _gain(rows: Sequence[np.ndarray]) -> tuple[float, float]:
     """Return how much likelier a walk is than a smooth misfit, and its share, in logarithms."""
-    walk, smooth = 0.0, 0.0
+    walk, slow = 0.0, 0.0
     for row in rows:
-        power, k = cosine_power(row), np.arange(1, len(row))
-        walk = walk + whittle_likelihood(power, 1.0 + _SHARES[:, None] * _walk(len(row)))
-        slow = 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
-        each = whittle_likelihood(power, 1.0 + _SHARES[:, None, None] * slow)
-        smooth = smooth + np.max(each, axis=0)
-    return float(np.max(walk) - np.max(smooth)), float(_SHARES[int(np.argmax(walk))])
+        power, n = cosine_power(row), len(row)
+        tried = spectra(1.0 + _SHARES[:, None] * _walk(n))
+        walk = walk + whittle_likelihood(power, tried)
+        tried = spectra(1.0 + _SHARES[:, None, None] * smooth(np.arange(1, n)))
+        slow = slow + np.max(whittle_likelihood(power, tried), axis=0)
+    return float(np.max(walk) - np.max(slow)), float(_SHARES[int(np.argmax(walk))])
 
 
 def _walk(n: int) -> np.ndarray:
