@@ -7,7 +7,7 @@ held against what was found by the criterion of the search.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -66,9 +66,10 @@ def free_forms(
     """Return the free functions that explain what a search left, the most probable first.
 
     Each is fitted beside the declared model, beside every stage of what was found, and beside every
-    effect that was tried alone, for what was found may stand for the function. One step of each
-    says which are fitted to the end. Kept are those with strong evidence over what was found
-    (`INDISTINGUISHABLE`) that are within reach of the best.
+    effect that was tried alone, for what was found may stand for the function. All are fitted to
+    the end with few knots, since an effect that stood for the function itself is far from where it
+    ends beside it; the best again with more. Kept are those with strong evidence over what was
+    found (`INDISTINGUISHABLE`) that are within reach of the best.
 
     Parameters
     ----------
@@ -89,21 +90,21 @@ def free_forms(
     for one in search.seen:
         if len(one.effects) == 1 and not search.refused & set(one.effects):
             starts.setdefault(one.effects, one.theta(search.model))
-    screened = [
+    few, more = KNOTS
+    trials = [
         trial
         for effects, theta in starts.items()
         for slot in _SLOTS
-        if (trial := _fitted(search, runs, slot, effects, theta, KNOTS[0], steps=1)) is not None
-    ]
-    screened.sort(key=lambda trial: trial.cost(weight))
-    trials = [
-        trial
-        for one in screened[:_REFITTED]
-        for knots in KNOTS
-        if (trial := _fitted(search, runs, one.slot, one.effects, one.theta, knots)) is not None
+        if (trial := _fitted(search, runs, slot, effects, theta, few)) is not None
     ]
     if not trials:
         return ()
+    trials = sorted(trials, key=lambda trial: trial.cost(weight))[:_REFITTED]
+    trials += [
+        trial
+        for one in trials
+        if (trial := _fitted(search, runs, one.slot, one.effects, one.theta, more)) is not None
+    ]
     best = min(trials, key=lambda trial: trial.cost(weight))
     effective = summarise(best.residual, weight).effective_samples
     choices = search.n_candidates + len(_SLOTS)
@@ -119,7 +120,11 @@ def free_forms(
     for gain, trial in ranked:
         if gain >= least and trial.slot not in [one.slot for one in out]:
             held = _held_out_error(search, trial, held_batch, held_runs)
-            out.append(_free_form_of(search, runs, trial, gain, held))
+            with_more_knots = max(
+                (t for t in trials if (t.slot, t.effects) == (trial.slot, trial.effects)),
+                key=lambda t: len(t.coefficients),
+            )
+            out.append(_free_form_of(search, runs, trial, with_more_knots, gain, held))
     return tuple(out)
 
 
@@ -149,7 +154,7 @@ def _columns(
 
 
 def _fitted(
-    search: Search, runs, slot: Slot, effects, start: np.ndarray, knots: int, steps: int = _STEPS
+    search: Search, runs, slot: Slot, effects, start: np.ndarray, knots: int
 ) -> _Trial | None:
     """Return a free function beside some effects, fitted with them; None where that fails."""
     model, batch = search.model, search.batch
@@ -177,7 +182,7 @@ def _fitted(
         return (splines, coefficients), residual + columns @ coefficients, columns
 
     best, left, columns = completed(residual)
-    for _ in range(steps):
+    for _ in range(_STEPS):
         if not free:
             break
         slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
@@ -208,26 +213,41 @@ def _fitted(
     return _Trial(slot, tuple(effects), theta, free, *best, left, design)
 
 
-def _free_form_of(search: Search, runs, trial: _Trial, gain: float, held: float | None) -> FreeForm:
-    """Return a free function as the result holds it."""
-    batch, tolerated = search.batch, search.tolerated
-    seen = np.asarray(batch.weight) > 0
-    covariance, _ = covariance_and_noise(batch, trial.residual, trial.design)
-    own = covariance[len(trial.free) :, len(trial.free) :]
-    predicted = np.where(seen, search.model.predict(trial.theta, batch), 0.0)
-    span = _variable(trial.slot, runs, batch, predicted)[seen]
+def _free_form_of(
+    search: Search, runs, trial: _Trial, with_more_knots: _Trial, gain: float, held: float | None
+) -> FreeForm:
+    """Return a free function as the result holds it.
+
+    The knots that evidence chooses may be too few to bend as the function does, by less than the
+    noise shows but by more than their own band. So the band holds that of more knots too
+    [undersmoothing: Hall 1992, Ann. Stat. 20, 675].
+    """
+    seen = np.asarray(search.batch.weight) > 0
+    predicted = np.where(seen, search.model.predict(trial.theta, search.batch), 0.0)
+    span = _variable(trial.slot, runs, search.batch, predicted)[seen]
     grid = np.linspace(float(np.min(span)), float(np.max(span)), _DRAWN)
-    basis = trial.splines.transform(grid.reshape(-1, 1))
+    found, wider = (_drawn(search, one, grid, gain, held) for one in (trial, with_more_knots))
+    return replace(
+        found,
+        low95=np.minimum(found.low95, wider.low95),
+        high95=np.maximum(found.high95, wider.high95),
+    )
+
+
+def _drawn(
+    search: Search, trial: _Trial, grid: np.ndarray, gain: float, held: float | None
+) -> FreeForm:
+    covariance, _ = covariance_and_noise(search.batch, trial.residual, trial.design)
     return drawn_form(
         trial.slot,
         _SLOTS[trial.slot],
         trial.effects,
         grid,
-        basis,
+        trial.splines.transform(grid.reshape(-1, 1)),
         trial.coefficients,
-        own,
+        covariance[len(trial.free) :, len(trial.free) :],
         gain,
-        tolerated.left(trial.residual).verdict != "unexplained",
+        search.tolerated.left(trial.residual).verdict != "unexplained",
         ErrorPair(error_of(trial.residual), held),
     )
 

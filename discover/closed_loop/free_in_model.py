@@ -44,6 +44,9 @@ _HARDLY = 4.0
 
 _HALVINGS, _DRAWN = 12, 60
 
+_BESIDE = 6
+"""Effects of the fluid that did best alone, beside each of which a curve is fitted."""
+
 
 @dataclass(frozen=True)
 class _Curve:
@@ -76,8 +79,10 @@ def free_functions_in_model(
     """Return the free functions of fluid and slip that explain what a search left.
 
     Each is fitted beside the declared model, beside the effects of the instrument that were found,
-    and beside all that was found. Kept are those with strong evidence over what was found
-    (`INDISTINGUISHABLE`), one of each variable, the most probable first.
+    beside these and each of the fluid's effects that did best alone (`_BESIDE`), since what was
+    found together may stand for the function, and beside all that was found. Kept are those with
+    strong evidence over what was found (`INDISTINGUISHABLE`), one of each variable, the most
+    probable first.
 
     Parameters
     ----------
@@ -91,15 +96,18 @@ def free_functions_in_model(
     if not all_at_a_rate_in_shear(runs) or search.degrees:
         return ()
     curves = _curves(search, runs)
-    found = [e for e in search.model.effects if e.name in search.active]
-    effects = [*found, *(curve.effect for curve in curves)]
-    model = AugmentedModel(search.model.declared, effects, data_scales(runs))
-    of_instrument = tuple(e.name for e in found if not isinstance(e, ConstitutiveEffect))
-    sets = dict.fromkeys([(), of_instrument, tuple(search.active)])
-    trials = [(curve, beside) for beside in sets for curve in curves]
+    beside = _sets(search)
+    names = {name for one in beside for name in one}
+    effects = [e for e in search.model.effects if e.name in names]
+    model = AugmentedModel(
+        search.model.declared, [*effects, *(curve.effect for curve in curves)], data_scales(runs)
+    )
+    trials = [(curve, one) for one in beside for curve in curves]
     if not trials:
         return ()
-    starts, free = zip(*(_start(search, model, *trial) for trial in trials), strict=True)
+    starts, free = zip(
+        *(_start(search, model, curve, one, beside[one]) for curve, one in trials), strict=True
+    )
     fits = fit_batch(model, search.batch, starts, free)
     usable = [(fit, *trial) for fit, trial in zip(fits, trials, strict=True) if fit.usable]
     if not usable:
@@ -124,6 +132,24 @@ def free_functions_in_model(
     return tuple(kept.values())
 
 
+def _sets(search: Search) -> dict[tuple[str, ...], np.ndarray]:
+    """Return the sets of effects beside which a curve is fitted, each with parameters to begin."""
+    fluids = {e.name for e in search.model.effects if isinstance(e, ConstitutiveEffect)}
+    found = search.path[len(search.active)]
+    of_instrument = tuple(name for name in search.active if name not in fluids)
+    sets = {(): search.path[0], of_instrument: found if of_instrument else search.path[0]}
+    alone = [
+        one for one in search.seen
+        if len(one.effects) == 1 and set(one.effects) <= fluids - set(search.refused)
+    ]  # fmt: skip
+    for one in sorted(alone, key=lambda one: one.cost)[:_BESIDE]:
+        theta = one.theta(search.model)
+        for name in of_instrument:
+            theta[search.model.slices[name]] = found[search.model.slices[name]]
+        sets[(*one.effects, *of_instrument)] = theta
+    return sets | {tuple(search.active): found}
+
+
 def _curves(search: Search, runs: Sequence[Run]) -> list[_Curve]:
     """Return the functions that the runs can tell of."""
     slowest = float(np.max(search.model.declared.relaxation_time))
@@ -143,11 +169,14 @@ def _curves(search: Search, runs: Sequence[Run]) -> list[_Curve]:
 
 
 def _start(
-    search: Search, model: AugmentedModel, curve: _Curve, beside: Sequence[str]
+    search: Search,
+    model: AugmentedModel,
+    curve: _Curve,
+    beside: Sequence[str],
+    known: np.ndarray,
 ) -> tuple[np.ndarray, list[int]]:
     """Return the parameters from which a curve is fitted beside some effects, and the free ones."""
     theta = model.zero()
-    known = search.path[len(search.active)] if beside else search.path[0]
     # what is declared stands first, in both models
     own = min(at.start for at in search.model.slices.values())
     theta[:own] = known[:own]

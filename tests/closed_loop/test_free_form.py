@@ -31,7 +31,7 @@ EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_gain", "stress_drift", "tr
 FEW = ["giesekus_mobility", "stress_drift"]
 
 
-def loop_with(folder, flaw, effects=EFFECTS):
+def loop_with(folder, flaw, effects: Any = EFFECTS, max_effects=1):
     """Return the loop on Giesekus records to which a flaw of the instrument was done."""
     generator, runs = np.random.default_rng(0), {}
     law = Giesekus(0.3, MODULUS, TIME)
@@ -42,8 +42,9 @@ def loop_with(folder, flaw, effects=EFFECTS):
         runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
     data = dc.load_dataset(write_folder(folder, runs))
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
+    named = {} if effects is None else {"effects": effects}
     return dc.close_loop(
-        data, base, held_out=["judge.csv"], effects=effects, max_effects=1, explanations=1
+        data, base, held_out=["judge.csv"], max_effects=max_effects, explanations=1, **named
     )
 
 
@@ -62,6 +63,7 @@ def test_a_saturated_transducer_is_found_as_a_function_of_the_stress(saturated):
     assert found.nearest == "tanh"
     true = LIMIT * np.tanh(found.grid / LIMIT) - found.grid
     # within 2 % of the limit where most samples are; the ends hang on few
+    assert np.mean((found.low95 <= true) & (true <= found.high95)) > 0.85
     middle = np.abs(found.grid) < 0.8 * np.max(np.abs(found.grid))
     assert np.max(np.abs(found.value - true)[middle]) < 0.02 * LIMIT
     assert found.error.fit < 1.2 * NOISE
@@ -81,9 +83,10 @@ def test_a_hum_is_found_as_a_function_of_time(tmp_path):
     found = loop.free_form[0]
     assert (found.slot, found.nearest) == ("drift", "periodic")
     assert found.explains
-    # 3 Pa, within three times the half-width of the band
-    off = np.abs(found.value - 3.0 * np.sin(0.9 * found.grid))
-    assert np.mean(off < 3.0 * (found.high95 - found.low95) / 2.0) > 0.95
+    # six draws: the band holds 92 to 100 % of the curve, that of the few knots alone 67 to 92 %
+    true = 3.0 * np.sin(0.9 * found.grid)
+    assert np.mean((found.low95 <= true) & (true <= found.high95)) > 0.9
+    assert np.median(found.high95 - found.low95) < 0.9  # of 6 Pa
     said = loop_verdict(loop)[0]
     assert "a function of the time alone" in said
     assert "periodic" in said
@@ -94,6 +97,18 @@ def test_no_curve_is_found_in_a_sound_record(tmp_path):
     loop = loop_with(tmp_path, lambda run: run.stress, FEW)
     assert loop.verdict == "effects_added"
     assert loop.free_form == ()
+
+
+@pytest.mark.slow
+def test_the_law_beside_a_curve_is_found_among_all_candidates(tmp_path):
+    """Three wrong names come first; beside the right one alone the curve leaves far less."""
+    loop = loop_with(
+        tmp_path, lambda run: LIMIT * np.tanh(run.stress / LIMIT), max_effects=3, effects=None
+    )
+    assert len(loop.stages) > 1
+    found = loop.free_form[0]
+    assert (found.slot, found.beside) == ("recorded_stress", ("giesekus_mobility",))
+    assert found.error.held_out < 1.5 * NOISE < loop.error_after.held_out
 
 
 @pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none

@@ -15,6 +15,8 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.closed_loop import free_in_model
+from discover.closed_loop.search.seen_sets import SeenSet, SeenSets
+from discover.effects import make_effect
 from discover.effects.free_function import FREE_RELAXATIONS, INTERVALS, ONSET, spline_basis
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.report.loop.verdict import loop_verdict
@@ -156,3 +158,32 @@ def test_the_spline_is_zero_at_rest_and_follows_any_smooth_function(largest):
         met = basis @ np.linalg.lstsq(basis, wanted, rcond=None)[0]
         # the root has no slope at zero that a spline could follow
         assert np.sqrt(np.mean((met - wanted) ** 2)) < 0.03 * np.max(wanted)
+
+
+@pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
+def test_a_curve_is_tried_beside_what_did_best_alone_and_the_instrument_that_was_found():
+    """What was found together may stand for the curve and hide the law beside it."""
+    declared = DeclaredModel.maxwell(MODULUS, TIME)
+    fluids = ["giesekus_mobility", "ptt_linear", "ptt_exponential", "solvent_viscosity"]
+    model = AugmentedModel(declared, [make_effect(n) for n in [*fluids, "transducer_lag"]])
+    found, alone = model.zero(), []
+    found[model.slices["transducer_lag"]] = 0.02
+    for rank, name in enumerate(["transducer_lag", *fluids]):
+        theta = model.zero()
+        theta[model.slices[name]] = 0.1 * (rank + 1)
+        free = tuple(model.positions(name))
+        values = tuple(theta[list(free)])
+        alone.append(SeenSet((name,), free, values, cost=float(rank)))
+    search: Any = SimpleNamespace(
+        model=model, active=["ptt_linear", "transducer_lag"], refused={"ptt_exponential"},
+        seen=SeenSets(alone), path=[model.zero(), model.zero(), found],
+    )  # fmt: skip
+    sets = free_in_model._sets(search)
+    lag = "transducer_lag"
+    assert list(sets) == [
+        (), (lag,), ("giesekus_mobility", lag), ("ptt_linear", lag), ("solvent_viscosity", lag),
+    ]  # fmt: skip
+    beside = sets["giesekus_mobility", lag]
+    assert beside[model.slices["giesekus_mobility"]] == pytest.approx(0.2)
+    assert beside[model.slices[lag]] == pytest.approx(0.02)
+    np.testing.assert_array_equal(sets["ptt_linear", lag], found)
