@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 from independent import WhiteMetzner
-from independent.flow import oscillation, start_up
+from independent.flow import Flow, oscillation, start_up
 from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument, Recording
@@ -39,8 +39,25 @@ SOUND, GIESEKUS = Instrument(), Giesekus(0.3, **SCALE)
 LIMIT, SLIP = 60.0, 0.4 / MODULUS**3
 
 
-def _as_it_is(run: Recording) -> np.ndarray:
+def _as_it_is(run: Recording, flow: Flow) -> np.ndarray:
+    del flow
     return run.stress
+
+
+def _on_bearing(run: Recording, flow: Flow) -> np.ndarray:
+    return run.stress + _of_bearing(flow.strain(run.time))
+
+
+def _of_bearing(strain: np.ndarray) -> np.ndarray:
+    return 3.0 * np.sin(2.0 * np.pi * strain / 9.0)
+
+
+def _wobbling(run: Recording, flow: Flow) -> np.ndarray:
+    return run.stress * (1.0 + _of_wobble(flow.strain(run.time)))
+
+
+def _of_wobble(strain: np.ndarray) -> np.ndarray:
+    return 0.1 * np.sin(2.0 * np.pi * strain / 20.0)
 
 
 @dataclass(frozen=True)
@@ -56,7 +73,7 @@ class Flaw:
     material, instrument
         What was measured, and on what.
     read
-        What the transducer makes of a run's stress.
+        What the transducer makes of the stress of a run in a flow.
     """
 
     title: str
@@ -64,7 +81,7 @@ class Flaw:
     true: Callable[[np.ndarray], np.ndarray]
     material: Material = GIESEKUS
     instrument: Instrument = SOUND
-    read: Callable[[Recording], np.ndarray] = _as_it_is
+    read: Callable[[Recording, Flow], np.ndarray] = _as_it_is
 
 
 FLAWS = {
@@ -72,7 +89,7 @@ FLAWS = {
         "a transducer that saturates at 60 Pa",
         ("stress (Pa)", "recorded − true (Pa)"),
         lambda stress: LIMIT * np.tanh(stress / LIMIT) - stress,
-        read=lambda run: LIMIT * np.tanh(run.stress / LIMIT),
+        read=lambda run, _: LIMIT * np.tanh(run.stress / LIMIT),
     ),
     "slips": Flaw(
         "slip with the third power of the stress",
@@ -90,7 +107,19 @@ FLAWS = {
         "a hum of 3 Pa",
         ("time (s)", "recorded − true (Pa)"),
         lambda time: 3.0 * np.sin(0.9 * time),
-        read=lambda run: run.stress + 3.0 * np.sin(0.9 * run.time),
+        read=lambda run, _: run.stress + 3.0 * np.sin(0.9 * run.time),
+    ),
+    "bears": Flaw(
+        "a bearing's torque, by where it stands",
+        ("strain", "recorded − true (Pa)"),
+        _of_bearing,
+        read=_on_bearing,
+    ),
+    "wobbles": Flaw(
+        "a cone that wobbles by 10 %",
+        ("strain", "relative change of the stress"),
+        _of_wobble,
+        read=_wobbling,
     ),
 }
 
@@ -100,7 +129,7 @@ def loop_on(flaw: Flaw, seed: int) -> LoopResult:
     generator, runs = np.random.default_rng(seed), {}
     for name, (flow, end) in FLOWS.items():
         run = flaw.instrument.record(flaw.material, flow, np.linspace(0.02, end, 120))
-        stress = flaw.read(run)
+        stress = flaw.read(run, flow)
         size = NOISE * np.sqrt(np.mean(stress**2))
         runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
     with tempfile.TemporaryDirectory() as folder:

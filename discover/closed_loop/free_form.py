@@ -2,18 +2,18 @@
 
 Where named effects leave structure, what is missing may be a function that nobody wrote down: of
 the recorded stress (a transducer that saturates), of the time (a drift), of the rate (friction of
-the tool), of the strain (a sample that is lost). It is a cubic spline of few degrees of freedom,
-held against what was found by the criterion of the search.
+the tool), of the strain (a sample that is lost), of where the tool stands (a bearing, a cone that
+wobbles) or in its cycle. It is a cubic spline of few degrees of freedom, held against what was
+found by the criterion of the search.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float
 from sklearn.preprocessing import SplineTransformer
 
-from discover.closed_loop.judging.before_after import strain_of
+from discover.closed_loop.free_variables import PLACES, Variables, columns, spline
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, drawn_form, error_of
 from discover.closed_loop.runs import all_at_a_rate_in_shear
@@ -27,12 +27,6 @@ from discover.statistics.residual import judged_cost, summarise
 KNOTS = (6, 14)
 """Of the spline, which then has two degrees of freedom more; evidence chooses."""
 
-_SLOTS: dict[Slot, tuple[str, str]] = {
-    "recorded_stress": ("stress", "Pa"),
-    "drift": ("instrument_time", "s"),
-    "rate": ("rate", "1/s"),
-    "network": ("strain", ""),
-}
 _STEPS, _HALVINGS, _SETTLED = 12, 4, 1e-4
 _DAMPING = 1e-8
 _DRAWN = 60
@@ -91,11 +85,12 @@ def free_forms(
         if len(one.effects) == 1 and not search.refused & set(one.effects):
             starts.setdefault(one.effects, one.theta(search.model))
     few, more = KNOTS
+    variables = Variables(runs, weight.shape[1])
     trials = [
         trial
         for effects, theta in starts.items()
-        for slot in _SLOTS
-        if (trial := _fitted(search, runs, slot, effects, theta, few)) is not None
+        for slot in variables.slots
+        if (trial := _fitted(search, variables, slot, effects, theta, few)) is not None
     ]
     if not trials:
         return ()
@@ -103,11 +98,11 @@ def free_forms(
     trials += [
         trial
         for one in trials
-        if (trial := _fitted(search, runs, one.slot, one.effects, one.theta, more)) is not None
+        if (trial := _fitted(search, variables, one.slot, one.effects, one.theta, more)) is not None
     ]
     best = min(trials, key=lambda trial: trial.cost(weight))
     effective = summarise(best.residual, weight).effective_samples
-    choices = search.n_candidates + len(_SLOTS)
+    choices = search.n_candidates + len(PLACES)
     own = judged_cost(search.fit.residual, weight)
     before = criterion(own, len(search.fit.free), len(search.active), effective, choices)
     gains = [
@@ -124,37 +119,12 @@ def free_forms(
                 (t for t in trials if (t.slot, t.effects) == (trial.slot, trial.effects)),
                 key=lambda t: len(t.coefficients),
             )
-            out.append(_free_form_of(search, runs, trial, with_more_knots, gain, held))
+            out.append(_free_form_of(search, variables, trial, with_more_knots, gain, held))
     return tuple(out)
 
 
-def _variable(
-    slot: Slot, runs: Sequence[Run], batch: Batch, predicted: np.ndarray
-) -> Float[np.ndarray, "runs n"]:
-    """Return of what the function is one, at every sample."""
-    if slot == "recorded_stress":
-        return predicted
-    out = np.zeros_like(predicted)
-    for row, run in zip(out, runs, strict=True):
-        of_run = {
-            "drift": run.time / run.clock_factor,
-            "rate": run.rate,
-            "network": np.abs(strain_of(run)),
-        }[slot]
-        row[: len(run)] = of_run
-    return out
-
-
-def _columns(
-    slot: Slot, splines: SplineTransformer, variable: np.ndarray, predicted: np.ndarray
-) -> Float[np.ndarray, "runs n m"]:
-    """Return what the coefficients of the spline change in the record."""
-    basis = splines.transform(variable.reshape(-1, 1)).reshape(*variable.shape, -1)
-    return basis * predicted[..., None] if slot == "network" else basis
-
-
 def _fitted(
-    search: Search, runs, slot: Slot, effects, start: np.ndarray, knots: int
+    search: Search, variables: Variables, slot: Slot, effects, start: np.ndarray, knots: int
 ) -> _Trial | None:
     """Return a free function beside some effects, fitted with them; None where that fails."""
     model, batch = search.model, search.batch
@@ -167,28 +137,27 @@ def _fitted(
     if not np.all(np.isfinite(residual)):
         return None
     # of a few rates any function is one, and says nothing between them
-    values = _variable(slot, runs, batch, recorded)[seen]
-    if np.unique(values).size < _VALUES * (knots + 2):
+    values = variables.at(slot, recorded)[seen]
+    if np.unique(values[np.isfinite(values)]).size < _VALUES * (knots + 2):
         return None
 
     def completed(residual):
         """Return the best spline at a law, what is then left, and what it changes."""
         predicted = np.where(seen, residual / scale + recorded, 0.0)
-        variable = _variable(slot, runs, batch, predicted)
-        splines = SplineTransformer(knots, extrapolation="linear")
-        splines.fit(variable[seen].reshape(-1, 1))
-        columns = _columns(slot, splines, variable, predicted) * weight[..., None]
-        coefficients = gauss_newton_step(columns[seen].T, residual[seen], _DAMPING)
-        return (splines, coefficients), residual + columns @ coefficients, columns
+        values = variables.at(slot, predicted)
+        splines = spline(slot, knots, values[seen])
+        changed = columns(slot, splines, values, predicted) * weight[..., None]
+        coefficients = gauss_newton_step(changed[seen].T, residual[seen], _DAMPING)
+        return (splines, coefficients), residual + changed @ coefficients, changed
 
-    best, left, columns = completed(residual)
+    best, left, changed = completed(residual)
     for _ in range(_STEPS):
         if not free:
             break
         slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
         if not np.all(np.isfinite(slopes)):
             return None
-        rows = np.concatenate([slopes, np.moveaxis(columns, -1, 0)])
+        rows = np.concatenate([slopes, np.moveaxis(changed, -1, 0)])
         step = gauss_newton_step(rows, left, _DAMPING)[: len(free)]
         before = float(np.sum(left**2))
         for halving in range(_HALVINGS):
@@ -200,21 +169,26 @@ def _fitted(
                 continue
             found = completed(tried)
             if np.sum(found[1] ** 2) < before:
-                theta, residual, (best, left, columns) = trial, tried, found
+                theta, residual, (best, left, changed) = trial, tried, found
                 break
         else:
             break
         if 1.0 - float(np.sum(left**2)) / before < _SETTLED:
             break
     slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
-    design = np.concatenate([slopes, np.moveaxis(columns, -1, 0)])
+    design = np.concatenate([slopes, np.moveaxis(changed, -1, 0)])
     if not np.all(np.isfinite(design)):
         return None
     return _Trial(slot, tuple(effects), theta, free, *best, left, design)
 
 
 def _free_form_of(
-    search: Search, runs, trial: _Trial, with_more_knots: _Trial, gain: float, held: float | None
+    search: Search,
+    variables: Variables,
+    trial: _Trial,
+    with_more_knots: _Trial,
+    gain: float,
+    held: float | None,
 ) -> FreeForm:
     """Return a free function as the result holds it.
 
@@ -224,8 +198,8 @@ def _free_form_of(
     """
     seen = np.asarray(search.batch.weight) > 0
     predicted = np.where(seen, search.model.predict(trial.theta, search.batch), 0.0)
-    span = _variable(trial.slot, runs, search.batch, predicted)[seen]
-    grid = np.linspace(float(np.min(span)), float(np.max(span)), _DRAWN)
+    span = variables.at(trial.slot, predicted)[seen]
+    grid = np.linspace(float(np.nanmin(span)), float(np.nanmax(span)), _DRAWN)
     found, wider = (_drawn(search, one, grid, gain, held) for one in (trial, with_more_knots))
     return replace(
         found,
@@ -240,7 +214,7 @@ def _drawn(
     covariance, _ = covariance_and_noise(search.batch, trial.residual, trial.design)
     return drawn_form(
         trial.slot,
-        _SLOTS[trial.slot],
+        (PLACES[trial.slot].variable, PLACES[trial.slot].unit),
         trial.effects,
         grid,
         trial.splines.transform(grid.reshape(-1, 1)),
@@ -262,6 +236,6 @@ def _held_out_error(search: Search, trial: _Trial, batch: Batch | None, runs) ->
         return np.inf  # the law beside the curve runs away
     seen = weight > 0
     predicted = np.where(seen, residual / np.where(seen, weight, 1.0) + recorded, 0.0)
-    variable = _variable(trial.slot, runs, batch, predicted)
-    columns = _columns(trial.slot, trial.splines, variable, predicted) * weight[..., None]
-    return error_of(residual + columns @ trial.coefficients)
+    values = Variables(runs, weight.shape[1]).at(trial.slot, predicted)
+    changed = columns(trial.slot, trial.splines, values, predicted) * weight[..., None]
+    return error_of(residual + changed @ trial.coefficients)

@@ -8,6 +8,9 @@ _WHAT = {
     "drift": "a function of the time alone",
     "rate": "a function of the shear rate alone",
     "network": "a factor that depends on the strain alone",
+    "position": "a function of the tool's position alone",
+    "gap": "a factor that depends on the tool's position alone",
+    "phase": "a function of the phase of the cycle alone",
     "relaxation": "a rate of relaxation that depends on the {variable} alone",
     "slip": "a rate of slip that depends on the {variable} alone",
 }

@@ -10,6 +10,7 @@ from independent.flow import oscillation, start_up
 from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
+from scipy.integrate import cumulative_simpson
 
 import discover as dc
 from discover.closed_loop import free_form
@@ -91,6 +92,42 @@ def test_a_hum_is_found_as_a_function_of_time(tmp_path):
     assert "a function of the time alone" in said
     assert "periodic" in said
     assert loop.to_json()["free_form"][0]["nearest"] == "periodic"
+
+
+def test_a_torque_that_depends_on_where_the_tool_stands_is_found_as_that_function(tmp_path):
+    def of_bearing(strain):
+        return 3.0 * np.sin(2.0 * np.pi * strain / 9.0)
+
+    def recorded(run):
+        # on these samples Simpson's rule is off by less than 1e-3
+        strain = run.rate[0] * run.time[0] + cumulative_simpson(run.rate, x=run.time, initial=0.0)
+        return run.stress + of_bearing(strain)
+
+    loop = loop_with(tmp_path, recorded, FEW)
+    found = loop.free_form[0]
+    assert (found.slot, found.beside, found.nearest) == (
+        "position", ("giesekus_mobility",), "periodic",
+    )  # fmt: skip
+    true = of_bearing(found.grid)
+    assert np.mean((found.low95 <= true) & (true <= found.high95)) > 0.85
+    assert "a function of the tool's position alone" in loop_verdict(loop)[0]
+
+
+@pytest.mark.slow
+def test_a_torque_that_repeats_with_the_cycle_is_found_as_a_function_of_its_phase(tmp_path):
+    def recorded(run):
+        if np.ptp(run.rate) == 0.0:
+            return run.stress
+        # γ̇ = a cos ωt: where it is zero for the first time ωt is a quarter of a turn
+        until = np.argmax(run.rate < 0.0) + 1
+        turn = np.interp(0.0, -run.rate[:until], run.time[:until])
+        return run.stress + 3.0 * np.sin(np.pi * run.time / turn)
+
+    loop = loop_with(tmp_path, recorded, FEW)
+    found = loop.free_form[0]
+    assert (found.slot, found.beside) == ("phase", ("giesekus_mobility",))
+    true = 3.0 * np.sin(2.0 * found.grid)
+    assert np.mean((found.low95 <= true) & (true <= found.high95)) > 0.85
 
 
 def test_no_curve_is_found_in_a_sound_record(tmp_path):

@@ -12,7 +12,9 @@ from scipy.optimize import OptimizeWarning, curve_fit
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.statistics import HALF_BAND
 
-Slot = Literal["recorded_stress", "drift", "network", "rate", "relaxation", "slip"]
+Slot = Literal[
+    "recorded_stress", "drift", "network", "rate", "position", "gap", "phase", "relaxation", "slip"
+]
 
 _WITHIN = 2.0
 """A closed form is the nearest one if it stays within so many standard deviations of the curve in
@@ -28,15 +30,17 @@ class FreeForm:
     ----------
     slot
         Where it acts: ``recorded_stress``, σ + f(σ) is recorded; ``drift``, σ + f(t); ``rate``,
-        σ + f(γ̇); ``network``, σ (1 + f(γ)); ``relaxation``, each mode relaxes 1 + f times as fast,
-        with f of its dimensionless stress or rate; ``slip``, γ̇ − f(σ) is felt.
+        σ + f(γ̇); ``network``, σ (1 + f(|γ|)); ``position``, σ + f(γ); ``gap``, σ (1 + f(γ));
+        ``phase``, σ + f(φ) in what oscillates, φ = 0 where the rate is largest; ``relaxation``,
+        each mode relaxes 1 + f times as fast, with f of its dimensionless stress or rate;
+        ``slip``, γ̇ − f(σ) is felt.
     variable, unit
         Of what it is a function, and its unit.
     beside
         Effects in the model with it.
     grid, value, low95, high95
-        The curve with its 95 % band, shape (n,): in Pa (``network``, ``relaxation``: a pure number;
-        ``slip``: in 1/s).
+        The curve with its 95 % band, shape (n,): in Pa (``network``, ``gap``, ``relaxation``: a
+        pure number; ``slip``: in 1/s).
     nearest
         Name of a closed form that is it within its uncertainty; None if none is.
     evidence

@@ -9,6 +9,9 @@ _AXES = {
     "drift": ("time on the instrument's clock (s)", "recorded less true stress (Pa)"),
     "rate": ("shear rate (1/s)", "recorded less true stress (Pa)"),
     "network": ("strain", "relative change of the stress"),
+    "position": ("strain, as the tool stands", "recorded less true stress (Pa)"),
+    "gap": ("strain, as the tool stands", "relative change of the stress"),
+    "phase": ("phase of the cycle, from the largest rate (rad)", "recorded less true stress (Pa)"),
     "relaxation": ("{variable}, dimensionless", "relative change of the rate of relaxation"),
     "slip": ("stress (Pa)", "rate taken by slip (1/s)"),
 }
