@@ -21,6 +21,7 @@ from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument, Recording
 from independent.material import Material
+from independent.thixotropic import Thixotropic
 
 import discover as dc
 from discover.closed_loop import LoopResult
@@ -36,7 +37,7 @@ FLOWS = {
     "judge.csv": (oscillation(3.0, 0.8), 10.0),
 }
 SOUND, GIESEKUS = Instrument(), Giesekus(0.3, **SCALE)
-LIMIT, SLIP = 60.0, 0.4 / MODULUS**3
+LIMIT, SLIP, BREAKDOWN = 60.0, 0.4 / MODULUS**3, 0.03
 
 
 def _as_it_is(run: Recording, flow: Flow) -> np.ndarray:
@@ -102,6 +103,12 @@ FLAWS = {
         ("λγ̇", "added rate of relaxation"),
         np.sqrt,
         material=WhiteMetzner(0.5, 1.0, **SCALE),
+    ),
+    "breaks": Flaw(
+        "a structure that the square of the rate breaks",
+        ("shear rate (1/s)", "breakdown (1/s)"),
+        lambda rate: BREAKDOWN * rate**2,
+        material=Thixotropic(GIESEKUS, BREAKDOWN, 5.0, rate_power=2.0),
     ),
     "hums": Flaw(
         "a hum of 3 Pa",

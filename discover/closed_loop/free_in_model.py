@@ -1,9 +1,10 @@
-"""Fit a free function inside the model: how fast the fluid relaxes, or how fast it slips.
+"""Fit a free function inside the model: how fast the fluid relaxes, slips, or loses a structure.
 
 Where named effects leave structure, what is missing may be a rate of relaxation that depends on the
-stress or on the rate of deformation, or slip that depends on the stress, as no candidate does. It
-is a spline that acts in every step of the integration (`discover.effects.free_function`), fitted
-together with the constants of a law and held against what was found by the criterion of the search.
+stress or on the rate of deformation, slip that depends on the stress, or the breakdown of a
+structure that depends on the rate, as no candidate does. It is a spline that acts in every step of
+the integration (`discover.effects.free_function`), fitted together with the constants of a law and
+held against what was found by the criterion of the search.
 """
 
 from collections.abc import Sequence
@@ -20,10 +21,12 @@ from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.effects.free_function import (
+    FREE_BREAKDOWN,
     FREE_RELAXATIONS,
     FREE_SLIP,
     INTERVALS,
     ONSET,
+    FreeBreakdown,
     FreeRelaxation,
     FreeSlip,
     spline_basis,
@@ -44,7 +47,10 @@ _HARDLY = 4.0
 
 _HALVINGS, _DRAWN = 12, 60
 
-_BESIDE = 6
+_BROKEN = 0.02
+"""Breakdown of a structure per strain, to begin with."""
+
+_BESIDE = 4
 """Effects of the fluid that did best alone, beside each of which a curve is fitted."""
 
 
@@ -52,16 +58,22 @@ _BESIDE = 6
 class _Curve:
     """A free function, the largest value of its variable, and the value at which it sets in."""
 
-    effect: FreeRelaxation | FreeSlip
+    effect: FreeRelaxation | FreeSlip | FreeBreakdown
     largest: float
 
     @property
     def slot(self) -> Slot:
-        return "slip" if isinstance(self.effect, FreeSlip) else "relaxation"
+        if isinstance(self.effect, FreeRelaxation):
+            return "relaxation"
+        return "slip" if isinstance(self.effect, FreeSlip) else "breakdown"
+
+    @property
+    def unit(self) -> str:
+        return {"relaxation": "", "slip": "Pa", "breakdown": "1/s"}[self.slot]
 
     @property
     def onset(self) -> float:
-        return ONSET * self.largest if self.slot == "slip" else ONSET
+        return ONSET if self.slot == "relaxation" else ONSET * self.largest
 
     def place(self, x: float) -> float:
         """Return where a value lies among the knots, from 0 to their number."""
@@ -78,11 +90,11 @@ def free_functions_in_model(
 ) -> tuple[FreeForm, ...]:
     """Return the free functions of fluid and slip that explain what a search left.
 
-    Each is fitted beside the declared model, beside the effects of the instrument that were found,
-    beside these and each of the fluid's effects that did best alone (`_BESIDE`), since what was
-    found together may stand for the function, and beside all that was found. Kept are those with
-    strong evidence over what was found (`INDISTINGUISHABLE`), one of each variable, the most
-    probable first.
+    Each is fitted beside the declared model and beside the effects of the instrument that were
+    found; beside these with each of the fluid's effects that did best alone (`_BESIDE`), since what
+    was found together may stand for the function; and beside all that was found, all but one and
+    one alone. Kept are those with strong evidence over what was found (`INDISTINGUISHABLE`), one of
+    each variable, the most probable first.
 
     Parameters
     ----------
@@ -97,16 +109,16 @@ def free_functions_in_model(
         return ()
     curves = _curves(search, runs)
     beside = _sets(search)
-    names = {name for one in beside for name in one}
+    names = {name for one, _ in beside for name in one}
     effects = [e for e in search.model.effects if e.name in names]
     model = AugmentedModel(
         search.model.declared, [*effects, *(curve.effect for curve in curves)], data_scales(runs)
     )
-    trials = [(curve, one) for one in beside for curve in curves]
+    trials = [(curve, one) for one, _ in beside for curve in curves]
     if not trials:
         return ()
     starts, free = zip(
-        *(_start(search, model, curve, one, beside[one]) for curve, one in trials), strict=True
+        *(_start(search, model, curve, *one) for one in beside for curve in curves), strict=True
     )
     fits = fit_batch(model, search.batch, starts, free)
     usable = [(fit, *trial) for fit, trial in zip(fits, trials, strict=True) if fit.usable]
@@ -132,12 +144,19 @@ def free_functions_in_model(
     return tuple(kept.values())
 
 
-def _sets(search: Search) -> dict[tuple[str, ...], np.ndarray]:
-    """Return the sets of effects beside which a curve is fitted, each with parameters to begin."""
+def _sets(search: Search) -> list[tuple[tuple[str, ...], np.ndarray]]:
+    """Return the sets of effects beside which a curve is fitted, each with parameters to begin.
+
+    A set may stand twice: an effect that stood for the curve is elsewhere when it is fitted alone
+    than among others.
+    """
     fluids = {e.name for e in search.model.effects if isinstance(e, ConstitutiveEffect)}
     found = search.path[len(search.active)]
     of_instrument = tuple(name for name in search.active if name not in fluids)
-    sets = {(): search.path[0], of_instrument: found if of_instrument else search.path[0]}
+    of_fluid = tuple(name for name in search.active if name in fluids)
+    sets = [((), search.path[0])]
+    if of_instrument:
+        sets.append((of_instrument, found))
     alone = [
         one for one in search.seen
         if len(one.effects) == 1 and set(one.effects) <= fluids - set(search.refused)
@@ -146,8 +165,11 @@ def _sets(search: Search) -> dict[tuple[str, ...], np.ndarray]:
         theta = one.theta(search.model)
         for name in of_instrument:
             theta[search.model.slices[name]] = found[search.model.slices[name]]
-        sets[(*one.effects, *of_instrument)] = theta
-    return sets | {tuple(search.active): found}
+        sets.append(((*one.effects, *of_instrument), theta))
+    kept = [(name,) for name in of_fluid]
+    kept += [tuple(other for other in of_fluid if other != name) for name in of_fluid]
+    every = dict.fromkeys((*one, *of_instrument) for one in [*kept, of_fluid] if one)
+    return [*sets, *((one, found) for one in every)]
 
 
 def _curves(search: Search, runs: Sequence[Run]) -> list[_Curve]:
@@ -161,11 +183,11 @@ def _curves(search: Search, runs: Sequence[Run]) -> list[_Curve]:
     strain = max(float(np.nanmax(np.abs(strain_of(run)))) for run in runs)
     # upper convected Maxwell: 2 Wi² in steady flow, γ² before that; real fluids stay below
     largest = {"trace of the stress": min(2.0 * weissenberg**2, strain**2)}
+    largest["stress"] = max(float(np.max(np.abs(run.stress))) for run in runs)
     if np.unique(np.round(rates / fastest, _DISTINCT)).size >= _VALUES:
-        largest["rate of deformation"] = weissenberg
-    curves = [_Curve(e, largest[e.variable]) for e in FREE_RELAXATIONS if e.variable in largest]
-    stress = max(float(np.max(np.abs(run.stress))) for run in runs)
-    return [*curves, _Curve(FREE_SLIP, stress)]
+        largest |= {"rate of deformation": weissenberg, "shear rate": fastest}
+    every = (*FREE_RELAXATIONS, FREE_SLIP, FREE_BREAKDOWN)
+    return [_Curve(e, largest[e.variable]) for e in every if e.variable in largest]
 
 
 def _start(
@@ -188,6 +210,11 @@ def _start(
     switch, largest, end, *coefficients = model.positions(curve.effect.name)
     theta[[switch, largest, end]] = 1.0, curve.largest, curve.largest
     theta[coefficients] = 0.0
+    if curve.slot == "breakdown":
+        # where nothing breaks, the time in which it is built up has no say
+        *spline, build_up = coefficients
+        theta[spline] = _BROKEN * curve.largest / INTERVALS * np.arange(1.0, INTERVALS + 2.0)
+        theta[build_up] = model.first_trial[build_up]
     return theta, [*free, *coefficients]
 
 
@@ -203,7 +230,8 @@ def _form(
     """Return a free function as the result holds it, as far as the runs tell of it."""
     *_, end, first = model.positions(curve.effect.name)[:4]
     reach = _reach(search, model, fit, curve, end)
-    rows = [row for row, position in enumerate(fit.free) if position >= first]
+    spline = range(first, first + INTERVALS + 1)
+    rows = [row for row, position in enumerate(fit.free) if position in spline]
     # a spline that begins beyond has no say, and no variance
     count = min(int(np.ceil(curve.place(reach))) + 1, len(rows))
     seen = [row for row in range(len(fit.free)) if row not in rows[count:]]
@@ -213,7 +241,7 @@ def _form(
     basis = np.asarray(spline_basis(jnp.asarray(grid), curve.largest, curve.onset))[:, :count]
     return drawn_form(
         curve.slot,
-        (curve.effect.variable, "Pa" if curve.slot == "slip" else ""),
+        (curve.effect.variable, curve.unit),
         beside,
         grid,
         basis,

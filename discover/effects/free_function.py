@@ -10,10 +10,16 @@ from typing import Literal
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.effects.base import ConstitutiveEffect, EffectParameter, Scale, SeriesElement
+from discover.effects.base import (
+    ConstitutiveEffect,
+    EffectParameter,
+    Scale,
+    SeriesElement,
+    StateEffect,
+)
 from tensor_library.algebra import Symmetric, inner, trace
 
-FreeVariable = Literal["trace of the stress", "rate of deformation", "stress"]
+FreeVariable = Literal["trace of the stress", "rate of deformation", "stress", "shear rate"]
 
 INTERVALS = 6
 """Of the spline, which has one coefficient more."""
@@ -67,6 +73,30 @@ class FreeSlip(SeriesElement):
         # at rest the ratio is the slope
         size = jnp.maximum(jnp.abs(stress), 1e-3 * largest)
         return _value(size, values, onset=ONSET * largest) / size
+
+
+@dataclass(frozen=True)
+class FreeBreakdown(StateEffect):
+    """Stress in proportion to a structure, ds/dt = (1 − s)/t_b − f(|γ̇|) s.
+
+    Moore's kinetics have f = k |γ̇|; others are in Mewis & Wagner 2009, Adv. Colloid Interface Sci.
+    147-148, 214, table 1.
+    """
+
+    rest = 1.0
+    variable: FreeVariable = "shear rate"
+
+    def source_and_decay(self, values, shear_rate, stress):
+        """Return 1/t_b and 1/t_b + f(|γ̇|); of the parameters see `_parameters`, the last is t_b."""
+        del stress
+        build_up = 1.0 / values[-1]
+        broken = _value(jnp.abs(shear_rate), values[:-1], onset=ONSET * values[1])
+        return build_up, build_up + broken
+
+    def modulus_factor(self, values, state):
+        """Return s."""
+        del values
+        return state
 
 
 def spline_basis(
@@ -137,4 +167,23 @@ FREE_SLIP = FreeSlip(
     equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - v(\sigma)",
     source="Hatzikiriakos 2012, Prog. Polym. Sci. 37, 624",
     check="Repeat with another gap H: slip goes as 1/H; roughen the plates.",
+)  # fmt: skip
+
+FREE_BREAKDOWN = FreeBreakdown(
+    name="free breakdown",
+    parameters=(
+        *_parameters(
+            "1/s", "rate", 0.0, 1e3, "rate",
+            "a strain of a thousandth breaks the most brittle structure: Bonn et al. 2017, Rev. "
+            "Mod. Phys. 89, 035005",
+        ),
+        EffectParameter(
+            "build_up_time", r"t_\mathrm{b}", "s", low=1e-3, high=1e6, scale="run_time",
+            first_trial=0.3, range_source="as of thixotropy",
+        ),
+    ),
+    equation=r"\sigma = s \sum_k \sigma_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}}"
+    r" - f(|\dot\gamma|)\,s",
+    source="Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214",
+    check="Start the flow again after rests: the overshoot grows with the length of the rest.",
 )  # fmt: skip

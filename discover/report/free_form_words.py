@@ -12,6 +12,7 @@ _WHAT = {
     "gap": "a factor that depends on the tool's position alone",
     "phase": "a function of the phase of the cycle alone",
     "relaxation": "a rate of relaxation that depends on the {variable} alone",
+    "breakdown": "a structure that flow breaks at a rate that depends on the {variable} alone",
     "slip": "a rate of slip that depends on the {variable} alone",
 }
 

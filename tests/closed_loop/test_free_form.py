@@ -15,6 +15,7 @@ from scipy.integrate import cumulative_simpson
 import discover as dc
 from discover.closed_loop import free_form
 from discover.closed_loop.beyond_the_search import predicts_worse
+from discover.closed_loop.free_variables import Variables
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
 from discover.report.loop.verdict import loop_verdict
@@ -161,7 +162,8 @@ def test_of_a_few_rates_no_curve_is_drawn_and_of_a_wave_one_is(monkeypatch):
             dc.Run(f"{rate}", times, dc.start_up(rate), rate * course, np.ones(80))
             for rate in (0.5, 1.0, 2.0)
         ]
-        return free_form._fitted(search, runs, slot, (), np.zeros(2), free_form.KNOTS[0])
+        variables, few = Variables(runs, 80), free_form.KNOTS[0]
+        return free_form._fitted(search, variables, slot, (), np.zeros(2), few)
 
     assert drawn("rate", np.ones(80)) is None
     # controls: of the time there is one in the same runs, and of the rate in a wave

@@ -13,8 +13,9 @@ from discover.closed_loop.results.error_pair import ErrorPair
 from discover.statistics import HALF_BAND
 
 Slot = Literal[
-    "recorded_stress", "drift", "network", "rate", "position", "gap", "phase", "relaxation", "slip"
-]
+    "recorded_stress", "drift", "network", "rate", "position", "gap", "phase",
+    "relaxation", "slip", "breakdown",
+]  # fmt: skip
 
 _WITHIN = 2.0
 """A closed form is the nearest one if it stays within so many standard deviations of the curve in
@@ -33,14 +34,15 @@ class FreeForm:
         σ + f(γ̇); ``network``, σ (1 + f(|γ|)); ``position``, σ + f(γ); ``gap``, σ (1 + f(γ));
         ``phase``, σ + f(φ) in what oscillates, φ = 0 where the rate is largest; ``relaxation``,
         each mode relaxes 1 + f times as fast, with f of its dimensionless stress or rate;
-        ``slip``, γ̇ − f(σ) is felt.
+        ``slip``, γ̇ − f(σ) is felt; ``breakdown``, a structure s to which the stress is proportional
+        obeys ds/dt = (1 − s)/t_b − f(|γ̇|) s.
     variable, unit
         Of what it is a function, and its unit.
     beside
         Effects in the model with it.
     grid, value, low95, high95
         The curve with its 95 % band, shape (n,): in Pa (``network``, ``gap``, ``relaxation``: a
-        pure number; ``slip``: in 1/s).
+        pure number; ``slip``, ``breakdown``: in 1/s).
     nearest
         Name of a closed form that is it within its uncertainty; None if none is.
     evidence
@@ -93,7 +95,7 @@ def drawn_form(
     value = basis @ coefficients
     variance = np.einsum("im,mk,ik->i", basis, covariance, basis)
     deviation = np.sqrt(np.clip(variance, 0.0, None))
-    in_model = slot in ("relaxation", "slip")  # where nothing is a function of time
+    in_model = slot in ("relaxation", "slip", "breakdown")  # where nothing is a function of time
     nearest = nearest_form(grid, value, deviation, slot == "recorded_stress", not in_model)
     return FreeForm(
         slot,

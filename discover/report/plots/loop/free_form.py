@@ -13,6 +13,7 @@ _AXES = {
     "gap": ("strain, as the tool stands", "relative change of the stress"),
     "phase": ("phase of the cycle, from the largest rate (rad)", "recorded less true stress (Pa)"),
     "relaxation": ("{variable}, dimensionless", "relative change of the rate of relaxation"),
+    "breakdown": ("shear rate (1/s)", "rate at which structure breaks (1/s)"),
     "slip": ("stress (Pa)", "rate taken by slip (1/s)"),
 }
 
