@@ -154,7 +154,7 @@ def _sets(search: Search) -> list[tuple[tuple[str, ...], np.ndarray]]:
     found = search.path[len(search.active)]
     of_instrument = tuple(name for name in search.active if name not in fluids)
     of_fluid = tuple(name for name in search.active if name in fluids)
-    sets = [((), search.path[0])]
+    sets: list[tuple[tuple[str, ...], np.ndarray]] = [((), search.path[0])]
     if of_instrument:
         sets.append((of_instrument, found))
     alone = [
