@@ -1,13 +1,13 @@
 """`discover close-loop` on measured data: what its band holds of runs held out, and its cost.
 
 Each study is run by the command itself, in a process of its own, with the eight explanations that a
-loop carries side by side and with the search's own alone. Programs are compiled by a start of each
-that does not count. A run that is done, in the folder of results, is not made again, and one that
+loop carries side by side and with the search's own alone. Programs are compiled by a start that does not
+count. A run that is done, in the folder of results, is not made again, and one that
 was stopped goes on. The data are not part of this project: set DISCOVER_DATA to the folder that
 holds them.
 
     python benchmarks/measured_loops.py --out loops
-    python benchmarks/measured_loops.py --out loops --only gel --explanations 8
+    python benchmarks/measured_loops.py --out loops --only hydrogel --explanations 8 --starts 1
 
 Blood has six runs and a study that holds each out in turn from a search among 23 candidates, which
 takes an hour. Here each of the six is held out from a search among the four that
@@ -77,6 +77,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, required=True, help="folder of results")
     parser.add_argument("--only", nargs="*", default=[""], help="studies whose names begin so")
     parser.add_argument("--explanations", nargs="*", type=int, default=[8, 1])
+    parser.add_argument("--starts", type=int, default=2, help="of each study; the last is timed")
     asked = parser.parse_args()
     out = asked.out.resolve()
     heads = (f"{'':36}", f"{'seconds':>8}", f"{'processor':>9}", f"{'before':>7}", f"{'after':>7}")
@@ -84,16 +85,18 @@ def main() -> None:
     for name, text in texts.items():
         if not name.startswith(tuple(asked.only)):
             continue
-        rows = {n: loop(name, with_explanations(text, n), n, out) for n in asked.explanations}
-        for number, row in rows.items():
-            print(_line(name, number, row))
+        rows, starts = {}, asked.starts
+        for number in asked.explanations:
+            rows[number] = loop(name, with_explanations(text, number), number, out, starts)
+            starts = 1  # its programs are compiled by now
+            print(_line(name, number, rows[number]), flush=True)
         if {8, 1} <= set(rows):
             times = [rows[8][key] / rows[1][key] for key in ("seconds", "processor")]
             print(f"{'':32} 8/1 {times[0]:8.2f} {times[1]:9.2f}", flush=True)
 
 
-def loop(name: str, text: str, number: int, out: Path) -> dict:
-    """Run one study twice and time the second, or read what an earlier run said of it."""
+def loop(name: str, text: str, number: int, out: Path, starts: int) -> dict:
+    """Run one study so often and time the last, or read what an earlier run said of it."""
     folder = out / f"{name.replace(', ', '-').replace(' ', '-')}-{number}"
     kept = folder.with_suffix(".json")
     if kept.is_file():
@@ -103,7 +106,8 @@ def loop(name: str, text: str, number: int, out: Path) -> dict:
     study.write_text(text, encoding="utf-8")
     own = {**os.environ, "XDG_CACHE_HOME": str(out / "cache")}
     command = [sys.executable, "-c", "from discover.cli import main; main()", "close-loop"]
-    for _ in range(2):
+    before = used = 0.0
+    for _ in range(starts):
         before, used = time.perf_counter(), _processor()
         ended = subprocess.run(
             [*command, str(study), "--out", str(folder), "--overwrite", "--quiet"],
