@@ -1,10 +1,10 @@
 """`discover close-loop` on measured data: what its band holds of runs held out, and its cost.
 
 Each study is run by the command itself, in a process of its own, with the eight explanations that a
-loop carries side by side and with the search's own alone. Programs are compiled by a start that does not
-count. A run that is done, in the folder of results, is not made again, and one that
-was stopped goes on. The data are not part of this project: set DISCOVER_DATA to the folder that
-holds them.
+loop carries side by side and with the search's own alone. Programs are compiled by a start that
+does not count. A run that is done, in the folder of results, is not made again, and one that was
+stopped goes on. The data are not part of this project: set DISCOVER_DATA to the folder that holds
+them.
 
     python benchmarks/measured_loops.py --out loops
     python benchmarks/measured_loops.py --out loops --only hydrogel --explanations 8 --starts 1
