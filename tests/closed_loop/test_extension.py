@@ -7,6 +7,7 @@ from independent.homogeneous import GiesekusFluid
 import discover as dc
 from discover.dataset.run import Run
 from discover.protocols import in_flow, start_up
+from discover.report.loop.certainty import how_sure
 
 pytestmark = pytest.mark.usefixtures("effects_alone")
 
@@ -78,3 +79,34 @@ def test_effects_of_a_rotational_rheometer_leave_an_extension_as_it_is(base):
     assert flawed.verdict == "no_effect_needed"
     lost = [candidate for ranking in flawed.rankings for candidate in ranking]
     assert all(candidate.reduction < 1e-3 for candidate in lost)
+
+
+@pytest.mark.parametrize(
+    ("effect", "verdict"), [("giesekus_mobility", "effects_added"), ("stress_gain", "unexplained")]
+)
+def test_a_band_in_a_flow_of_another_kind_is_drawn_only_by_what_explains(base, effect, verdict):
+    fluid, generator, runs = (
+        GiesekusFluid(MODULUS, TIME, 0.3, SOLVENT),
+        np.random.default_rng(0),
+        [],
+    )
+    for kind, rate in [("shear", 0.3), ("shear", 0.6), ("shear", 1.2), ("uniaxial", 0.3)]:
+        times = np.linspace(0.05, 6.0, 60)
+        stress = fluid.recorded(kind, lambda _, r=rate: r, times)
+        noise = 0.01 * np.sqrt(np.mean(stress**2)) * generator.standard_normal(60)
+        protocol = start_up(rate) if kind == "shear" else in_flow(start_up(rate), kind)
+        runs.append(Run(f"{kind}_{rate}", times, protocol, np.full(60, rate), stress + noise))
+    loop = dc.close_loop(
+        dc.Dataset("both", tuple(runs)), base, held_out=["uniaxial_0.3"], effects=[effect]
+    )
+    assert loop.verdict == verdict
+    *fitted, pulled = loop.records
+    assert all(record.band is not None for record in fitted)
+    if verdict == "unexplained":
+        # shear alone, unexplained: a gain that follows it says nothing of extension
+        assert pulled.band is None
+        assert loop.held_in_band is None
+        assert "no band is drawn in uniaxial extension" in how_sure(loop)
+    else:
+        assert loop.held_in_band > 0.9
+        assert "no band" not in how_sure(loop)

@@ -78,6 +78,10 @@ def with_band(
 ) -> list[RunRecord]:
     """Return the records of runs with what the explanations predict, each and together.
 
+    Where none of them explains the fitted runs, a run held out in a flow of another kind (`flow`)
+    has no band: laws that follow shear alike differ in extension by many times what they leave of
+    shear, and candidates near them say nothing of laws that are not.
+
     Parameters
     ----------
     model, batch, carried, explanations
@@ -104,12 +108,15 @@ def with_band(
         judgement.left.noise, judgement.structured, candidates,
         [rates[0], *rates] if timed else (),
     )  # fmt: skip
+    flows = {record.flow for record in told[0][1]}
     thetas = [one.fit.theta for one in sorted(mixed, key=lambda one: [*of].index(one.effects))]
     each = [model.predictions(thetas, held) for held, _ in told]
     return [
         replace(
             record,
-            band=band[:, i, : len(record.time)],
+            band=band[:, i, : len(record.time)]
+            if record.flow in flows or not judgement.structured
+            else None,
             by_explanation=predicted[:, i, : len(record.time)],
         )
         for (_, records), band, predicted in zip(told, bands, each, strict=True)

@@ -60,10 +60,23 @@ def _errors(result: LoopResult) -> str:
         if result.held_in_band is not None:
             share = percent(result.held_in_band)
             parts.append(f"the 95 % band of all explanations holds {share} of their samples")
+        parts += _without_band(result)
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
     return sentence([*parts, f"on the fitted runs {told}, {_share_of_noise(result)}"])
+
+
+def _without_band(result: LoopResult) -> Iterator[str]:
+    """Tell of the runs held out that have no band, since nothing that was fitted bears on them."""
+    fitted = {record.flow for record in result.records if not record.held_out}
+    others = dict.fromkeys(r.flow for r in result.records if r.held_out and r.flow not in fitted)
+    if others and result.verdict == "unexplained":
+        flows = listed([flow if flow == "shear" else f"{flow} extension" for flow in others])
+        yield (
+            f"no band is drawn in {flows}, where no run was fitted and which laws that do not "
+            "explain the fitted runs say nothing of"
+        )
 
 
 def _share_of_noise(result: LoopResult) -> str:
