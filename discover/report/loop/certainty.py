@@ -74,8 +74,8 @@ def _without_band(result: LoopResult) -> Iterator[str]:
     if others and result.verdict == "unexplained":
         flows = listed([flow if flow == "shear" else f"{flow} extension" for flow in others])
         yield (
-            f"no band is drawn in {flows}, where no run was fitted and which laws that do not "
-            "explain the fitted runs say nothing of"
+            f"no band is drawn in {flows}: none of it was fitted, and laws that do not explain the "
+            "fitted runs say nothing about it"
         )
 
 
