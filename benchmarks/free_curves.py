@@ -11,12 +11,13 @@ the largest value, and what is left of the runs fitted and held out without the 
 import argparse
 import tempfile
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from independent import WhiteMetzner
-from independent.flow import Flow, oscillation, start_up
+from independent.curve_records import JUDGE, as_it_is, curve_records
+from independent.flow import Flow
 from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument, Recording
@@ -28,21 +29,10 @@ from discover.closed_loop import LoopResult
 from discover.closed_loop.results.free_curve import FreeForm
 from discover.report.plots.style import legend_above, panels_of, picture
 
-MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
+MODULUS, TIME = 100.0, 1.0
 SCALE = {"modulus": MODULUS, "relaxation_time": TIME}
-FLOWS = {
-    "up.csv": (start_up(1.5), 6.0),
-    "swing.csv": (oscillation(2.0, 1.0), 10.0),
-    "wide.csv": (oscillation(4.0, 0.5), 12.0),
-    "judge.csv": (oscillation(3.0, 0.8), 10.0),
-}
 SOUND, GIESEKUS = Instrument(), Giesekus(0.3, **SCALE)
 LIMIT, SLIP, BREAKDOWN = 60.0, 0.4 / MODULUS**3, 0.03
-
-
-def _as_it_is(run: Recording, flow: Flow) -> np.ndarray:
-    del flow
-    return run.stress
 
 
 def _on_bearing(run: Recording, flow: Flow) -> np.ndarray:
@@ -82,7 +72,7 @@ class Flaw:
     true: Callable[[np.ndarray], np.ndarray]
     material: Material = GIESEKUS
     instrument: Instrument = SOUND
-    read: Callable[[Recording, Flow], np.ndarray] = _as_it_is
+    read: Callable[[Recording, Flow], np.ndarray] = as_it_is
 
 
 FLAWS = {
@@ -133,16 +123,11 @@ FLAWS = {
 
 def loop_on(flaw: Flaw, seed: int) -> LoopResult:
     """Return the loop on records of a flaw."""
-    generator, runs = np.random.default_rng(seed), {}
-    for name, (flow, end) in FLOWS.items():
-        run = flaw.instrument.record(flaw.material, flow, np.linspace(0.02, end, 120))
-        stress = flaw.read(run, flow)
-        size = NOISE * np.sqrt(np.mean(stress**2))
-        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
+    runs = curve_records(flaw.material, flaw.instrument, flaw.read, seed)
     with tempfile.TemporaryDirectory() as folder:
         data = dc.load_dataset(write_folder(Path(folder), runs))
         base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-        return dc.close_loop(data, base, held_out=["judge.csv"])
+        return dc.close_loop(data, base, held_out=[JUDGE])
 
 
 def line(name: str, flaw: Flaw, loop: LoopResult) -> str:

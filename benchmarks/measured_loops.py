@@ -19,7 +19,6 @@ import csv
 import json
 import os
 import re
-import resource
 import subprocess
 import sys
 import time
@@ -27,8 +26,8 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
+from measured_comparisons import ROOT, processor
 
-ROOT = Path(__file__).resolve().parent.parent
 WHOLE = {
     "polyisoprene, small strains": "polyisoprene-small-strain",
     "polyisoprene": "polyisoprene-startup",
@@ -108,7 +107,7 @@ def loop(name: str, text: str, number: int, out: Path, starts: int) -> dict:
     command = [sys.executable, "-c", "from discover.cli import main; main()", "close-loop"]
     before = used = 0.0
     for _ in range(starts):
-        before, used = time.perf_counter(), _processor()
+        before, used = time.perf_counter(), processor()
         ended = subprocess.run(
             [*command, str(study), "--out", str(folder), "--overwrite", "--quiet"],
             check=False, env=own, cwd=ROOT,
@@ -117,16 +116,11 @@ def loop(name: str, text: str, number: int, out: Path, starts: int) -> dict:
             raise SystemExit(f"{name} ended with exit code {ended.returncode}")
     row = {
         "seconds": time.perf_counter() - before,
-        "processor": _processor() - used,
+        "processor": processor() - used,
         **what_is_said(folder),
     }
     kept.write_text(json.dumps(row), encoding="utf-8")
     return row
-
-
-def _processor() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def what_is_said(folder: Path) -> dict:

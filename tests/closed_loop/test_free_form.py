@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from independent.flow import oscillation, start_up
+from independent.curve_records import JUDGE, NOISE, curve_records
+from independent.flow import start_up
 from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
@@ -20,13 +21,7 @@ from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
 from discover.report.loop.verdict import loop_verdict
 
-MODULUS, TIME, NOISE, LIMIT = 100.0, 1.0, 0.01, 60.0
-FLOWS = {
-    "up.csv": (start_up(1.5), 6.0),
-    "swing.csv": (oscillation(2.0, 1.0), 10.0),
-    "wide.csv": (oscillation(4.0, 0.5), 12.0),
-    "judge.csv": (oscillation(3.0, 0.8), 10.0),
-}
+MODULUS, TIME, LIMIT = 100.0, 1.0, 60.0
 EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_gain", "stress_drift", "transducer_lag"]
 
 
@@ -35,18 +30,12 @@ FEW = ["giesekus_mobility", "stress_drift"]
 
 def loop_with(folder, flaw, effects: Any = EFFECTS, max_effects=1):
     """Return the loop on Giesekus records to which a flaw of the instrument was done."""
-    generator, runs = np.random.default_rng(0), {}
-    law = Giesekus(0.3, MODULUS, TIME)
-    for name, (flow, end) in FLOWS.items():
-        run = Instrument().record(law, flow, np.linspace(0.02, end, 120))
-        stress = flaw(run)
-        size = NOISE * np.sqrt(np.mean(stress**2))
-        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
+    runs = curve_records(Giesekus(0.3, MODULUS, TIME), read=lambda run, _: flaw(run))
     data = dc.load_dataset(write_folder(folder, runs))
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     named = {} if effects is None else {"effects": effects}
     return dc.close_loop(
-        data, base, held_out=["judge.csv"], max_effects=max_effects, explanations=1, **named
+        data, base, held_out=[JUDGE], max_effects=max_effects, explanations=1, **named
     )
 
 

@@ -1,6 +1,5 @@
 """What is in no dictionary, found as a curve inside the model: on records by scipy alone."""
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import PhanThienTanner, PomPom, WhiteMetzner
-from independent.flow import oscillation, start_up
+from independent.curve_records import JUDGE, NOISE, curve_records
+from independent.flow import start_up
 from independent.folders import write_folder
 from independent.giesekus import Giesekus
 from independent.instruments import Instrument
@@ -28,31 +28,21 @@ from discover.effects.free_function import (
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.report.loop.verdict import loop_verdict
 
-MODULUS, TIME, NOISE = 100.0, 1.0, 0.01
+MODULUS, TIME = 100.0, 1.0
 TIMES = np.linspace(0.05, 6.0, 80)
 SCALE = {"modulus": MODULUS, "relaxation_time": TIME}
-FLOWS = {
-    "up.csv": (start_up(1.5), 6.0),
-    "swing.csv": (oscillation(2.0, 1.0), 10.0),
-    "wide.csv": (oscillation(4.0, 0.5), 12.0),
-    "judge.csv": (oscillation(3.0, 0.8), 10.0),
-}
 EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_gain", "stress_drift", "transducer_lag"]
 
 
 def loop_on(folder, material, **flaws):
     """Return the loop on records of a material and the largest N1 of the fitted ones."""
-    generator, runs = np.random.default_rng(0), {}
-    for name, (flow, end) in FLOWS.items():
-        run = Instrument(**flaws).record(material, flow, np.linspace(0.02, end, 120))
-        size = NOISE * np.sqrt(np.mean(run.stress**2))
-        runs[name] = replace(run, stress=run.stress + size * generator.standard_normal(120))
+    runs = curve_records(material, Instrument(**flaws))
     data = dc.load_dataset(write_folder(folder, runs))
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     loop = dc.close_loop(
-        data, base, held_out=["judge.csv"], effects=EFFECTS, max_effects=1, explanations=2
+        data, base, held_out=[JUDGE], effects=EFFECTS, max_effects=1, explanations=2
     )
-    largest = max(np.max(run.true.N1) for name, run in runs.items() if name != "judge.csv")
+    largest = max(np.max(run.true.N1) for name, run in runs.items() if name != JUDGE)
     return loop, largest
 
 

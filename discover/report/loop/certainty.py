@@ -69,9 +69,9 @@ def _errors(result: LoopResult) -> str:
 
 def _without_band(result: LoopResult) -> Iterator[str]:
     """Tell of the runs held out that have no band, since nothing that was fitted bears on them."""
-    fitted = {record.flow for record in result.records if not record.held_out}
-    others = dict.fromkeys(r.flow for r in result.records if r.held_out and r.flow not in fitted)
-    if others and result.verdict == "unexplained":
+    drawn = {record.flow for record in result.records if record.band is not None}
+    others = dict.fromkeys(record.flow for record in result.records if record.flow not in drawn)
+    if others and drawn:
         flows = listed([flow if flow == "shear" else f"{flow} extension" for flow in others])
         yield (
             f"no band is drawn in {flows}: none of it was fitted, and laws that do not explain the "
