@@ -116,12 +116,6 @@ class _InTurn:
     def __init__(self, *_):
         pass
 
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        pass
-
 
 def pytest_collection_finish(session: pytest.Session) -> None:
     """Optimise the few programs that run long; all tests are imported, in a worker, by now."""

@@ -8,6 +8,7 @@ a call of its own, each leaves out the terms that it has at zero.
 from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -52,6 +53,8 @@ class AugmentedModel:
         instants at which rates step.
     scales
         Size of each property of the data in which parameters are scaled; see `data_scales`.
+    like
+        Runs into whose shape others are laid where they fit, so that all share one program.
     """
 
     def __init__(
@@ -59,8 +62,13 @@ class AugmentedModel:
         declared: DeclaredModel,
         effects: Sequence[AbstractEffect],
         scales: Mapping[str, float] | None = None,
+        like: Batch | None = None,
     ):
         self.declared = declared
+        parts = like.parts if isinstance(like, MixedBatch) else (like,)
+        self._like = next((part for part in parts if isinstance(part, RunBatch)), None)
+        self._last_weights: tuple[Any, float, Any] | None = None
+        self._laid_out: list[tuple[RunBatch, RunBatch]] = []
         names = {effect.name for effect in effects}
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
@@ -227,15 +235,38 @@ class AugmentedModel:
         self, thetas, part: Part | OscillationBatch
     ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self._program
+        own = slice(None)
+        if isinstance(part, RunBatch) and self._like is not None and part is not self._like:
+            own = np.s_[: part.recorded.shape[0], : part.recorded.shape[1]]
+            part = self._in_shape(part)
 
         def one(theta: np.ndarray) -> np.ndarray:
             used = program.in_use(theta)
-            return np.asarray(program.predict(self._numbers, used, theta, part))
+            weights = self._weights(theta, part)
+            return np.asarray(program.predict(self._numbers, used, theta, part, weights))[own]
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         found = in_threads(one, thetas, is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
+
+    def _weights(self, theta: np.ndarray, part: Part | OscillationBatch):
+        """Return the weights of the steps, computed once for trials of the same times."""
+        known = self._last_weights
+        if known is None or known[0] is not part or known[1] != theta[1]:
+            known = (part, theta[1], self._program.weights(self._numbers, theta, part))
+            self._last_weights = known
+        return known[2]
+
+    def _in_shape(self, part: RunBatch) -> RunBatch:
+        """Return runs in the shape of those whose program they share, laid out once."""
+        assert self._like is not None
+        for known, laid_out in self._laid_out:
+            if known is part:
+                return laid_out
+        laid_out = part.in_shape_of(self._like)
+        self._laid_out.append((part, laid_out))
+        return laid_out
 
     def residuals(
         self,

@@ -7,7 +7,7 @@ series with the fluid take away. What no candidate needs is not compiled.
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
@@ -23,6 +23,8 @@ def integrate(
     rate: Float[Array, " m"],
     flow: Kinematics | None = None,
     cycle: Cycle | None = None,
+    steps: Int[Array, ""] | None = None,
+    weights: Float[Array, "steps 1 11 _"] | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
@@ -36,6 +38,10 @@ def integrate(
         Which flow has this rate; None is simple shear.
     cycle
         The last cycle before the record, of a batch that holds runs with a periodic start.
+    steps
+        How many steps are taken; those beyond are padding, and nothing is computed of them.
+    weights
+        Of the steps for the declared modes, where they are known; see `declared_weights`.
     """
     width = jnp.diff(times)
     if cycle is not None:
@@ -96,20 +102,21 @@ def integrate(
     rest = dynamics.rest()
     start = (*rest, zero, zero)
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
-    inputs = (rates, width, dynamics.weights(width))
-    if cycle is None:
-        _, (stress, compliance_rate) = jax.lax.scan(step, start, inputs)
-    else:
-        begun = _begun(step, start, inputs, cycle, times, dynamics)
+    inputs = (rates, width, dynamics.weights(width, weights))
+    begun_at, begun = -1, start
+    if cycle is not None:
+        begun_at, begun = cycle.start, _begun(step, start, inputs, cycle, times, dynamics)
 
-        def step_or_begin(carry, numbered):
-            number, one = numbered
-            carry = jax.tree.map(lambda a, b: jnp.where(number == cycle.start, b, a), carry, begun)
-            return step(carry, one)
+    def taken(number, so_far):
+        carry, recorded = so_far
+        if cycle is not None:
+            carry = jax.tree.map(lambda a, b: jnp.where(number == begun_at, b, a), carry, begun)
+        carry, seen = step(carry, jax.tree.map(lambda of: of[number], inputs))
+        return carry, recorded.at[:, number].set(jnp.stack(seen))
 
-        _, (stress, compliance_rate) = jax.lax.scan(
-            step_or_begin, start, (jnp.arange(len(width)), inputs)
-        )
+    count = len(width) if steps is None else steps
+    nothing = jnp.zeros((2, len(width)))
+    _, (stress, compliance_rate) = jax.lax.fori_loop(0, count, taken, (start, nothing))
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides

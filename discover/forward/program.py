@@ -25,13 +25,13 @@ from discover.forward.batches import (
     StressBatch,
 )
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
-from discover.forward.dynamics import Dynamics, Modes, Series
+from discover.forward.dynamics import Dynamics, Modes, Series, declared_weights
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.integrator import integrate
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
 from discover.forward.starts.steady_states import steady_states
-from discover.forward.structure import Structure
+from discover.forward.structure import Numbers, Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.programs import compiled
@@ -43,6 +43,9 @@ from tensor_library.kinematics import rate_of_deformation
 # eight runs and all candidates a prediction takes 2.0 ms so and 6.3 otherwise for 3 modes, 4.8 and
 # 7.5 for 6, 10 and 7.8 for 9: arithmetic on many numbers is faster in pieces of its own
 _FEW_MODES = 6
+
+# Modes from which on weights of steps are worth a program of their own
+_MANY_MODES = 4
 
 
 class Program:
@@ -101,21 +104,39 @@ class Program:
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
 
-    def _predict_all(self, numbers, used, theta, runs: Part | OscillationBatch):
+    def weights(self, numbers: Numbers, theta: np.ndarray, runs: Part | OscillationBatch):
+        """Return the weights of all steps that trials of the same times share; None of few modes.
+
+        None too where the law's own constants decide how a mode relaxes.
+        """
+        if not isinstance(runs, RunBatch) or len(numbers.modulus) < _MANY_MODES:
+            return None
+        if numbers.law.retracts:
+            return None
+        times = np.asarray(numbers.relaxation_time) * np.exp(theta[1])
+        return declared_weights(
+            runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
+        )
+
+    def _predict_all(self, numbers, used, theta, runs: Part | OscillationBatch, weights=None):
         if isinstance(runs, OscillationBatch):
             return self._predict_moduli(numbers, used, theta, runs)
+        if isinstance(runs, RunBatch):
+            # of all runs, so that a step that is padding in each of them is not taken
+            steps = jnp.max(runs.last_step)
+            return jax.vmap(self._predict_transient, in_axes=(None, None, None, 0, None, 0))(
+                numbers, used, theta, runs, steps, weights
+            )
         return jax.vmap(self._predict_run, in_axes=(None, None, None, 0))(
             numbers, used, theta, runs
         )
 
-    def _predict_run(self, numbers, used, theta, run: Part):
+    def _predict_run(self, numbers, used, theta, run: SteadyBatch | StressBatch):
         if isinstance(run, SteadyBatch):
             return self._predict_steady_states(numbers, used, theta, run)
-        if isinstance(run, StressBatch):
-            return self._predict_strain(numbers, used, theta, run)
-        return self._predict_transient(numbers, used, theta, run)
+        return self._predict_strain(numbers, used, theta, run)
 
-    def _predict_transient(self, numbers, used, theta, run: RunBatch):
+    def _predict_transient(self, numbers, used, theta, run: RunBatch, steps, weights):
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -139,7 +160,7 @@ class Program:
         cycle = None
         if run.cycle_steps:
             cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        stress, felt = integrate(dynamics, times, rate, flow, cycle)
+        stress, felt = integrate(dynamics, times, rate, flow, cycle, steps, weights)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)

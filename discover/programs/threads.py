@@ -3,12 +3,24 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from typing import TypeVar
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 _WORKERS = min(os.cpu_count() or 1, 4)
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    """Return the one pool of this process: to start threads takes as long as a short program."""
+    return ThreadPoolExecutor(_WORKERS)
+
+
+# a process made by copying this one has none of its threads
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
 
 
 def in_threads(
@@ -19,7 +31,7 @@ def in_threads(
     Parameters
     ----------
     function
-        Calls a compiled program, which leaves Python to the others.
+        Calls a compiled program, which leaves Python to the others, and not this function.
     jobs
         What it is called with.
     is_compiled
@@ -31,5 +43,4 @@ def in_threads(
     waiting = waiting[len(done) :]
     if len(waiting) < 2:
         return done + [function(job) for job in waiting]
-    with ThreadPoolExecutor(_WORKERS) as pool:
-        return done + list(pool.map(function, waiting))
+    return done + list(_pool().map(function, waiting))

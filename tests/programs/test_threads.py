@@ -12,6 +12,9 @@ from discover.programs import in_threads, threads
 def in_threads_whoever_runs_the_tests(monkeypatch):
     monkeypatch.setattr(threads, "ThreadPoolExecutor", ThreadPoolExecutor)
     monkeypatch.setattr(threads, "_WORKERS", 2)
+    threads._pool.cache_clear()
+    yield
+    threads._pool.cache_clear()
 
 
 @pytest.mark.parametrize("is_compiled", [False, True])
@@ -31,3 +34,10 @@ def test_the_first_call_runs_alone_where_nothing_is_compiled_yet():
     in_threads(lambda job: seen.append((job, threading.current_thread())), range(3))
     assert seen[0] == (0, threading.main_thread())
     assert all(thread is not threading.main_thread() for _, thread in seen[1:])
+
+
+def test_threads_are_started_once():
+    started = set()
+    for _ in range(5):
+        in_threads(lambda job: started.add(threading.current_thread()), range(4), True)
+    assert len(started) <= 2

@@ -72,6 +72,18 @@ class RateSteps(eqx.Module):
 
         return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
 
+    def padded(self, count: int) -> "RateSteps":
+        """Return as many steps of each run as asked for; those beyond its own never happen."""
+        beyond = ((0, 0), (0, count - self.start.shape[1]))
+        columns = (self.start, self.end, self.change, self.share, self.place)
+        fills = (_NEVER - 1.0, _NEVER, 0.0, 0.5, -1)
+        return RateSteps(
+            *(
+                on_device(np.pad(np.asarray(column), beyond, constant_values=fill))
+                for column, fill in zip(columns, fills, strict=True)
+            )
+        )
+
 
 def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
     """Return the steps of runs whose instants are fitted or were; None where there is none."""

@@ -1,9 +1,13 @@
 """Transients at a given rate on padded grids, so that all of them share one compilation."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
 
 import equinox as eqx
+import jax
 import numpy as np
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
@@ -43,6 +47,8 @@ class RunBatch(eqx.Module):
         Shape (runs,).
     strain_before
         Total strain of the sample before each run, shape (runs,).
+    last_step
+        Position of the last sample of each run among step ends; what follows is padding.
     kinematics
         Which flow each run is; None where all are simple shear.
     steps
@@ -62,6 +68,7 @@ class RunBatch(eqx.Module):
     clock_factor: Float[Array, " runs"]
     strain_before: Float[Array, " runs"]
     cycle: Int[Array, "runs 2"]
+    last_step: Int[Array, " runs"]
     kinematics: Kinematics | None = None
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)
@@ -73,6 +80,46 @@ class RunBatch(eqx.Module):
             np.asarray(self.times)[:, ::2], np.asarray(self.sample_index), axis=1
         )
         return float(np.max(ends))
+
+    def in_shape_of(self, other: "RunBatch") -> "RunBatch":
+        """Return these runs padded to the shape of others, so that both share one program.
+
+        A run more is the last once more, and what is beyond a run's end is at rest. Runs that do
+        not fit into the shape of the others stay as they are.
+        """
+        own, theirs = (jax.tree.leaves(batch) for batch in (self, other))
+        if jax.tree.structure(self) != jax.tree.structure(other) or any(
+            a.ndim != b.ndim or np.any(np.array(a.shape) > b.shape)
+            for a, b in zip(own, theirs, strict=True)
+        ):
+            return self
+        runs, m = other.times.shape
+        times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
+        spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
+        later = times[:, -1:] + spacing * np.arange(1, m - times.shape[1] + 1)
+        # a straight line for one step more: the slope of the rate at the last sample stays as it is
+        one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
+        longer = replace(
+            self,
+            times=on_device(np.concatenate([times, later], axis=1)),
+            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), m),
+            sample_index=_longer(self.sample_index, other.sample_index.shape[1], "edge"),
+            weight=_longer(self.weight, other.weight.shape[1]),
+            recorded=_longer(self.recorded, other.recorded.shape[1]),
+            steps=self.steps and other.steps and self.steps.padded(other.steps.start.shape[1]),
+        )
+        return jax.tree.map(lambda values: _more_runs(values, runs), longer)
+
+
+def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
+    beyond = size - np.shape(values)[1]
+    return on_device(np.pad(np.asarray(values), ((0, 0), (0, beyond)), mode))
+
+
+def _more_runs(values: ArrayLike, runs: int) -> Array:
+    values = np.asarray(values)
+    more = [(0, runs - len(values)), *[(0, 0)] * (values.ndim - 1)]
+    return on_device(np.pad(values, more, "edge"))
 
 
 def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
@@ -118,6 +165,7 @@ def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
                 run.clock_factor,
                 run.strain_before,
                 np.asarray(cycle),
+                np.asarray(len(grid) - 1),
             )
         )
     columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
