@@ -6,6 +6,7 @@ import importlib.metadata
 import os
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import jaxtyping
@@ -108,13 +109,10 @@ def _leaves_tests_to_workers(config: pytest.Config) -> bool:
     return bool(shared_out) and not hasattr(config, "workerinput")
 
 
-class _InTurn:
+class _InTurn(ThreadPoolExecutor):
     """What stands for a pool of threads where each core has a worker: there is none to spare."""
 
-    map = staticmethod(map)
-
-    def __init__(self, *_):
-        pass
+    map = staticmethod(map)  # pyright: ignore[reportAssignmentType]
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
