@@ -5,9 +5,10 @@ zeros, never another program. Runs are padded to one grid and mapped over. Trial
 a call of its own, each leaves out the terms that it has at zero.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
+from itertools import repeat
 from typing import Any
 
 import jax
@@ -232,7 +233,7 @@ class AugmentedModel:
         return found
 
     def _of_part(
-        self, thetas, part: Part | OscillationBatch
+        self, thetas, part: Part | OscillationBatch, limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self._program
         own = slice(None)
@@ -240,13 +241,17 @@ class AugmentedModel:
             own = np.s_[: part.recorded.shape[0], : part.recorded.shape[1]]
             part = self._in_shape(part)
 
-        def one(theta: np.ndarray) -> np.ndarray:
+        def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
+            theta, limit = trial
             used = program.in_use(theta)
             weights = self._weights(theta, part)
-            return np.asarray(program.predict(self._numbers, used, theta, part, weights))[own]
+            limit = np.float64(limit if program.is_judged_by_modes(theta) else np.inf)
+            found = program.predict(self._numbers, used, theta, part, weights, limit)
+            return np.asarray(found)[own]
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        found = in_threads(one, thetas, is_compiled=shape in program.met)
+        trials = zip(thetas, repeat(np.inf, len(thetas)) if limits is None else limits, strict=True)
+        found = in_threads(one, trials, is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
 
@@ -283,11 +288,18 @@ class AugmentedModel:
         thetas, batch
             Parameter vectors, and the runs that each predicts.
         limits
-            Sums of squares from which on a vector is of no use. What has reached its limit in tests
-            that are quickly predicted is infinite and not asked about the others, of which a
-            periodic state takes a hundred times as long as a steady one.
+            Sums of squares from which on a vector is of no use: its residuals are infinite. What
+            has reached its limit is not followed to the end of its runs, nor, in tests that are
+            quickly predicted, asked about the others, of which a periodic state takes a hundred
+            times as long as a steady one.
         """
         recorded, weight = np.asarray(batch.recorded), np.asarray(batch.weight)
+        if limits is not None and isinstance(batch, RunBatch):
+            off = (self._of_part(thetas, batch, limits) - recorded) * weight
+            with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
+                sums = np.sum(off**2, axis=(1, 2))
+            off[~(sums < limits)] = np.inf
+            return off
         if limits is None or not isinstance(batch, MixedBatch):
             predicted = self.predictions(thetas, batch)
             off = (predicted - recorded) * weight

@@ -5,9 +5,11 @@ fluid, with steps that are exact for constant coefficients, and the deformation 
 series with the fluid take away. What no candidate needs is not compiled.
 """
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
@@ -15,6 +17,41 @@ from discover.simulate.periodic_start import Cycle, periodic_start
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
+
+RUNS = "runs"
+"""Axis along which runs are followed side by side, all by the same number of steps."""
+
+
+class Judged(NamedTuple):
+    """What was measured, for a trial that is given up as soon as it is of no use.
+
+    Attributes
+    ----------
+    weight, recorded
+        Of one run, at step ends; of no weight where there is no sample.
+    beside
+        Recorded stress that the modes do not make, in Pa, at step ends.
+    limit
+        Sum over all runs of the squared weighted residuals from which on a trial is of no use.
+        Infinity follows every run to its end, also one whose stress runs away.
+    """
+
+    weight: Float[Array, " s"]
+    recorded: Float[Array, " s"]
+    beside: Float[Array, " s"]
+    limit: Float[Array, ""]
+
+    def missed(self, number: Int[Array, ""], stress: Float[Array, ""]) -> Float[Array, ""]:
+        """Return the squared weighted residual at the end of a step, counted from 0."""
+        at = number + 1
+        off = self.weight[at] * (stress + self.beside[at] - self.recorded[at])
+        # between samples, and past a run's last, a stress may be anything
+        return jnp.where(self.weight[at] > 0.0, off**2, 0.0)
+
+    def of_use(self, missed: Float[Array, ""]) -> Bool[Array, ""]:
+        """Return whether a trial that missed so much of each run by now is followed further."""
+        # what is no number is below no limit
+        return jnp.isinf(self.limit) | (jax.lax.psum(missed, RUNS) < self.limit)
 
 
 def integrate(
@@ -25,6 +62,7 @@ def integrate(
     cycle: Cycle | None = None,
     steps: Int[Array, ""] | None = None,
     weights: Float[Array, "steps 1 11 _"] | None = None,
+    judged: Judged | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
@@ -42,6 +80,9 @@ def integrate(
         How many steps are taken; those beyond are padding, and nothing is computed of them.
     weights
         Of the steps for the declared modes, where they are known; see `declared_weights`.
+    judged
+        What the stress is judged by on the way; zero where it is not followed to the end. None
+        follows it to the end.
     """
     width = jnp.diff(times)
     if cycle is not None:
@@ -107,16 +148,24 @@ def integrate(
     if cycle is not None:
         begun_at, begun = cycle.start, _begun(step, start, inputs, cycle, times, dynamics)
 
-    def taken(number, so_far):
-        carry, recorded = so_far
+    def taken(so_far):
+        number, carry, recorded, missed = so_far
         if cycle is not None:
             carry = jax.tree.map(lambda a, b: jnp.where(number == begun_at, b, a), carry, begun)
         carry, seen = step(carry, jax.tree.map(lambda of: of[number], inputs))
-        return carry, recorded.at[:, number].set(jnp.stack(seen))
+        if judged is not None:
+            missed = missed + judged.missed(number, seen[0])
+        return number + 1, carry, recorded.at[:, number].set(jnp.stack(seen)), missed
 
     count = len(width) if steps is None else steps
-    nothing = jnp.zeros((2, len(width)))
-    _, (stress, compliance_rate) = jax.lax.fori_loop(0, count, taken, (start, nothing))
+
+    def goes_on(so_far):
+        number, _, _, missed = so_far
+        left = number < count
+        return left if judged is None else left & judged.of_use(missed)
+
+    begin = (0, start, jnp.zeros((2, len(width))), zero)
+    _, _, (stress, compliance_rate), _ = jax.lax.while_loop(goes_on, taken, begin)
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides

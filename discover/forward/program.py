@@ -27,7 +27,7 @@ from discover.forward.batches import (
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series, declared_weights
 from discover.forward.imposed_stress import answer_to_stress
-from discover.forward.integrator import integrate
+from discover.forward.integrator import RUNS, Judged, integrate
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
 from discover.forward.starts.steady_states import steady_states
@@ -118,15 +118,25 @@ class Program:
             runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
         )
 
-    def _predict_all(self, numbers, used, theta, runs: Part | OscillationBatch, weights=None):
+    def is_judged_by_modes(self, theta: np.ndarray) -> bool:
+        """Return whether nothing alters the record after the modes, or gives way in series."""
+        after = (*self._signal, *self._series)
+        return not any(theta[self.slices[effect.name].start] for effect in after)
+
+    def _predict_all(
+        self, numbers, used, theta, runs: Part | OscillationBatch, weights=None, limit=np.inf
+    ):
         if isinstance(runs, OscillationBatch):
             return self._predict_moduli(numbers, used, theta, runs)
         if isinstance(runs, RunBatch):
             # of all runs, so that a step that is padding in each of them is not taken
             steps = jnp.max(runs.last_step)
-            return jax.vmap(self._predict_transient, in_axes=(None, None, None, 0, None, 0))(
-                numbers, used, theta, runs, steps, weights
+            of_run = jax.vmap(
+                self._predict_transient,
+                in_axes=(None, None, None, 0, None, 0, None),
+                axis_name=RUNS,
             )
+            return of_run(numbers, used, theta, runs, steps, weights, limit)
         return jax.vmap(self._predict_run, in_axes=(None, None, None, 0))(
             numbers, used, theta, runs
         )
@@ -136,7 +146,7 @@ class Program:
             return self._predict_steady_states(numbers, used, theta, run)
         return self._predict_strain(numbers, used, theta, run)
 
-    def _predict_transient(self, numbers, used, theta, run: RunBatch, steps, weights):
+    def _predict_transient(self, numbers, used, theta, run: RunBatch, steps, weights, limit):
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -160,7 +170,13 @@ class Program:
         cycle = None
         if run.cycle_steps:
             cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        stress, felt = integrate(dynamics, times, rate, flow, cycle, steps, weights)
+        # as it is where `is_judged_by_modes`, which is where there is a limit
+        beside = self._beside(numbers, theta, rate[::2], flow)
+        nothing = jnp.zeros_like(times)
+        weight = nothing.at[run.sample_index].add(run.weight)
+        recorded = nothing.at[run.sample_index].add(run.recorded)
+        judged = Judged(weight, recorded, beside, limit)
+        stress, felt = integrate(dynamics, times, rate, flow, cycle, steps, weights, judged)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)

@@ -11,7 +11,7 @@ from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.batches import OscillationBatch
 from discover.forward.least_squares import fit_batch
-from discover.protocols import oscillations
+from discover.protocols import oscillations, start_up
 from discover.protocols.control import steady_rates
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3
@@ -51,10 +51,10 @@ def followed(monkeypatch, model):
     """Return a list to which the number of vectors is added whenever a sweep is followed."""
     counts, of_part = [], model._of_part
 
-    def counting(thetas, part):
+    def counting(thetas, part, *limits):
         if isinstance(part, OscillationBatch):
             counts.append(len(thetas))
-        return of_part(thetas, part)
+        return of_part(thetas, part, *limits)
 
     monkeypatch.setattr(model, "_of_part", counting)
     return counts
@@ -100,3 +100,58 @@ def test_ranks_and_fits_are_those_of_trials_followed_to_the_end(problem, monkeyp
     np.testing.assert_allclose([r for _, r in pruned[0]], [r for _, r in plain[0]], rtol=1e-9)
     np.testing.assert_allclose(pruned[1], plain[1], rtol=1e-6)
     assert pruned[2] < plain[2]
+
+
+@pytest.fixture(scope="module")
+def start_ups():
+    """Two start-ups of the same fluid by scipy, and the same model."""
+    fluid = GiesekusFluid((MODULUS,), (TIME,), MOBILITY)
+    times = np.linspace(0.1, 6.0, 60)
+    runs = []
+    for rate in (1.0, 4.0):
+        stress = fluid.recorded("shear", lambda _, r=rate: r, times)
+        runs.append(Run(f"{rate}", times, start_up(rate), np.full(60, rate), stress))
+    model = AugmentedModel(
+        DeclaredModel.maxwell(MODULUS, TIME), [named_effects()[name] for name in NAMES]
+    )
+    return model, make_batch(runs)
+
+
+def test_a_transient_is_left_where_it_misses_too_much(start_ups):
+    model, batch = start_ups
+    right, maxwell = trials(model)[0], model.zero()
+    costs = np.sum(model.residuals([right, maxwell], batch) ** 2, axis=(1, 2))
+    assert costs[0] < 1e-6 < 1.0 < costs[1]
+    limits = np.array([0.1, 0.1])
+    found = model._of_part([right, maxwell], batch, limits)
+    whole = model._of_part([right, maxwell], batch)
+    np.testing.assert_array_equal(found[0], whole[0])
+    # up to where it had missed too much as it was, and nothing from there on
+    given_up = found[1, 1] == 0.0
+    assert given_up[-1]
+    assert not given_up[0]
+    np.testing.assert_array_equal(found[1, 1][~given_up], whole[1, 1][~given_up])
+    assert np.all(np.isinf(model.residuals([maxwell], batch, limits[:1])))
+
+
+def test_a_transient_whose_record_is_altered_afterwards_is_followed_to_the_end(start_ups):
+    model, batch = start_ups
+    theta = model.zero()
+    theta[model.positions("stress_gain")[0]] = 1e-6
+    found = model._of_part([theta], batch, np.array([0.1]))
+    np.testing.assert_array_equal(found, model._of_part([theta], batch))
+
+
+def test_fits_to_transients_are_those_of_trials_followed_to_the_end(start_ups, monkeypatch):
+    model, batch = start_ups
+    starts = [model.zero() for _ in NAMES]
+    free = [model.positions(name) for name in NAMES]
+    for start, at in zip(starts, free, strict=True):
+        start[at[0]] = 20.0 * model.first_trial[at[0]]  # from far off some steps are refused
+    left = fit_batch(model, batch, starts, free)
+    residuals = model.residuals
+    monkeypatch.setattr(
+        model, "residuals", lambda thetas, batch, limits=None: residuals(thetas, batch)
+    )
+    for one, other in zip(left, fit_batch(model, batch, starts, free), strict=True):
+        np.testing.assert_array_equal(one.theta, other.theta)

@@ -108,7 +108,9 @@ class RunBatch(eqx.Module):
             recorded=_longer(self.recorded, other.recorded.shape[1]),
             steps=self.steps and other.steps and self.steps.padded(other.steps.start.shape[1]),
         )
-        return jax.tree.map(lambda values: _more_runs(values, runs), longer)
+        padded = jax.tree.map(lambda values: _more_runs(values, runs), longer)
+        # a run that is there once more is judged once
+        return eqx.tree_at(lambda all: all.weight, padded, padded.weight.at[len(rate) :].set(0.0))
 
 
 def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
