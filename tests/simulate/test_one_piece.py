@@ -43,9 +43,8 @@ def test_no_candidate_of_the_loop_brings_a_matrix_product_into_the_steps(run, te
     model = AugmentedModel(DeclaredModel.maxwell([100.0, 10.0], [0.1, 1.0]), effects)
     theta, batch = model.zero(), make_batch([run])
     program = model._program
-    over_runs = jax.vmap(program._predict_run, in_axes=(None, None, None, 0))
     used = program.in_use(theta)
-    assert products(over_runs, model._numbers, used, theta, batch) == 0
+    assert products(program._predict_all, model._numbers, used, theta, batch) == 0
 
 
 def test_a_contraction_is_that_of_tensordot_without_a_product_of_matrices():
