@@ -111,9 +111,8 @@ def free_functions_in_model(
     beside = _sets(search)
     names = {name for one, _ in beside for name in one}
     effects = [e for e in search.model.effects if e.name in names]
-    model = AugmentedModel(
-        search.model.declared, [*effects, *(curve.effect for curve in curves)], data_scales(runs)
-    )
+    asked = [*effects, *(curve.effect for curve in curves)]
+    model = AugmentedModel(search.model.declared, asked, data_scales(runs), search.batch)
     trials = [(curve, one) for one, _ in beside for curve in curves]
     if not trials:
         return ()

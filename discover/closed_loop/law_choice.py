@@ -76,7 +76,7 @@ def choose_law(
     found: dict[str, tuple[AugmentedModel, Fit]] = {}
     for name in _contained_first(names):
         say(f"law {len(found) + 1} of {len(names)}: {LAWS[name].title}")
-        model = AugmentedModel(with_law(with_effects, name), [], scales)
+        model = AugmentedModel(with_law(with_effects, name), [], scales, fitted=batch)
         starts = first_starts(model, nothing_known=True)
         for effect, values in beside:
             for start in starts:

@@ -214,7 +214,7 @@ class SearchTask:
         # no candidates, but a bench may have a little of them
         unasked = {*FACTORS} - names
         asked = [*self.candidates, *map(make_effect, sorted(unasked)), *by_mode]
-        model = AugmentedModel(declared, asked, data_scales(self.fitted), like=self._batch)
+        model = AugmentedModel(declared, asked, data_scales(self.fitted), fitted=self._batch)
         admitted = admission(self.fitted, self.held_out)
         search = Search(
             model,

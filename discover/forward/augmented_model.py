@@ -7,6 +7,7 @@ a call of its own, each leaves out the terms that it has at zero.
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from itertools import repeat
 from typing import Any
@@ -54,8 +55,8 @@ class AugmentedModel:
         instants at which rates step.
     scales
         Size of each property of the data in which parameters are scaled; see `data_scales`.
-    like
-        Runs into whose shape others are laid where they fit, so that all share one program.
+    fitted
+        The fitted runs, whose program others share that are no longer.
     """
 
     def __init__(
@@ -63,13 +64,13 @@ class AugmentedModel:
         declared: DeclaredModel,
         effects: Sequence[AbstractEffect],
         scales: Mapping[str, float] | None = None,
-        like: Batch | None = None,
+        fitted: Batch | None = None,
     ):
         self.declared = declared
-        parts = like.parts if isinstance(like, MixedBatch) else (like,)
-        self._like = next((part for part in parts if isinstance(part, RunBatch)), None)
+        parts = fitted.parts if isinstance(fitted, MixedBatch) else (fitted,)
+        self._room = next((part.room for part in parts if isinstance(part, RunBatch)), None)
         self._last_weights: tuple[Any, float, Any] | None = None
-        self._laid_out: list[tuple[RunBatch, RunBatch]] = []
+        self._laid_out: list[tuple[RunBatch, list[RunBatch]]] = []
         names = {effect.name for effect in effects}
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
@@ -120,16 +121,24 @@ class AugmentedModel:
             jnp.asarray(float(declared.solvent_viscosity)),
         )
 
-    def at_moduli(self, modulus: Float[np.ndarray, " k"]) -> "AugmentedModel":
+    def at_moduli(
+        self, modulus: Float[np.ndarray, " k"], solvent_viscosity: float | None = None
+    ) -> "AugmentedModel":
         """Return the same model with other moduli in Pa, in the same program.
 
         For derivatives: an error that a sweep allows for may make one of many moduli negative.
+
+        Parameters
+        ----------
+        modulus
+            Of the modes, in Pa.
+        solvent_viscosity
+            In Pa s; None leaves it as it is.
         """
         other = copy(self)
-        numbers = self._numbers
-        moved = Numbers(
-            numbers.law, jnp.asarray(modulus), numbers.relaxation_time, numbers.solvent_viscosity
-        )
+        moved = replace(self._numbers, modulus=jnp.asarray(modulus))
+        if solvent_viscosity is not None:
+            moved = replace(moved, solvent_viscosity=jnp.asarray(float(solvent_viscosity)))
         other.__dict__["_numbers"] = moved
         return other
 
@@ -235,19 +244,23 @@ class AugmentedModel:
     def _of_part(
         self, thetas, part: Part | OscillationBatch, limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials runs *columns"]:
+        if not isinstance(part, RunBatch) or self._room is None:
+            return self._of_piece(thetas, part, limits)
+        runs, samples = part.recorded.shape
+        found = [self._of_piece(thetas, piece, limits) for piece in self._in_room(part)]
+        return np.concatenate(found, axis=1)[:, :runs, :samples]
+
+    def _of_piece(
+        self, thetas, part: Part | OscillationBatch, limits: Iterable[float] | None
+    ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self._program
-        own = slice(None)
-        if isinstance(part, RunBatch) and self._like is not None and part is not self._like:
-            own = np.s_[: part.recorded.shape[0], : part.recorded.shape[1]]
-            part = self._in_shape(part)
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial
             used = program.in_use(theta)
             weights = self._weights(theta, part)
             limit = np.float64(limit if program.is_judged_by_modes(theta) else np.inf)
-            found = program.predict(self._numbers, used, theta, part, weights, limit)
-            return np.asarray(found)[own]
+            return np.asarray(program.predict(self._numbers, used, theta, part, weights, limit))
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         trials = zip(thetas, repeat(np.inf, len(thetas)) if limits is None else limits, strict=True)
@@ -263,13 +276,13 @@ class AugmentedModel:
             self._last_weights = known
         return known[2]
 
-    def _in_shape(self, part: RunBatch) -> RunBatch:
-        """Return runs in the shape of those whose program they share, laid out once."""
-        assert self._like is not None
+    def _in_room(self, part: RunBatch) -> list[RunBatch]:
+        """Return runs in the room of the fitted ones, laid out once."""
+        assert self._room is not None
         for known, laid_out in self._laid_out:
             if known is part:
                 return laid_out
-        laid_out = part.in_shape_of(self._like)
+        laid_out = part.laid_out(self._room)
         self._laid_out.append((part, laid_out))
         return laid_out
 

@@ -1,6 +1,4 @@
-"""Runs laid out in the shape of others: one program, and what each predicts stays the same."""
-
-from dataclasses import replace
+"""Runs laid out in one room: one program, and what each predicts stays the same."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -33,16 +31,16 @@ MANY = [
 FEW = [record("short", start_up(2.0), 1.0, 12)]
 
 
-def model_of(like=None, declared=DECLARED):
-    model = AugmentedModel(declared, [*map(make_effect, AMPLITUDES)], like=like)
+def model_of(fitted=None):
+    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)], fitted=fitted)
     theta = model.zero()
     for name, value in AMPLITUDES.items():
         theta[model.positions(name)[0]] = value
     return model, theta
 
 
-@pytest.mark.parametrize("runs", [FEW, MANY[1:]])
-def test_runs_in_the_shape_of_others_are_predicted_as_in_their_own(runs):
+@pytest.mark.parametrize("runs", [FEW, MANY[1:], MANY + FEW + MANY[:1]])
+def test_runs_in_the_room_of_others_are_predicted_as_in_their_own(runs):
     batch = make_batch(runs)
     alone, theta = model_of()
     shared, _ = model_of(make_batch(MANY))
@@ -53,21 +51,19 @@ def test_runs_in_the_shape_of_others_are_predicted_as_in_their_own(runs):
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(expected))
 
 
-def test_fewer_and_shorter_runs_ask_for_no_program_of_their_own():
-    batch = make_batch(MANY)
-    shared, theta = model_of(batch)
+def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
+    batches = [make_batch(runs) for runs in (MANY, FEW, MANY[:2], [*MANY, *MANY])]
+    shared, theta = model_of(batches[0])
     shared._program.met.clear()
-    for runs in (MANY, FEW, MANY[:2]):
-        shared.predict(theta, batch if runs is MANY else make_batch(runs))
+    for batch in batches:
+        shared.predict(theta, batch)
     assert len(shared._program.met) == 1
 
 
-def test_runs_that_do_not_fit_stay_as_they_are():
+def test_longer_runs_stay_as_they_are():
     small, large = make_batch(FEW), make_batch(MANY)
-    assert large.in_shape_of(small) is large
-    assert small.in_shape_of(large).times.shape == large.times.shape
-    periodic = replace(large, cycle_steps=4)
-    assert small.in_shape_of(periodic) is small
+    assert large.laid_out(small.room) == [large]
+    assert [batch.room for batch in small.laid_out(large.room)] == [large.room]
 
 
 def test_a_rate_that_steps_between_samples_still_steps_there():
@@ -83,7 +79,7 @@ def test_a_rate_that_steps_between_samples_still_steps_there():
     assert run.rate_steps
     batch = make_batch([run])
     expected = AugmentedModel(declared, []).predict(np.array([0.0, 0.0, 0.3, 0.7]), batch)
-    shared = AugmentedModel(declared, [], like=make_batch([run, *others]))
+    shared = AugmentedModel(declared, [], fitted=make_batch([run, *others]))
     np.testing.assert_allclose(
         shared.predict(np.array([0.0, 0.0, 0.3, 0.7]), batch), expected, rtol=1e-10
     )

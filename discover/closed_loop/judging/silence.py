@@ -1,7 +1,6 @@
 """Do the records hold a signal of the fluid? Asked of them alone, and of a fit to them."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -43,7 +42,6 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
     of it the record, explains nothing, however small the misfit.
     """
     declared = model.declared
-    off = replace(declared, modulus=_OFF * declared.modulus, solvent_viscosity=0.0)
     theta, fluid = fit.theta.copy(), max(sum(at < declared.size for at in fit.free), 1)
     on = {*active, *(known.name for known in declared.effects)}
     for effect in model.effects:
@@ -51,7 +49,8 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
             at = model.positions(effect.name)
             theta[at[0]] = 0.0
             fluid += len(at)
-    without = AugmentedModel(off, model.effects).residuals([theta], batch)[0]
+    off = model.at_moduli(_OFF * declared.modulus, solvent_viscosity=0.0)
+    without = off.residuals([theta], batch)[0]
     weight = np.asarray(batch.weight)
     rows = judging(weight)
     lost, left = (judged_cost(r, weight) for r in (without, fit.residual))

@@ -38,8 +38,9 @@ def problem_by_mode(
     """Return the question which constants effects with these names have in each mode."""
     effects = {name: make_effect(name) for name in names}
     declared = model.without_effects(by_mode=tuple(effects))
-    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted))
-    return FitProblem(forward, make_batch(fitted), n_candidates)
+    batch = make_batch(fitted)
+    forward = AugmentedModel(declared, list(effects.values()), data_scales(fitted), batch)
+    return FitProblem(forward, batch, n_candidates)
 
 
 def fitted_by_mode(problem: FitProblem, names: Sequence[str]) -> tuple[Fit, dict[str, Degree]]:

@@ -105,8 +105,9 @@ def fit_named_effects(
     declared = model.without_effects(modulus_covariance=model.modulus_covariance)
     dated = [[with_rate_steps(run) for run in runs] for runs in (fitted, unseen)]
     declared, fitted, unseen = with_places(declared, *dated)
-    forward = AugmentedModel(declared, effects, data_scales(fitted))
-    problem = FitProblem(forward, make_batch(fitted), len(effects))
+    batch = make_batch(fitted)
+    forward = AugmentedModel(declared, effects, data_scales(fitted), batch)
+    problem = FitProblem(forward, batch, len(effects))
     best = _best_fits(problem, _sets(effects))
     if not best:
         return ()

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -81,36 +81,56 @@ class RunBatch(eqx.Module):
         )
         return float(np.max(ends))
 
-    def in_shape_of(self, other: "RunBatch") -> "RunBatch":
-        """Return these runs padded to the shape of others, so that both share one program.
+    @property
+    def room(self) -> "Room":
+        """Sizes of its arrays."""
+        runs, half_steps = self.times.shape
+        steps = 0 if self.steps is None else self.steps.start.shape[1]
+        return Room(runs, half_steps, self.sample_index.shape[1], steps)
 
-        A run more is the last once more, and what is beyond a run's end is at rest. Runs that do
-        not fit into the shape of the others stay as they are.
+    def laid_out(self, room: "Room") -> list["RunBatch"]:
+        """Return these runs padded to a room, in as many batches as they need.
+
+        A run more is the last once more, and what is beyond a run's end is at rest. Runs too long
+        for the room stay as they are.
         """
-        own, theirs = (jax.tree.leaves(batch) for batch in (self, other))
-        if jax.tree.structure(self) != jax.tree.structure(other) or any(
-            a.ndim != b.ndim or np.any(np.array(a.shape) > b.shape)
-            for a, b in zip(own, theirs, strict=True)
-        ):
-            return self
-        runs, m = other.times.shape
+        own = self.room
+        if own == room or np.any(np.array(own[1:]) > room[1:]):
+            return [self]
+        starts = range(0, own.runs, room.runs)
+        return [self._at(slice(start, start + room.runs))._padded(room) for start in starts]
+
+    def _at(self, rows: slice) -> "RunBatch":
+        return jax.tree.map(lambda values: values[rows], self)
+
+    def _padded(self, room: "Room") -> "RunBatch":
         times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
         spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
-        later = times[:, -1:] + spacing * np.arange(1, m - times.shape[1] + 1)
+        later = times[:, -1:] + spacing * np.arange(1, room.half_steps - times.shape[1] + 1)
         # a straight line for one step more: the slope of the rate at the last sample stays as it is
         one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
         longer = replace(
             self,
             times=on_device(np.concatenate([times, later], axis=1)),
-            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), m),
-            sample_index=_longer(self.sample_index, other.sample_index.shape[1], "edge"),
-            weight=_longer(self.weight, other.weight.shape[1]),
-            recorded=_longer(self.recorded, other.recorded.shape[1]),
-            steps=self.steps and other.steps and self.steps.padded(other.steps.start.shape[1]),
+            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), room.half_steps),
+            sample_index=_longer(self.sample_index, room.samples, "edge"),
+            weight=_longer(self.weight, room.samples),
+            recorded=_longer(self.recorded, room.samples),
+            steps=self.steps and self.steps.padded(room.rate_steps),
         )
-        padded = jax.tree.map(lambda values: _more_runs(values, runs), longer)
+        padded = jax.tree.map(lambda values: _more_runs(values, room.runs), longer)
         # a run that is there once more is judged once
-        return eqx.tree_at(lambda all: all.weight, padded, padded.weight.at[len(rate) :].set(0.0))
+        weight = padded.weight.at[len(rate) :].set(0.0)
+        return replace(padded, weight=weight)
+
+
+class Room(NamedTuple):
+    """Sizes of the arrays of a batch: runs, half steps, samples and steps of the rate of each."""
+
+    runs: int
+    half_steps: int
+    samples: int
+    rate_steps: int
 
 
 def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
