@@ -58,11 +58,11 @@ def integrate(
     dynamics: Dynamics,
     times: Float[Array, " s"],
     rate: Float[Array, " m"],
+    steps: Int[Array, ""],
+    judged: Judged,
     flow: Kinematics | None = None,
     cycle: Cycle | None = None,
-    steps: Int[Array, ""] | None = None,
     weights: Float[Array, "steps 1 11 _"] | None = None,
-    judged: Judged | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
@@ -72,17 +72,16 @@ def integrate(
         The fluid, with what gives way in series with it.
     times, rate
         Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
+    steps
+        How many steps are taken; those beyond are padding, and nothing is computed of them.
+    judged
+        What the stress is judged by on the way; zero where it is not followed to the end.
     flow
         Which flow has this rate; None is simple shear.
     cycle
         The last cycle before the record, of a batch that holds runs with a periodic start.
-    steps
-        How many steps are taken; those beyond are padding, and nothing is computed of them.
     weights
         Of the steps for the declared modes, where they are known; see `declared_weights`.
-    judged
-        What the stress is judged by on the way; zero where it is not followed to the end. None
-        follows it to the end.
     """
     width = jnp.diff(times)
     if cycle is not None:
@@ -153,16 +152,12 @@ def integrate(
         if cycle is not None:
             carry = jax.tree.map(lambda a, b: jnp.where(number == begun_at, b, a), carry, begun)
         carry, seen = step(carry, jax.tree.map(lambda of: of[number], inputs))
-        if judged is not None:
-            missed = missed + judged.missed(number, seen[0])
+        missed = missed + judged.missed(number, seen[0])
         return number + 1, carry, recorded.at[:, number].set(jnp.stack(seen)), missed
-
-    count = len(width) if steps is None else steps
 
     def goes_on(so_far):
         number, _, _, missed = so_far
-        left = number < count
-        return left if judged is None else left & judged.of_use(missed)
+        return (number < steps) & judged.of_use(missed)
 
     begin = (0, start, jnp.zeros((2, len(width))), zero)
     _, _, (stress, compliance_rate), _ = jax.lax.while_loop(goes_on, taken, begin)

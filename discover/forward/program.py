@@ -176,7 +176,7 @@ class Program:
         weight = nothing.at[run.sample_index].add(run.weight)
         recorded = nothing.at[run.sample_index].add(run.recorded)
         judged = Judged(weight, recorded, beside, limit)
-        stress, felt = integrate(dynamics, times, rate, flow, cycle, steps, weights, judged)
+        stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
         stress = stress + self._beside(numbers, theta, felt, flow)
         for effect in self._signal:
             record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
