@@ -26,11 +26,12 @@ def main() -> None:
     import jax
     import jax.numpy as jnp
 
+    from discover.forward.steps.exponential_runge_kutta import ExponentialRungeKutta4
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.learners.tbnn_ude.recipe_paper import make_network
     from discover.learners.tbnn_ude.variational import states_and_jacobian
     from discover.learners.tbnn_ude.weights import Rebuild
-    from discover.simulate import ExponentialRungeKutta4, synthetic_dataset
+    from discover.simulate import synthetic_dataset
 
     data = synthetic_dataset("giesekus", {"alpha": 0.2})
     problem = make_problem(data.runs, np.ones(1), np.ones(1))

@@ -24,10 +24,10 @@ from independent.named import CONSTANTS, material
 from scipy.integrate import solve_ivp
 
 from discover.forward.fluids import observed_in_batch
+from discover.forward.grids.flow_batch import lay_out
 from discover.laws import Fluid, make_law
 from discover.precision import enable_x64
 from discover.protocols import FlowProtocol, imposed_stress, in_flow, oscillatory_shear, start_up
-from discover.simulate.flow_batch import lay_out
 
 SHEAR_RATE, AMPLITUDE, FREQUENCY, HENCKY_RATE = 3.0, 2.0, 1.0, 0.8
 STRESS, RISE, SOLVENT = 0.6, 1.0, 0.1

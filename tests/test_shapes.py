@@ -5,8 +5,8 @@ import jaxtyping
 import numpy as np
 import pytest
 
+from discover.forward.grids.grid import make_grid
 from discover.protocols import start_up
-from discover.simulate.grid import make_grid
 
 
 def test_a_shape_that_does_not_fit_is_an_error():

@@ -8,14 +8,14 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
-from discover.programs import compiled
-from discover.protocols.kinematics import Kinematics
-from discover.simulate.exponential_weights import (
+from discover.forward.steps.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,
     relax,
 )
+from discover.programs import compiled
+from discover.protocols.kinematics import Kinematics
 from tensor_library.contraction import contracted
 
 Levels = tuple[Float[Array, "..."], ...]
@@ -106,6 +106,9 @@ class Dynamics(NamedTuple):
         Of each tensor that stands first among them, of each mode, as the law's.
     in_one_piece
         Whether no matrix product stands in the steps; see `contracted`.
+    columns
+        How many derivatives stand beside each number of the modes: σ then has shape (s, 1 +
+        columns, k), and `slope` is of all of it. 0 leaves σ as it is.
     """
 
     slope: Callable
@@ -121,6 +124,7 @@ class Dynamics(NamedTuple):
     variables: int = 0
     shares: Float[Array, "tensors k"] | None = None
     in_one_piece: bool = True
+    columns: int = 0
 
     @property
     def tensors(self) -> int:
@@ -176,7 +180,7 @@ class Dynamics(NamedTuple):
         self,
         pieces: tuple[Float[Array, "kinds 11 _"], ...],
         width: Float[Array, ""],
-        slow: Float[Array, ""],
+        slow: Float[Array, ""] | float,
     ) -> StressWeights:
         """Return the weights of one step.
 
@@ -208,14 +212,15 @@ class Dynamics(NamedTuple):
         )
         return StressWeights(whole, trace, self.relaxations[0, 1], beside, self.shares)
 
-    def rest(self) -> tuple[Float[Array, "s k"], Levels]:
+    def rest(self) -> tuple[Float[Array, "s *c k"], Levels]:
         """Return modes and states at rest."""
         modulus = self.modes.modulus
         levels = (
             jnp.full((effect.levels,) if effect.levels > 1 else (), effect.rest, modulus.dtype)
             for effect in self.states
         )
-        return jnp.zeros((4 + self.variables, len(modulus))), tuple(levels)
+        beside = (1 + self.columns,) if self.columns else ()
+        return jnp.zeros((4 + self.variables, *beside, len(modulus))), tuple(levels)
 
     def later(
         self,
@@ -264,7 +269,56 @@ class Dynamics(NamedTuple):
             return self.slope(stress, self.modes.relaxation_time * gradient)
         return self.slope(stress, slow * self.modes.relaxation_time * gradient) / slow
 
-    def summed(self, of_modes: Float[Array, " k"]) -> Float[Array, ""]:
+    def stage(
+        self, w: StressWeights, slow: Float[Array, ""] | float, flow: Kinematics | None
+    ) -> Callable[[Float[Array, "s *c k"], tuple], Float[Array, "s *c k"]]:
+        """Return what is evaluated in each stage of a step.
+
+        Parameters
+        ----------
+        w
+            Weights of the step.
+        slow
+            The factor on all times in its middle.
+        flow
+            Which flow it is; None is simple shear.
+
+        Returns
+        -------
+        From the stress in a stage, and the rate and the factor on all times there, to what of the
+        change is not relaxation at the rates of the weights.
+        """
+
+        def remainder(stress, given):
+            rate, now = given
+            change = slow * self.change(stress, rate, now, flow)
+            return w.remainder(stress, change, self.decay)
+
+        return remainder
+
+    def after_step(
+        self,
+        stress: Float[Array, "s *c k"],
+        rates: Float[Array, "3"],
+        width: Float[Array, ""],
+        flow: Kinematics | None,
+    ) -> Float[Array, "s *c k"]:
+        """Return the modes after a step at a given rate, where no state changes with them.
+
+        Parameters
+        ----------
+        rates
+            At its beginning, in its middle and at its end, in 1/s.
+        width
+            Of the step in s.
+        """
+        w = self.weights_of_step(tuple(piece[0] for piece in self.weights(width[None])), width, 1.0)
+        stage = self.stage(w, 1.0, flow)
+        first, middle, last = rates
+        felt = jnp.stack([first, middle, middle, last])
+        return w.step(stress, lambda state, rate: (stage(state, (rate, 1.0)), ()), felt)[0]
+
+    def summed(self, of_modes: Float[Array, "*c k"]) -> Float[Array, " *c"]:
         """Return a stress in Pa of that of each mode over its modulus."""
         return contracted(of_modes, self.modes.modulus, self.in_one_piece)
 

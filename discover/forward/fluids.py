@@ -8,37 +8,27 @@ implicit function.
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
-import equinox as eqx
+import diffrax
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jax.custom_derivatives import SymbolicZero
 from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
+from discover.forward.following import Observe, begun, follow, without_derivatives
+from discover.forward.grids.flow_batch import FlowBatch
+from discover.forward.grids.grid import IntegrationGrid
 from discover.forward.imposed_stress import answer_to_stress
+from discover.forward.in_reverse import solve_in_reverse
 from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
-from discover.protocols.protocol import FlowProtocol, recorded_at
-from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.following import without_derivatives
-from discover.simulate.grid import IntegrationGrid
-from discover.simulate.solve import (
-    SimulationError,
-    simulate,
-    solve_on_grid,
-    solve_states_on_grid,
-)
-from tensor_library.kinematics import VelocityGradient
+from discover.protocols.protocol import FlowProtocol
 
 Numbers = TypeVar("Numbers")
-
-_SAMPLES, _STEPS = 64, 256
 
 # Periodic states that are solved for side by side
 _GROUP = 8
@@ -66,7 +56,7 @@ class AtSamples(NamedTuple):
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
     """Return what is seen of a fluid in one flow. Not finite where it runs away."""
     if protocol.control in FOLLOWED:
-        states = solve_states_on_grid(fluid, protocol, grid)
+        states = _at_given_rate(fluid, protocol, grid, lambda stress, _: stress.T)
         rate = jax.vmap(protocol.rate)(grid.sample_times)
         gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
         stress = jax.vmap(fluid.stress)(states, gradient)
@@ -75,7 +65,10 @@ def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> A
 
 
 def observed_on_grid(
-    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, adjoint: Any = None
+    fluid: Fluid,
+    protocol: FlowProtocol,
+    grid: IntegrationGrid,
+    adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> Inexact[Array, "n 3"]:
     """Return what `AtSamples.observed` holds, at the samples of one grid."""
     if protocol.control in FOLLOWED:
@@ -83,40 +76,54 @@ def observed_on_grid(
     return at_samples(fluid, protocol, grid).observed
 
 
+def solve_on_grid(
+    fluid: Fluid,
+    protocol: FlowProtocol,
+    grid: IntegrationGrid,
+    adjoint: diffrax.AbstractAdjoint | None = None,
+) -> Float[Array, "n 4"]:
+    """Return the stresses at a given rate at the samples of one grid.
+
+    Parameters
+    ----------
+    fluid, protocol, grid
+        As in `follow`.
+    adjoint
+        How diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``. None
+        is for values and forward mode: the same steps, traced and compiled in a third of the time.
+
+    Returns
+    -------
+    σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
+    """
+    if adjoint is None or protocol.control == "steady":
+        return _at_given_rate(fluid, protocol, grid, lambda s, rate: fluid.stress(s.T, rate))
+    dynamics, fixed = _with_fixed(fluid, protocol)
+    start = begun(dynamics, fixed, protocol, grid).T
+    return solve_in_reverse(fluid, protocol, grid, start, adjoint)
+
+
+def _at_given_rate(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
+    return follow(*_with_fixed(fluid, protocol), protocol, grid, observe)
+
+
+def _with_fixed(fluid: Fluid, protocol: FlowProtocol) -> tuple[Dynamics, Dynamics]:
+    """Return a fluid as the integrators take it, and once more without derivatives."""
+    return dynamics_of_fluid(fluid, protocol), dynamics_of_fluid(
+        without_derivatives(fluid), protocol
+    )
+
+
+@compiled
+def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
+    """Return the stresses of one fluid in a batch of runs, on fixed grids."""
+    return flows.over(partial(solve_on_grid, fluid))
+
+
 @compiled
 def observed_in_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 3"]:
     """Return what is recorded of one fluid in a batch of runs, and N1 and N2."""
     return flows.over(partial(observed_on_grid, fluid))
-
-
-def observe(
-    fluid: Fluid, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-) -> Float[np.ndarray, "n 3"]:
-    """Return what is recorded of a fluid in one flow of any control, and N1 and N2 in Pa.
-
-    At a given rate to a tolerance, as `simulate` does.
-
-    Parameters
-    ----------
-    fluid, protocol, times
-        As in `simulate`.
-    """
-    if protocol.control in FOLLOWED:
-        stress = simulate(fluid, protocol, times)
-        recorded = recorded_at(protocol, stress.components)
-        n1, n2 = stress.first_normal_stress_difference, stress.second_normal_stress_difference
-        return np.stack([recorded, n1, n2], axis=-1)
-    n = len(times)
-    # lengths rounded up, so that flows share programs
-    flows = lay_out([protocol], [times], n + -n % _SAMPLES).with_steps_in(_STEPS)
-    observed = np.asarray(observed_in_batch(fluid, flows))[0, :n]
-    if not np.all(np.isfinite(observed)):
-        what = "bears this stress" if protocol.control == "stress" else "becomes periodic"
-        raise SimulationError(
-            f"The law could not be integrated: nothing shows that it {what}. Check its parameters "
-            "and the flow."
-        )
-    return observed
 
 
 def solved_on_grid(
@@ -194,14 +201,6 @@ def _observed(stress: Float[Array, "n 4"], protocol: FlowProtocol) -> Float[Arra
 
 def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
     """Return a fluid as the integrators take it."""
-    dynamics = dynamics_of_modes(
-        over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law, -1),
-        fluid.modulus,
-        fluid.relaxation_time,
-        fluid.solvent_viscosity,
-        protocol,
-        fluid.law.variables,
-    )
     law, count = fluid.law, fluid.n_modes
 
     def of_modes(name):
@@ -209,88 +208,16 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
         # a choice of method, through which no derivative passes
         return jax.lax.stop_gradient(jnp.moveaxis(values, 0, -1))
 
-    return dynamics._replace(
-        linear_relaxation=law.linear_relaxation,
-        relaxations=of_modes("relaxations") if law.retracts else None,
-        shares=of_modes("shares") if law.tensors else None,
-    )
-
-
-def dynamics_of_modes(
-    slope: Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "s k"]],
-    modulus: Float[Array, " k"],
-    relaxation_time: Float[Array, " k"],
-    solvent_viscosity: Float[Array, ""] | float,
-    protocol: FlowProtocol,
-    variables: int = 0,
-) -> Dynamics:
-    """Return modes as the integrators take them.
-
-    Parameters
-    ----------
-    slope
-        Dimensionless dσ/dt of all modes, of their σ and their λL, modes along the last axis.
-    modulus, relaxation_time, solvent_viscosity
-        In Pa, s and Pa s.
-    variables
-        Structure variables of each mode.
-    """
     viscous = 1.0 if protocol.kinematics is None else protocol.kinematics.viscous
     return Dynamics(
-        slope=slope,
-        # the natural split in any case; where it lies decides accuracy only
-        linear_relaxation=True,
-        declared=Modes(modulus, relaxation_time),
+        slope=over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1),
+        linear_relaxation=law.linear_relaxation,
+        declared=Modes(fluid.modulus, fluid.relaxation_time),
         extra=None,
         states={},
         series=None,
-        viscosity=jnp.asarray(solvent_viscosity * viscous),
-        variables=variables,
+        viscosity=jnp.asarray(fluid.solvent_viscosity * viscous),
+        relaxations=of_modes("relaxations") if law.retracts else None,
+        variables=law.variables,
+        shares=of_modes("shares") if law.tensors else None,
     )
-
-
-def with_cheap_tangents(
-    stress_rate: Callable[[Any, Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
-    given: Any,
-) -> Callable[[Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]]:
-    """Return the rate of a law whose tangents cost little, however many there are.
-
-    Four pullbacks give the derivative by stress, rate and every number of the law at once; each
-    tangent is then a product with a small matrix, where one through the law evaluates all of it.
-
-    Parameters
-    ----------
-    stress_rate
-        Of what is given, of a tree of numbers by which is differentiated, of σ and of λL.
-    given
-        A tree through which no derivative passes.
-    """
-    # what is traced has to be handed in: a rule for derivatives must not close over it
-    arrays, rest = eqx.partition(given, eqx.is_array)
-
-    def of_all(arrays, numbers, stress, gradient):
-        return stress_rate(eqx.combine(arrays, rest), numbers, stress, gradient)
-
-    rate = jax.custom_jvp(of_all)
-
-    def tangent(primals, tangents):
-        arrays, *moving = primals
-        still = [isinstance(leaf, SymbolicZero) for leaf in jax.tree.leaves(tangents[1])]
-        if all(still):
-            # few tangents, of the state or of the rate, are carried through the law
-            flow = [
-                jnp.zeros_like(value) if isinstance(moved, SymbolicZero) else moved
-                for value, moved in zip(moving[1:], tangents[2:], strict=True)
-            ]
-            return jax.jvp(partial(of_all, arrays, moving[0]), tuple(moving[1:]), tuple(flow))
-        value, pull = jax.vjp(partial(of_all, arrays), *moving)
-        rows = jax.vmap(pull)(jnp.eye(value.shape[0]))
-        total = jnp.zeros_like(value)
-        pairs = zip(*map(jax.tree.leaves, (rows, tuple(tangents[1:]))), strict=True)
-        for row, moved in pairs:
-            if not isinstance(moved, SymbolicZero):
-                total = total + jnp.tensordot(row, moved, axes=moved.ndim)
-        return value, total
-
-    rate.defjvp(tangent, symbolic_zeros=True)
-    return partial(rate, arrays)

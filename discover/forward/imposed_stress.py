@@ -86,9 +86,10 @@ def answer_to_stress(
             """Return what the balance misses at rates in the middle and at the end; the modes."""
             middle, last = rates
 
+            of_fluid = fluid.stage(w, slow, flow)
+
             def stage(state, rate):
-                change = slow * fluid.change(state, rate, slow, flow)
-                remainder = w.remainder(state, change, fluid.decay)
+                remainder = of_fluid(state, (rate, slow))
                 return remainder, remainder
 
             in_stages = jnp.stack([2.0 * middle - last, middle, middle, last])

@@ -12,8 +12,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.forward.dynamics import Dynamics
+from discover.forward.starts.periodic_start import Cycle, periodic_start
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.periodic_start import Cycle, periodic_start
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 _JUMP = 1e-9
@@ -88,8 +88,6 @@ def integrate(
         # a state that stays where it is says nothing of where a cycle brings it
         dynamics = dynamics._replace(states_in_use=None)
     states, series = dynamics.states, dynamics.series
-    # so that it is traced once, and not at each of the four stages
-    slope = jax.jit(lambda stress, rate, slow: dynamics.change(stress, rate, slow, flow))
     combined = dynamics.combined
 
     def step(carry, inputs):
@@ -104,11 +102,9 @@ def integrate(
         slow_last = combined("time_factor", at_end)
         w = dynamics.weights_of_step(weights, h, slow_middle)
 
-        def remainder(stress, rate, slow):
-            change = slow_middle * slope(stress, rate, slow)
-            return w.remainder(stress, change, dynamics.decay)
-
-        n1 = remainder(stress, first_rate + compliance_rate, slow_first)
+        # so that it is traced once, and not at each of the four stages
+        remainder = jax.jit(dynamics.stage(w, slow_middle, flow))
+        n1 = remainder(stress, (first_rate + compliance_rate, slow_first))
         if series is not None:
             scale_last = combined("modulus_factor", at_end)
             n1, compliance_rate = _compliance_rate(
@@ -116,9 +112,9 @@ def integrate(
                 slow_middle, first_rate, last_rate, h, times[-1],
             )  # fmt: skip
         middle_rate, last_rate = middle_rate + compliance_rate, last_rate + compliance_rate
-        n2 = remainder(w.second(stress, n1), middle_rate, slow_middle)
-        n3 = remainder(w.third(stress, n1, n2), middle_rate, slow_middle)
-        n4 = remainder(w.fourth(stress, n1, n3), last_rate, slow_last)
+        n2 = remainder(w.second(stress, n1), (middle_rate, slow_middle))
+        n3 = remainder(w.third(stress, n1, n2), (middle_rate, slow_middle))
+        n4 = remainder(w.fourth(stress, n1, n3), (last_rate, slow_last))
         after = w.end(stress, n1, n2, n3, n4)
 
         # the states once more, now with the mean of the stress at both ends

@@ -29,6 +29,7 @@ from discover.forward.dynamics import Dynamics, Modes, Series, declared_weights
 from discover.forward.imposed_stress import answer_to_stress
 from discover.forward.integrator import RUNS, Judged, integrate
 from discover.forward.starts.half_cycles import first_harmonic
+from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
 from discover.forward.starts.steady_states import steady_states
 from discover.forward.structure import Numbers, Structure
@@ -36,7 +37,6 @@ from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
-from discover.simulate.periodic_start import Cycle
 from tensor_library.kinematics import rate_of_deformation
 
 # Modes up to which the steps at a given rate are one piece of machine code; see `contracted`. With

@@ -13,6 +13,8 @@ import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
+from discover.forward.fluids import solve_on_grid
+from discover.forward.grids.grid import IntegrationGrid, make_grids
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
@@ -25,8 +27,7 @@ from discover.protocols.paper import (
     paper_training_protocols,
 )
 from discover.protocols.protocol import FlowProtocol, in_flow, stack_protocols, start_up
-from discover.simulate.grid import IntegrationGrid, make_grids
-from discover.simulate.solve import SimulationError, simulate, solve_on_grid
+from discover.simulate.solve import SimulationError, simulate
 
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
 

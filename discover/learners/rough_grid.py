@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 from jaxtyping import Float
 
+from discover.forward.grids.flow_batch import FlowBatch
 from discover.protocols.kinematics import STATES
-from discover.simulate.flow_batch import FlowBatch
 
 AFFORDABLE = 6000.0
 """Modes times steps of all runs up to which every trial is made on the fine grid."""

@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.run import Run
+from discover.forward.grids.flow_batch import FlowBatch
 from discover.learners.rough_grid import AFFORDABLE, WORTH_IT
-from discover.simulate.flow_batch import FlowBatch
 from discover.words import percent_of
 
 SETTLED = 50.0

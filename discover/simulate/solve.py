@@ -1,26 +1,28 @@
-"""Fluid + protocol → stresses: an adaptive reference and a fast path on fixed grids."""
+"""Fluid + protocol → stresses, to a tolerance."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import diffrax
-import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.forward.fluids import observed_in_batch, solve_batch
+from discover.forward.grids.flow_batch import lay_out
+from discover.forward.grids.grid import had_gone_on
+from discover.forward.in_reverse import stress_of, vector_field
+from discover.forward.steps.exponential_runge_kutta import exponential_steps
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled, on_device
-from discover.protocols.protocol import FlowProtocol, shear_rates
-from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
-from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.following import Following, begun, follow
-from discover.simulate.grid import IntegrationGrid, had_gone_on
-from discover.simulate.steady_states import steady_state
+from discover.protocols.kinematics import FOLLOWED
+from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
 
 MAX_STEPS = 100_000
+
+# Lengths rounded up, so that flows share programs
+_SAMPLES, _STEPS = 64, 256
 
 _BUCKET = 401
 """Flows with up to so many samples share one program."""
@@ -61,45 +63,20 @@ class ShearStress:
         return self.components[:, 1] - self.components[:, 2]
 
 
-def _vector_field(t, state, args):
-    fluid, protocol = args
-    return fluid.state_rate(state, protocol.velocity_gradient(t))
-
-
-def _observe(t, state, args):
-    fluid, protocol = args
-    return fluid.stress(state, protocol.velocity_gradient(t))
-
-
-def exponential_steps(fluid: Fluid, columns: bool = False) -> ExponentialRungeKutta4:
-    """Return the method that is exact for the linear relaxation of a fluid.
-
-    Parameters
-    ----------
-    columns
-        Whether states have derivatives beside them, along a third axis.
-    """
-    # where the split lies is a choice of method, not of model: no gradient through it
-    decay = jax.lax.stop_gradient(fluid.decay_rate())
-    tensors = 1 + fluid.law.tensors if fluid.law.retracts else 0
-    shares = jax.lax.stop_gradient(fluid.law.shares()) if fluid.law.tensors else None
-    return ExponentialRungeKutta4(decay[..., None] if columns else decay, tensors, shares)
-
-
 @compiled
 def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
     controller = diffrax.ClipStepSizeController(
         diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times, jump_ts=jumps
     )
     solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_vector_field),
+        diffrax.ODETerm(vector_field),
         solver,
         protocol.begins,
         times[-1],
         None,
         fluid.rest(),
         args=(fluid, protocol),
-        saveat=diffrax.SaveAt(ts=times, fn=_observe),
+        saveat=diffrax.SaveAt(ts=times, fn=stress_of),
         stepsize_controller=controller,
         max_steps=MAX_STEPS,
         throw=False,
@@ -191,87 +168,39 @@ def _solved_for(
     return ShearStress(times, components)
 
 
+def observe(
+    fluid: Fluid, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, "n 3"]:
+    """Return what is recorded of a fluid in one flow of any control, and N1 and N2 in Pa.
+
+    At a given rate to a tolerance, as `simulate` does.
+
+    Parameters
+    ----------
+    fluid, protocol, times
+        As in `simulate`.
+    """
+    if protocol.control in FOLLOWED:
+        stress = simulate(fluid, protocol, times)
+        recorded = recorded_at(protocol, stress.components)
+        n1, n2 = stress.first_normal_stress_difference, stress.second_normal_stress_difference
+        return np.stack([recorded, n1, n2], axis=-1)
+    n = len(times)
+    flows = lay_out([protocol], [times], n + -n % _SAMPLES).with_steps_in(_STEPS)
+    observed = np.asarray(observed_in_batch(fluid, flows))[0, :n]
+    if not np.all(np.isfinite(observed)):
+        what = "bears this stress" if protocol.control == "stress" else "becomes periodic"
+        raise SimulationError(
+            f"The law could not be integrated: nothing shows that it {what}. Check its parameters "
+            "and the flow."
+        )
+    return observed
+
+
 def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
     """Return the times with a few more just after the end."""
     step = 1e-6 * max(float(times[-1]), 1e-12)
     return np.concatenate([times, times[-1] + step * np.arange(1, -times.size % _BUCKET + 1)])
-
-
-def solve_on_grid(
-    fluid: Fluid,
-    protocol: FlowProtocol,
-    grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
-) -> Float[Array, "n 4"]:
-    """Return the stresses at the samples of one grid, by fixed exponential Runge–Kutta steps.
-
-    Made to be transformed: `jax.vmap` over runs, `jax.jvp`, reverse mode with an adjoint. A law
-    that runs away gives infinite or nan values, never an error, so that a fit can reject the trial.
-
-    Parameters
-    ----------
-    fluid, protocol
-        As in `simulate`.
-    adjoint
-        How diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``. None
-        is for values and forward mode: the same steps, traced and compiled in a third of the time.
-
-    Returns
-    -------
-    σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
-    """
-    if adjoint is None or protocol.control == "steady":
-        return _in_fixed_steps(fluid, protocol, grid, _observe)
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_vector_field),
-        exponential_steps(fluid),
-        grid.times[0],
-        grid.times[-1],
-        None,
-        begun(_following(fluid, protocol), grid),
-        args=(fluid, protocol),
-        saveat=diffrax.SaveAt(t0=True, steps=True, fn=_observe),
-        stepsize_controller=diffrax.StepTo(grid.times),
-        adjoint=adjoint,
-        max_steps=grid.times.shape[0] - 1,
-        throw=False,
-    )
-    return jnp.asarray(solution.ys)[grid.sample_index]
-
-
-def solve_states_on_grid(
-    fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid
-) -> Float[Array, "n k s"]:
-    """Return the dimensionless state of every mode at the samples of one grid.
-
-    As `solve_on_grid` without an adjoint, but before the modes are added. Structure variables of
-    the law stand behind the four components of σ.
-    """
-    return _in_fixed_steps(fluid, protocol, grid, None)
-
-
-def _in_fixed_steps(fluid, protocol, grid, observe):
-    if protocol.control == "steady":
-        return _in_steady_flow(fluid, protocol, grid, observe)
-    return follow(_following(fluid, protocol), grid, observe)
-
-
-def _following(fluid, protocol) -> Following:
-    return Following(_vector_field, exponential_steps(fluid), fluid.rest(), (fluid, protocol))
-
-
-def _in_steady_flow(fluid, protocol, grid, observe):
-    def at(time):
-        state = steady_state(fluid, protocol.velocity_gradient(time))
-        return state if observe is None else observe(time, state, (fluid, protocol))
-
-    return grid.of_states(at)
-
-
-@compiled
-def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
-    """Return the stresses of one fluid in a batch of runs, on fixed grids."""
-    return flows.over(partial(solve_on_grid, fluid))
 
 
 def _change_in_any_flow(t, stress, args):

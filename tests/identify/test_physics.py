@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.forward.grids import lay_out
 from discover.identify.soundness.physics import check_physics
 from discover.identify.soundness.steady_states import (
     is_stable,
@@ -15,7 +16,6 @@ from discover.identify.soundness.steady_states import (
 )
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
 from discover.protocols import oscillatory_shear
-from discover.simulate import lay_out
 from tensor_library import TermLibrary, parse_term
 
 FLOWS = {f"laos_{wi:g}": oscillatory_shear(wi, 1.0) for wi in (1.0, 2.0)}

@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.forward.grids import make_grids
 from discover.identify.exact.exact_series import compare_series
 from discover.identify.side_by_side.histories import SAME, differences, random_histories
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
@@ -20,7 +21,7 @@ from discover.laws import (
     UpperConvectedMaxwell,
 )
 from discover.protocols import in_flow, stack_protocols, start_up
-from discover.simulate import make_grids, simulate_homogeneous_flow
+from discover.simulate import simulate_homogeneous_flow
 from tensor_library import build_library, parse_term, uniaxial_extension
 
 SLIP = "sigma.gammadot+gammadot.sigma"

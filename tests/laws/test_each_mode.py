@@ -12,6 +12,7 @@ from discover.effects import make_effect
 from discover.equations import AugmentedLaw, law_parts
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.starts.approach import steady_state
 from discover.identify.soundness.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.checking import check_law
@@ -24,7 +25,6 @@ from discover.learners.trajectories.problem import make_problem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.protocols import start_up
 from discover.simulate import simulate
-from discover.simulate.steady_states import steady_state
 from discover.simulate.synthetic import linear_sweep
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term

@@ -14,13 +14,12 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.fluids import dynamics_of_fluid
+from discover.forward.fluids import at_samples, dynamics_of_fluid, solve_batch
+from discover.forward.grids.flow_batch import lay_out
 from discover.forward.starts.half_cycles import first_harmonic, half_cycle
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, oscillations, start_up
 from discover.simulate import simulate
-from discover.simulate.flow_batch import lay_out
-from discover.simulate.solve import solve_batch, solve_states_on_grid
 
 CONSTANTS = {
     "long_fraction": 0.3,
@@ -202,7 +201,7 @@ def test_no_flow_takes_a_conformation_away():
     """Of any pair, in a reversal at Wi 20."""
     flows = lay_out([dc.step_rates([0.0, 1.0], [20.0, -20.0])], [np.linspace(0.0, 2.0, 81)])
     protocol, grid = jax.tree.map(lambda leaf: leaf[0], flows.parts[0])
-    states = np.asarray(jax.jit(solve_states_on_grid)(fluid(), protocol, grid))[:, 0]
+    states = np.asarray(jax.jit(at_samples)(fluid(), protocol, grid).states)[:, 0]
     for first in range(0, 20, 4):
         s11, s22, s33, s12 = states[:, first : first + 4].T + np.array([[1], [1], [1], [0]])
         assert np.min((s11 + s22) / 2 - np.hypot((s11 - s22) / 2, s12)) > 0.0

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from shared_flows import LIBRARY, small_dataset
 
+from discover.forward.fluids import solve_batch
 from discover.laws import Fluid, LibraryExpansion
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import make_problem
 from discover.learners.trajectories.sensitivities import linearise
-from discover.simulate import solve_batch
 from tensor_library import build_library, from_shear
 
 N = len(LIBRARY)

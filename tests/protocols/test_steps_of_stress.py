@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from discover.forward.grids.stress_grid import stress_grid
 from discover.protocols import imposed_stress
 from discover.protocols.control import jumps_at_start
-from discover.simulate.stress_grid import stress_grid
 
 TIMES = np.linspace(0.1, 15.0, 150)
 LEVELS = np.array([6.0, 14.0, 24.0, 36.0, 60.0])

@@ -7,13 +7,13 @@ from independent.homogeneous import UNIT
 from independent.rolie_poly import RoliePoly
 from scipy.integrate import solve_ivp
 
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.fluids import solve_batch
+from discover.forward.grids.flow_batch import lay_out
+from discover.forward.steps.exponential_weights import turned
 from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.exponential_weights import turned
-from discover.simulate.flow_batch import lay_out
-from discover.simulate.solve import solve_batch
 
 MODULUS, TIMES = (1000.0, 300.0, 100.0), (1e-3, 0.1, 10.0)
 SAMPLES = np.linspace(0.5, 30.0, 60)

@@ -13,15 +13,15 @@ from independent.sweeps import modulus_of
 from discover.errors import InputError
 from discover.forward.fluids import (
     dynamics_of_fluid,
-    observe,
     observed_on_grid,
     solved_on_grid,
 )
+from discover.forward.grids import lay_out
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.giesekus import Giesekus
 from discover.protocols import imposed_stress, oscillations, start_up, steady_rates
 from discover.protocols.protocol import recording
-from discover.simulate import SimulationError, lay_out, simulate
+from discover.simulate import SimulationError, observe, simulate
 
 MODULUS, TIME, SOLVENT, MOBILITY = (100.0, 30.0), (0.3, 3.0), 5.0, 0.3
 TIMES = np.concatenate([np.geomspace(0.02, 6.0, 30), 6.0 + np.geomspace(0.02, 6.0, 30)])

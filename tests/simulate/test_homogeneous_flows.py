@@ -9,6 +9,8 @@ from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch
+from discover.forward.grids import lay_out
 from discover.laws import Fluid, make_law
 from discover.protocols import (
     after_alternation,
@@ -24,7 +26,7 @@ from discover.protocols import (
     start_up,
     step_rates,
 )
-from discover.simulate import lay_out, simulate, solve_batch
+from discover.simulate import simulate
 
 MODULUS, TIME, SOLVENT, MOBILITY = np.array([100.0, 20.0]), np.array([0.2, 3.0]), 5.0, 0.3
 TIMES = np.linspace(0.05, 4.0, 30)

@@ -9,6 +9,8 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch
+from discover.forward.grids.flow_batch import lay_out
 from discover.laws import Fluid, Giesekus
 from discover.protocols import (
     after_alternation,
@@ -19,8 +21,7 @@ from discover.protocols import (
     shear_rates,
     start_up,
 )
-from discover.simulate import simulate, solve_batch
-from discover.simulate.flow_batch import lay_out
+from discover.simulate import simulate
 
 MODULUS, MOBILITY, FREQUENCY = 100.0, 0.3, 1.0
 PERIOD = 2.0 * np.pi / FREQUENCY

@@ -9,6 +9,8 @@ from independent import Giesekus, JohnsonSegalman, Structured, WhiteMetzner, ste
 from discover.dataset import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch
+from discover.forward.grids import lay_out, make_grid
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.protocols import (
@@ -18,7 +20,6 @@ from discover.protocols import (
     start_up,
     step_rates,
 )
-from discover.simulate import lay_out, make_grid, solve_batch
 
 TIME = 0.4
 RATES = [0.0, 1.0], [0.1, 20.0]

@@ -6,6 +6,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.errors import InputError
+from discover.forward.fluids import solve_batch, solve_on_grid
+from discover.forward.grids import lay_out, make_grid, make_grids
+from discover.forward.steps.exponential_weights import phi_functions
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell, make_law
 from discover.protocols import (
     oscillatory_shear,
@@ -14,16 +17,7 @@ from discover.protocols import (
     start_up,
     step_rates,
 )
-from discover.simulate import (
-    lay_out,
-    make_grid,
-    make_grids,
-    simulate,
-    solve_batch,
-    solve_on_grid,
-    synthetic_dataset,
-)
-from discover.simulate.exponential_weights import phi_functions
+from discover.simulate import simulate, synthetic_dataset
 
 SPECTRUM = (np.logspace(5, 3, 13), np.logspace(-3, 4, 13))  # 1 ms to 10,000 s
 

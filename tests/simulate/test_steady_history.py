@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from independent import PhanThienTanner, steps
 
+from discover.forward.fluids import solve_batch
+from discover.forward.grids import lay_out, make_grid
 from discover.laws import Fluid, make_law
 from discover.protocols import after_steady_flow, start_up
-from discover.simulate import lay_out, make_grid, solve_batch
 
 BEFORE, AFTER = 20.0, 0.1
 TIMES = np.geomspace(1e-3, 60.0, 60)

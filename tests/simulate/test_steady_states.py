@@ -1,7 +1,6 @@
 """Steady states that are solved for, against start-ups that scipy follows until they are steady."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent.authors import rolie_poly_fene
@@ -13,12 +12,13 @@ from scipy.optimize import brentq
 from discover import Fluid, make_law
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch, solve_on_grid
+from discover.forward.grids import lay_out
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.giesekus import Giesekus
 from discover.protocols import in_flow, start_up
 from discover.protocols.control import steady_rates
-from discover.simulate import SimulationError, lay_out, simulate, solve_batch
-from discover.simulate.steady_states import steady_state
+from discover.simulate import SimulationError, simulate
 
 MODULUS, TIME, MOBILITY = (100.0, 300.0), (1.0, 0.1), 0.3
 RATES = np.array([0.02, 1.0, 30.0])
@@ -42,10 +42,14 @@ def test_a_steady_state_is_where_a_start_up_ends(kind):
 
 
 def test_a_steady_state_follows_the_mobility_as_its_differences_do():
+    flow = steady_rates(np.array([3.0]))
+    ((_, grids),) = lay_out([flow], [COUNTED[:1]]).parts
+    grid = jax.tree.map(lambda leaf: leaf[0], grids)
+
     @jax.jit
     def stress(mobility):
         fluid = Fluid(Giesekus(mobility), MODULUS, TIME)
-        return fluid.stress(steady_state(fluid, jnp.asarray(3.0)), jnp.asarray(3.0))
+        return solve_on_grid(fluid, flow, grid)[0]
 
     step = 1e-4  # the difference errs by its square
     expected = (stress(MOBILITY + step) - stress(MOBILITY - step)) / (2.0 * step)

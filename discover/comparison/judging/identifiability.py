@@ -13,6 +13,7 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
 from discover.dataset.run import Run
+from discover.forward.grids.flow_batch import lay_out
 from discover.identify import (
     LawStructure,
     LawTerms,
@@ -27,7 +28,6 @@ from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.learners import RecoveredTerm
-from discover.simulate.flow_batch import lay_out
 from discover.study.declared_model import DeclaredModel
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term

@@ -9,7 +9,6 @@ from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
 from discover.dataset.run import Run, sizes_of
-from discover.forward.fluids import observe
 from discover.laws.multimode import Fluid
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
@@ -21,7 +20,7 @@ from discover.protocols.protocol import (
     shear_rates,
     strains_in_table,
 )
-from discover.simulate.solve import ShearStress, SimulationError, simulate
+from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
 

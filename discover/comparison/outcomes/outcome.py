@@ -9,13 +9,13 @@ from jaxtyping import Float, Real
 
 from discover.comparison.outcomes.constant import Constant
 from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.grids.flow_batch import lay_out
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.results.term_tables import TermTables
 from discover.learners.results.weighted_laws import WeightedLaws
 from discover.plain_json import plain
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import lay_out
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""

@@ -8,10 +8,10 @@ from jaxtyping import Array, Float
 
 from discover.dataset import Run
 from discover.forward.batches.samples import measured
+from discover.forward.grids.stress_grid import stress_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
-from discover.simulate.stress_grid import stress_grid
 
 
 class StressBatch(eqx.Module):

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
+from discover.forward.grids.grid import steps_of_half_cycle
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI
-from discover.simulate.grid import steps_of_half_cycle
 
 # Half a cycle in the loop: as many steps as one of so much strain at least, whatever the strain
 _FEWEST = 8.0

@@ -13,10 +13,10 @@ from jaxtyping import Array, Float, Int
 from discover.dataset import Run
 from discover.forward.batches.rate_steps import RateSteps, rate_steps
 from discover.forward.batches.samples import measured
+from discover.forward.grids.grid import make_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
-from discover.simulate.grid import make_grid
 
 # An instrument effect acts within the first samples, so the first gap is divided this often
 _EARLY_STEPS = 0.5 ** np.arange(6)

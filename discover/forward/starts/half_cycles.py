@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.simulate.exponential_weights import relax
+from discover.forward.steps.exponential_weights import relax
 
 # Half a period later the flow is its own mirror image in the plane across it
 _MIRROR = (1.0, 1.0, 1.0, -1.0)
@@ -168,14 +168,10 @@ def _step(dynamics: Dynamics, width, unroll: int):
         slow = [combined("time_factor", some) for some in (levels, halfway, at_end)]
         w = dynamics.weights_of_step(weights, width, slow[1])
 
-        def stage(stress, given):
-            rate, now = given
-            change = slow[1] * dynamics.change(stress, rate, now, None)
-            return w.remainder(stress, change, dynamics.decay), ()
-
+        remainder = dynamics.stage(w, slow[1], None)
         felt = jnp.stack([first, middle, middle, last])
         factors = jnp.stack([slow[0], slow[1], slow[1], slow[2]])
-        stress, _ = w.step(stress, stage, (felt, factors), unroll)
+        stress, _ = w.step(stress, lambda *given: (remainder(*given), ()), (felt, factors), unroll)
         after = combined("modulus_factor", at_end) * sheared(stress, middle)
         levels, kept = relaxed(levels, middle, 0.5 * (before + after), 1.0)
         left = [a * b for a, b in zip(left, kept, strict=True)]

@@ -7,15 +7,16 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from discover.forward.dynamics import Dynamics, Levels
-from discover.protocols.kinematics import Kinematics
-from discover.simulate.steady_states import (
+from discover.forward.starts.approach import (
     MOST_STEPS,
     Approach,
     approach,
     approach_step,
     arrived,
     moves,
+    newton_step,
 )
+from discover.protocols.kinematics import Kinematics
 
 
 class _Way(NamedTuple):
@@ -49,12 +50,36 @@ def steady_states(
     """
 
     def one(rate):
-        return _approach(dynamics, rate, flow)
+        stress, levels, felt = _approach(dynamics, rate, flow)
+        scale = dynamics.combined("modulus_factor", levels)
+        return scale * dynamics.recorded(stress, flow), felt
 
     return jax.vmap(one)(rates)
 
 
+def steady_state(
+    dynamics: Dynamics, fixed: Dynamics, rate: Float[Array, ""], flow: Kinematics | None = None
+) -> Float[Array, "s k"]:
+    """Return the dimensionless modes in one steady flow, as `steady_states` reaches it.
+
+    Not finite where none is reached. Derivatives are those of the implicit function: none passes
+    through the steps.
+
+    Parameters
+    ----------
+    dynamics
+        The fluid; no state changes with it, and nothing gives way in series.
+    fixed
+        The same, through which no derivative passes.
+    rate, flow
+        As in `steady_states`.
+    """
+    reached, _, _ = jax.lax.stop_gradient(_approach(fixed, rate, flow))
+    return newton_step(lambda stress: dynamics.change(stress, rate, 1.0, flow), reached)
+
+
 def _approach(dynamics: Dynamics, rate, flow):
+    """Return modes and states of the fluid in steady flow, and the rate that it feels."""
     modes = dynamics.modes
     stress, levels = dynamics.rest()
     intensity = 1.0 if flow is None else flow.intensity
@@ -92,9 +117,7 @@ def _approach(dynamics: Dynamics, rate, flow):
     )
     end = jax.lax.while_loop(lambda now: now.moving & (now.index < MOST_STEPS), step, start)
     way, levels, felt = end.way, end.levels, end.felt
-    stress = arrived(changes(levels, felt), way, weissenberg)
-    scale = dynamics.combined("modulus_factor", levels)
-    return scale * dynamics.recorded(stress, flow), felt
+    return arrived(changes(levels, felt), way, weissenberg), levels, felt
 
 
 def _steady_level(effect, values, rate, stress):

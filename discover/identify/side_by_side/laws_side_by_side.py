@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.forward.grids.grid import IntegrationGrid
+from discover.forward.steps.runge_kutta import runge_kutta_4
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.grid import IntegrationGrid
-from discover.simulate.runge_kutta import runge_kutta_4
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 

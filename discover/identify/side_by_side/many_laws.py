@@ -12,7 +12,9 @@ from jaxtyping import Array, Float
 from scipy.stats import norm
 from scipy.stats.qmc import LatinHypercube
 
+from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_on_grid
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
@@ -20,8 +22,6 @@ from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics import root_of
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term

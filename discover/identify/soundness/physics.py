@@ -13,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.grids.flow_batch import FlowBatch
 from discover.identify.soundness.physics_flows import (
     Cycles,
     Trajectories,
@@ -31,8 +33,6 @@ from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch
 from discover.words import percent_of, plainly
 
 _ROUNDING = 1e-6

@@ -9,14 +9,13 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.equations.equation import mean_relaxation_time
-from discover.forward.fluids import at_samples
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.fluids import at_samples, solve_batch
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch, lay_out
-from discover.simulate.solve import solve_batch
 from discover.words import plainly
 
 _CYCLES = 3

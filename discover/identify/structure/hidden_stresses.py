@@ -14,10 +14,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from discover.forward.steps.runge_kutta import runge_kutta_4
 from discover.identify.side_by_side.histories import histories_for
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.programs import compiled
-from discover.simulate.runge_kutta import runge_kutta_4
 
 _ZERO = 1e-10
 """Relative singular value that counts as zero; exact ones come out at rounding error."""

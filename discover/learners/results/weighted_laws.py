@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Array, Float, Int
 
 from discover.forward.fluids import observed_on_grid
+from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
-from discover.simulate.flow_batch import FlowBatch
 from discover.statistics.one_more import one_more
 from discover.statistics.weighted_quantiles import weighted_quantiles
 

@@ -16,7 +16,9 @@ from sklearn.utils.validation import check_is_fitted
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_in_batch
+from discover.forward.grids.flow_batch import lay_out
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
@@ -43,8 +45,6 @@ from discover.learners.tbnn_ude.spread import (
 )
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import lay_out
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.library import TermLibrary, build_library
 

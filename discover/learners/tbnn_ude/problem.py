@@ -12,15 +12,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
+from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_on_grid
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.learners.own_loadings import signals_of, with_likely_factors
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch, lay_out
 
 STRAIN_STEP = 0.2
 """Largest strain of a step of the integration."""

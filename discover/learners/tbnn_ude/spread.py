@@ -11,12 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.forward.fluids import observe
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.solve import SimulationError
+from discover.simulate.solve import SimulationError, observe
 from tensor_library.integrity_basis import TENSOR_NAMES
 
 

@@ -15,20 +15,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Int
 
-from discover.forward.fluids import (
-    dynamics_of_modes,
-    solved_on_grid,
-    with_cheap_tangents,
-)
+from discover.forward.cheap_tangents import with_cheap_tangents
+from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
+from discover.forward.following import follow
+from discover.forward.starts.steady_states import steady_state
 from discover.laws.each_mode import over_modes
+from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
-from discover.simulate.following import Following, follow
-from discover.simulate.solve import exponential_steps
-from discover.simulate.steady_states import steady_modes
+from tensor_library.contraction import contracted
 
 
 class Along(NamedTuple):
@@ -98,40 +96,54 @@ def states_and_jacobian(
     if count is not None:
         flows = flows.some(first, count)
         looked_at = jax.lax.dynamic_slice_in_dim(looked_at, first, count)
-    modulus, relaxation_time = problem.modulus, problem.relaxation_time
-    fluid = problem.fluid(rebuild(weights))
-    n_weights = weights.shape[0]
+    modulus = problem.modulus
+    law = rebuild(weights)
 
-    def one_mode(rebuild, state, sensitivity, time_scale, gradient):
+    def one_mode(rebuild, state, gradient):
         def change(s, w):
-            return rebuild(w).stress_rate(s, time_scale * gradient) / time_scale
+            return rebuild(w).stress_rate(s, gradient)
 
+        stress, sensitivity = state[:, 0], state[:, 1:]
         # one evaluation and four pullbacks give both derivatives
-        value, pull = jax.vjp(change, state, weights)
-        by_state, by_weight = jax.vmap(pull)(jnp.eye(len(state)))
+        value, pull = jax.vjp(change, stress, weights)
+        by_state, by_weight = jax.vmap(pull)(jnp.eye(len(stress)))
         return jnp.concatenate([value[:, None], by_state @ sensitivity + by_weight], axis=1)
 
-    @jax.jit  # traced once for all stages of a step
-    def field(t, y, protocol):
-        gradient = protocol.velocity_gradient(t)
-        gradients = jnp.broadcast_to(gradient, (*relaxation_time.shape, *gradient.shape))
-        of_modes = over_modes(one_mode, rebuild)
-        return of_modes(y[..., 0], y[..., 1:], relaxation_time, gradients)
+    def dynamics(w, protocol, cheaply=False):
+        """Return the modes of a law of these weights, as the integrators take it."""
 
-    def observe(t, y, protocol):
-        stress = y[:, :4]  # without structure variables, which no record holds
-        return stress[..., 0], protocol.recorded_stress(
-            jnp.tensordot(modulus, stress[..., 1:], axes=1)
-        )
+        def stress_rate(made, w, *flow):
+            return made(w).stress_rate(*flow)
+
+        def of_mode(made, *flow):
+            rate = with_cheap_tangents if cheaply else partial
+            return rate(stress_rate, made)(w, *flow)
+
+        modes = problem.modulus, problem.relaxation_time, problem.beside(protocol)
+        known = dynamics_of_fluid(Fluid(law, *modes), protocol)
+        return known._replace(slope=over_modes(of_mode, rebuild, -1))
+
+    def followed_run(protocol, grid):
+        alone = dynamics(weights, protocol)
+        # traced once for all stages of a step
+        of_modes = jax.jit(over_modes(one_mode, rebuild, -1))
+        beside = alone._replace(slope=of_modes, columns=weights.shape[0])
+
+        def observe(state, _):
+            stress = state[:4]  # without structure variables, which no record holds
+            recorded = protocol.recorded_stress(contracted(stress[:, 1:], modulus))
+            return stress[:, 0].T, recorded
+
+        return follow(beside, alone, protocol, grid, observe)
 
     def steady_run(protocol, grid):
-        def at(time):
-            gradient = jnp.multiply.outer(relaxation_time, protocol.velocity_gradient(time))
+        alone = dynamics(weights, protocol)
 
+        def at(number):
             def recorded(w):
-                of_modes = over_modes(lambda made, *flow: made(w).stress_rate(*flow), rebuild)
-                state = steady_modes(of_modes, gradient, fluid.rest())[:, :4]
-                return protocol.recorded_stress(jnp.tensordot(modulus, state, axes=1)), state
+                made = dynamics(w, protocol)
+                state = steady_state(made, alone, protocol.rate(number), protocol.kinematics)[:4]
+                return protocol.recorded_stress(contracted(state, modulus)), state.T
 
             # one number recorded: a pullback costs what one weight's tangent would
             by_weight, state = jax.jacrev(recorded, has_aux=True)(weights)
@@ -140,16 +152,7 @@ def states_and_jacobian(
         return grid.of_states(at)
 
     def solved_run(protocol, grid):
-        modes = modulus, relaxation_time, problem.beside(protocol)
-
-        def make(w):
-            def of_mode(rebuild, stress, rate):
-                law = with_cheap_tangents(
-                    lambda made, w, *flow: made(w).stress_rate(*flow), rebuild
-                )
-                return law(w, stress, rate)
-
-            return dynamics_of_modes(over_modes(of_mode, rebuild, -1), *modes, protocol)
+        make = partial(dynamics, protocol=protocol, cheaply=True)
 
         def recorded(w):
             found = solved_on_grid(make, w, protocol, grid)
@@ -161,21 +164,10 @@ def states_and_jacobian(
     def one_run(protocol, grid):
         if protocol.control not in FOLLOWED:
             return solved_run(protocol, grid)
-        states, by_weight = followed_run(protocol, grid)
+        run = steady_run if protocol.control == "steady" else followed_run
+        states, by_weight = run(protocol, grid)
         recorded = protocol.recorded_stress(jnp.tensordot(modulus, states, axes=(0, 1)).T)
         return Along(recorded, states, jax.vmap(protocol.rate)(grid.sample_times)), by_weight
-
-    def followed_run(protocol, grid):
-        if protocol.control == "steady":
-            return steady_run(protocol, grid)
-        start = jnp.pad(fluid.rest()[..., None], ((0, 0), (0, 0), (0, n_weights)))
-        solver = exponential_steps(fluid, columns=True)
-
-        def states_alone(t, states, protocol):
-            return fluid.state_rate(states, protocol.velocity_gradient(t))
-
-        alone = Following(states_alone, exponential_steps(fluid), fluid.rest(), protocol)
-        return follow(Following(field, solver, start, protocol), grid, observe, alone)
 
     along, jacobian = flows.over(one_run)
     return along, jnp.where(looked_at[..., None], jacobian, 0.0)

@@ -11,6 +11,8 @@ from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.grids.flow_batch import lay_out
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
@@ -33,8 +35,6 @@ from discover.learners.tensor_dense.term_sizes import term_sizes
 from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.progress import Progress, by_lines
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import lay_out
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 

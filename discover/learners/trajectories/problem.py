@@ -10,14 +10,14 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.own_loadings import signals_of, with_likely_factors
 from discover.learners.runs import as_runs
 from discover.programs import on_device
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics import root_of
 from tensor_library.library import TermLibrary
 

@@ -18,11 +18,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
-from discover.forward.fluids import (
-    dynamics_of_modes,
-    solved_on_grid,
-    with_cheap_tangents,
-)
+from discover.forward.cheap_tangents import with_cheap_tangents
+from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
+from discover.forward.following import follow, without_derivatives
 from discover.laws.base import as_state, stress_in
 from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid
@@ -30,10 +28,6 @@ from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
-from discover.simulate.exponential_runge_kutta import ExponentialRungeKutta4
-from discover.simulate.following import Following, follow
-from discover.simulate.solve import exponential_steps
-from discover.simulate.steady_states import steady_modes
 from tensor_library.contraction import contracted
 from tensor_library.kinematics import rate_of_deformation
 
@@ -74,98 +68,42 @@ def _mode_rates(library, active, base, coefficients, inner, state, rate):
     return jnp.concatenate([change[:, None], along], axis=1)
 
 
-def _vector_field(t, state, args):
-    problem, protocol, active, coefficients, inner = args
-    rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
+def _solve_run(problem, active, coefficients, inner, protocol, grid):
+    if protocol.control not in FOLLOWED or protocol.control == "steady":
+        return _of_implicit_function(problem, active, coefficients, inner, protocol, grid)
 
-    def mode(base, state, rate):
+    def of_mode(base, state, rate):
         return _mode_rates(problem.library, active, base, coefficients, inner, state, rate)
 
-    rates = over_modes(mode, problem.base)(state, rate)
-    return rates / problem.relaxation_time[:, None, None]
+    n_columns = coefficients.shape[0] + inner.shape[0]
+    alone = _dynamics(problem, active, protocol)((coefficients, inner))
+    beside = alone._replace(slope=over_modes(of_mode, problem.base, -1), columns=n_columns)
+    return follow(beside, alone, protocol, grid, _observation(problem, protocol))
 
 
-def _observe(t, state, args):
-    """Return the recorded stress, N1, N2 and their sensitivities, shape (3, 1 + q + m)."""
-    problem, protocol, *_ = args
-    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
-    return _recorded(total.at[:, 0].add(_of_solvent(problem, protocol, t)), protocol)
+def _dynamics(problem, active, protocol, cheaply=False):
+    """Return the function from the numbers of a trial law to its modes, as the integrators take it.
 
-
-def _of_solvent(problem, protocol, t):
-    return problem.solvent_viscosity * rate_of_deformation(protocol.velocity_gradient(t))
-
-
-def _recorded(total, protocol):
-    """Return the recorded stress, N1 and N2 of σ11, σ22, σ33, σ12 along the first axis."""
-    recorded = protocol.recorded_stress(total)
-    return jnp.stack([recorded, total[0] - total[1], total[1] - total[2]])
-
-
-def _solve_run(problem, active, coefficients, inner, protocol, grid):
-    if protocol.control == "steady":
-        return _steady_run(problem, active, coefficients, inner, protocol, grid)
-    if protocol.control not in FOLLOWED:
-        return _solved_run(problem, active, coefficients, inner, protocol, grid)
-    columns = 1 + coefficients.shape[0] + inner.shape[0]
-    start = jnp.pad(_rest(problem)[..., None], ((0, 0), (0, 0), (0, columns - 1)))
-    args = (problem, protocol, active, coefficients, inner)
-    following = Following(_vector_field, _solver(problem, columns=True), start, args)
-    alone = _states_alone(problem, active, coefficients, inner, protocol)
-    return follow(following, grid, _observe, alone)
-
-
-def _states_alone(problem, active, coefficients, inner, protocol) -> Following:
-    """Return how the states change, without sensitivities."""
-    of_modes = _known_less_terms(problem, active, coefficients, inner)
-
-    def field(t, stress, _):
-        rate = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(t))
-        return of_modes(stress, rate) / problem.relaxation_time[:, None]
-
-    return Following(field, _solver(problem), _rest(problem), None)
-
-
-def _rest(problem):
-    rest = problem.base.rest()
-    return jnp.broadcast_to(rest, (problem.modulus.shape[0], *rest.shape))
-
-
-def _solver(problem, columns=False):
-    """Return the method that is exact for the linear relaxation of the known law.
-
-    Where that too is unknown, a rate of this size is still the natural split, and the split decides
-    accuracy only.
+    Parameters
+    ----------
+    cheaply
+        Whether its tangents are to cost little, however many there are.
     """
-    if problem.base.linear_relaxation:
-        fluid = Fluid(problem.base, problem.modulus, problem.relaxation_time)
-        return exponential_steps(fluid, columns)
-    decay = (1.0 / problem.relaxation_time)[:, None]
-    return ExponentialRungeKutta4(decay[..., None] if columns else decay)
-
-
-def _solved_run(problem, active, coefficients, inner, protocol, grid):
-    """Return what `_solve_run` does where the rate is solved for."""
-
-    def recorded(*numbers):
-        observed = _observed_where_solved(problem, active, numbers, protocol, grid)
-        return observed, observed
-
-    columns, value = jax.jacfwd(recorded, argnums=(0, 1), has_aux=True)(coefficients, inner)
-    return jnp.concatenate([value[..., None], *columns], axis=-1)
-
-
-def _observed_where_solved(problem, active, numbers, protocol, grid):
-    modes = problem.modulus, problem.relaxation_time, problem.solvent_viscosity
+    law = partial(_law_of_numbers, problem.library)
+    known = Fluid(problem.base, problem.modulus, problem.relaxation_time, problem.solvent_viscosity)
 
     def make(numbers):
         def of_mode(base, stress, rate):
-            law = with_cheap_tangents(partial(_law_of_numbers, problem.library), (active, base))
-            return law(numbers, stress, rate)
+            if cheaply:
+                return with_cheap_tangents(law, (active, base))(numbers, stress, rate)
+            return law((active, base), numbers, stress, rate)
 
-        return dynamics_of_modes(over_modes(of_mode, problem.base, -1), *modes, protocol)
+        # where the known law does not relax linearly, −σ is still the natural split, and the split
+        # decides accuracy only
+        dynamics = dynamics_of_fluid(known, protocol)._replace(linear_relaxation=True)
+        return dynamics._replace(slope=over_modes(of_mode, problem.base, -1))
 
-    return solved_on_grid(make, numbers, protocol, grid, together=True).observed
+    return make
 
 
 def _law_of_numbers(library, given, numbers, stress, rate):
@@ -176,39 +114,39 @@ def _law_of_numbers(library, given, numbers, stress, rate):
     return base.stress_rate(stress, rate) - added
 
 
-def _steady_run(problem, active, coefficients, inner, protocol, grid):
-    """Return what `_solve_run` does of steady states, by the implicit function."""
+def _observation(problem, protocol):
+    """Return what is seen of the modes: the recorded stress, N1 and N2, shape (3, *c)."""
 
-    def at(time):
-        recorded = partial(_observed_in_steady_flow, problem, active, protocol, time)
-        value = recorded(coefficients, inner)
-        columns = jax.jacfwd(recorded, argnums=(0, 1))(coefficients, inner)
-        return jnp.concatenate([value[:, None], *columns], axis=1)
+    def observe(stress, gradient):
+        total = contracted(stress[:4], problem.modulus)
+        solvent = problem.solvent_viscosity * rate_of_deformation(gradient)
+        # no number of the trial law changes the solvent
+        total = total + solvent if total.ndim == 1 else total.at[:, 0].add(solvent)
+        recorded = protocol.recorded_stress(total)
+        return jnp.stack([recorded, total[0] - total[1], total[1] - total[2]])
 
-    return grid.of_states(at)
-
-
-def _observed_in_steady_flow(problem, active, protocol, time, coefficients, inner):
-    gradient = jnp.multiply.outer(problem.relaxation_time, protocol.velocity_gradient(time))
-    law = _known_less_terms(problem, active, coefficients, inner)
-    state = steady_modes(law, gradient, _rest(problem), problem.base.scalars)
-    return _observed(problem, protocol, time, state)
+    return observe
 
 
-def _known_less_terms(problem, active, coefficients, inner):
-    """Return the dimensionless dσ/dt of all modes, of their σ and their λL."""
-    numbers = coefficients, inner
+def _of_implicit_function(problem, active, coefficients, inner, protocol, grid):
+    """Return what `_solve_run` does where a state, or the rate, is solved for."""
 
-    def of_mode(base, stress, rate):
-        return _law_of_numbers(problem.library, (active, base), numbers, stress, rate)
+    def observed(*numbers):
+        found = _observed(problem, active, numbers, protocol, grid)
+        return found, found
 
-    return over_modes(of_mode, problem.base)
+    columns, value = jax.jacfwd(observed, argnums=(0, 1), has_aux=True)(coefficients, inner)
+    return jnp.concatenate([value[..., None], *columns], axis=-1)
 
 
-def _observed(problem, protocol, time, state):
-    """Return the recorded stress, N1 and N2 of modes, shape (k, s)."""
-    total = jnp.tensordot(problem.modulus, state[:, :4], axes=1)
-    return _recorded(total + _of_solvent(problem, protocol, time), protocol)
+def _observed(problem, active, numbers, protocol, grid):
+    """Return what is recorded, N1 and N2 of a trial law in one run, without sensitivities."""
+    if protocol.control not in FOLLOWED:
+        make = _dynamics(problem, active, protocol, cheaply=True)
+        return solved_on_grid(make, numbers, protocol, grid, together=True).observed
+    make = _dynamics(problem, active, protocol)
+    fluids = make(numbers), make(without_derivatives(numbers))
+    return follow(*fluids, protocol, grid, _observation(problem, protocol))
 
 
 def observe(
@@ -252,26 +190,13 @@ def predict_many(
     default those of the problem. Not finite where a law runs away.
     """
 
-    def run(problem, coefficients, inner, protocol, grid):
-        if protocol.control == "steady":
-            return grid.of_states(
-                lambda time: _observed_in_steady_flow(
-                    problem, active, protocol, time, coefficients, inner
-                )
-            )
-        if protocol.control not in FOLLOWED:
-            numbers = coefficients, inner
-            return _observed_where_solved(problem, active, numbers, protocol, grid)
-        return follow(
-            _states_alone(problem, active, coefficients, inner, protocol),
-            grid,
-            lambda t, stress, _: _observed(problem, protocol, t, stress),
-        )
+    def run(problem, numbers, protocol, grid):
+        return _observed(problem, active, numbers, protocol, grid)
 
     def law(numbers):
         coefficients, inner, modulus = numbers
         at = problem if modulus is None else eqx.tree_at(lambda p: p.modulus, problem, modulus)
-        predicted = problem.flows.over(partial(run, at, coefficients, inner))
+        predicted = problem.flows.over(partial(run, at, (coefficients, inner)))
         return problem.weighted(predicted).reshape(-1)
 
     # side by side, a law that is given up at once would cost as much as the slowest beside it

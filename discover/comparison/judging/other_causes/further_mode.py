@@ -17,11 +17,11 @@ from scipy.stats import chi2
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.outcomes.flows import Flow
 from discover.errors import InputError
+from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_in_batch
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws.each_mode import LawOfEachMode
 from discover.laws.multimode import Fluid
-from discover.simulate.enough_steps import in_enough_steps
-from discover.simulate.flow_batch import FlowBatch, lay_out
 from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import common_likelihood
 from discover.statistics.projection import rms

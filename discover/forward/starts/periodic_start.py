@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
-from discover.simulate.modified_newton import (
+from discover.forward.starts.modified_newton import (
     FROM_REST,
     Approximation,
     first_approximation,

@@ -9,10 +9,10 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from discover.errors import InputError
+from discover.forward.grids.stress_grid import MAX_GRID_POINTS, stress_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import FlowProtocol
-from discover.simulate.stress_grid import MAX_GRID_POINTS, stress_grid
 
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""

@@ -11,10 +11,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
+from discover.forward.grids.grid import IntegrationGrid, make_grids
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols
-from discover.simulate.grid import IntegrationGrid, make_grids
 
 # Of its strain, what an oscillation keeps that is to be still: without any it has no modulus
 _SMALL_STRAIN = 1e-3

@@ -158,11 +158,11 @@ class StressWeights(NamedTuple):
 
     def step(
         self,
-        stress: Float[Array, "s k"],
-        stage: Callable[[Float[Array, "s k"], Any], tuple[Float[Array, "s k"], Any]],
+        stress: Float[Array, "s *c k"],
+        stage: Callable[[Float[Array, "s *c k"], Any], tuple[Float[Array, "s *c k"], Any]],
         inputs: Any,
         at_once: int = 1,
-    ) -> tuple[Float[Array, "s k"], Any]:
+    ) -> tuple[Float[Array, "s *c k"], Any]:
         """Return the stress after a step, and what else each stage says.
 
         A scan and not four lines: what a stage does is then compiled once and not four times.
@@ -180,6 +180,7 @@ class StressWeights(NamedTuple):
         """
         if self.beside:
             return self._step_by_step(stress, stage, inputs)
+        beside = (1,) * (stress.ndim - 1)
         rows = [self.whole.tableau()]
         if self.trace is not None:
             rows.append(self.trace.tableau())
@@ -187,11 +188,13 @@ class StressWeights(NamedTuple):
         def one(remainders, given):
             number, tableau, own = given
             (kept, weights), *of_trace = tableau
-            state = kept * stress + jnp.sum(weights[:, None] * remainders, axis=0)
+            weights = weights.reshape(4, *beside, -1)
+            state = kept * stress + jnp.sum(weights * remainders, axis=0)
             for other_kept, other in of_trace:
                 mean = (other_kept - kept) * _mean_normal(stress)
                 means = jax.vmap(_mean_normal)(remainders)
-                state = state.at[:3].add(mean + jnp.sum((other - weights) * means, axis=0))
+                apart = other.reshape(4, *beside[1:], -1) - weights[:, 0]
+                state = state.at[:3].add(mean + jnp.sum(apart * means, axis=0))
             found, more = stage(state, own)
             return remainders.at[number].set(found), more
 
@@ -242,7 +245,7 @@ class StressWeights(NamedTuple):
         return with_shares(found, self.shares, 1.0, axis=0)
 
 
-def _mean_normal(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
+def _mean_normal(stress: Float[Array, "s *c k"]) -> Float[Array, "*c k"]:
     return jnp.sum(stress[:3], axis=0) / 3.0
 
 

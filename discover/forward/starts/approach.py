@@ -1,4 +1,4 @@
-"""Steady states of a fluid, found without waiting for them."""
+"""The way to a steady state, in steps of pseudo-time that grow until they are Newton's."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -6,10 +6,6 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
-
-from discover.laws.each_mode import over_modes
-from discover.laws.multimode import Fluid
-from tensor_library.kinematics import VelocityGradient
 
 # A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so
 # many steps before, and widths then grow twice as fast until they have caught up. At most so often,
@@ -187,6 +183,17 @@ def linearly_implicit_step(
     return stress + _solved(matrix, now)
 
 
+def newton_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]], stress: Float[Array, "s k"]
+) -> Float[Array, "s k"]:
+    """Return modes after a step of Newton's method from where they are steady.
+
+    It moves them by nothing, and by what the change depends on as the implicit function does.
+    """
+    now, jacobian = _with_jacobian(change, stress)
+    return stress + _solved(jax.lax.stop_gradient(-jacobian), now)
+
+
 def _with_jacobian(change, stress):
     """Return the change, and of each mode its derivative, shape (k, s, s)."""
     now, tangent = jax.linearize(change, stress)
@@ -197,68 +204,3 @@ def _with_jacobian(change, stress):
 
 def _solved(matrix: Float[Array, "k s s"], change: Float[Array, "s k"]) -> Float[Array, "s k"]:
     return jnp.linalg.solve(matrix, change.T[:, :, None])[:, :, 0].T
-
-
-def steady_state(fluid: Fluid, velocity_gradient: VelocityGradient) -> Float[Array, "k s"]:
-    """Return the dimensionless state of every mode of a fluid in one steady flow.
-
-    As `steady_modes`.
-
-    Parameters
-    ----------
-    velocity_gradient
-        The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
-    """
-    scaled = jnp.multiply.outer(fluid.relaxation_time, velocity_gradient)
-    of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), fluid.law)
-    return steady_modes(of_modes, scaled, fluid.rest(), fluid.law.scalars)
-
-
-def steady_modes(
-    stress_rate: Callable[[Float[Array, "k s"], Float[Array, "k ..."]], Float[Array, "k s"]],
-    scaled_gradient: Float[Array, " k"] | Float[Array, "k 4"],
-    rest: Float[Array, "k s"],
-    scalars: int = 0,
-) -> Float[Array, "k s"]:
-    """Return the dimensionless state of modes in one steady flow.
-
-    Approached from rest by linearly implicit Euler steps in pseudo-time that grow until they are
-    Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]. Where a law has several steady
-    states it is the one that a start-up leads to. Not finite where none is reached.
-
-    Derivatives by the law's parameters are those of the implicit function: no tangent passes
-    through the steps.
-
-    Parameters
-    ----------
-    stress_rate
-        Dimensionless dσ/dt of all modes, of their σ and their λL.
-    scaled_gradient
-        λL of each mode: a shear rate, shape (k,), or four components, shape (k, 4).
-    rest
-        The modes at rest.
-    scalars
-        As in `approach_step`.
-    """
-    # the shear rate, or of an extension the largest rate of stretching
-    weissenberg = jnp.max(jnp.abs(scaled_gradient).reshape(len(rest), -1), axis=1)
-
-    def change(stress):
-        return stress_rate(stress.T, scaled_gradient).T
-
-    # no derivative passes through the steps, whose number depends on where they lead
-    converted, numbers = jax.closure_convert(change, rest.T)
-    fixed = jax.lax.stop_gradient(numbers)
-
-    def step(now):
-        index, way, _ = now
-        after = approach_step(lambda s: converted(s, *fixed), way, index, still, scalars)
-        return index + 1.0, after, moves(way, after, still)
-
-    still = jax.lax.stop_gradient(weissenberg)
-    start = jnp.zeros(()), approach(jax.lax.stop_gradient(rest.T)), jnp.asarray(True)
-    _, way, _ = jax.lax.while_loop(lambda now: now[2] & (now[0] < MOST_STEPS), step, start)
-    reached = jax.lax.stop_gradient(arrived(change, way, weissenberg))
-    now, jacobian = _with_jacobian(change, reached)
-    # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
-    return (reached + _solved(jax.lax.stop_gradient(-jacobian), now)).T

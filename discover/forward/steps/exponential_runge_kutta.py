@@ -9,7 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.simulate.exponential_weights import krogstad_weights, turned, with_shares
+from discover.forward.steps.exponential_weights import krogstad_weights, turned, with_shares
+from discover.laws.multimode import Fluid
 
 
 class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
@@ -101,3 +102,12 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
         error = w.b4 * (slope_after + self.decay * y1 - n4)
         dense = {"y0": y0, "y1": y1, "k0": step * slope, "k1": step * slope_after}
         return y1, error, dense, None, diffrax.RESULTS.successful
+
+
+def exponential_steps(fluid: Fluid) -> ExponentialRungeKutta4:
+    """Return the method that is exact for the linear relaxation of a fluid."""
+    # where the split lies is a choice of method, not of model: no gradient through it
+    decay = jax.lax.stop_gradient(fluid.decay_rate())
+    tensors = 1 + fluid.law.tensors if fluid.law.retracts else 0
+    shares = jax.lax.stop_gradient(fluid.law.shares()) if fluid.law.tensors else None
+    return ExponentialRungeKutta4(decay, tensors, shares)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from discover.forward.fluids import solve_batch
+from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import FOLLOWED
-from discover.simulate.flow_batch import FlowBatch
-from discover.simulate.solve import solve_batch
 
 _TOLERANCE = 1e-4
 """Change of the recorded stress on halving every step, relative to its size in the run."""
