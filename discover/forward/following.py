@@ -27,6 +27,7 @@ def follow(
     protocol: FlowProtocol,
     grid: IntegrationGrid,
     observe: Observe,
+    start: Float[Array, "s *c k"] | None = None,
 ) -> PyTree:
     """Return what is observed at the samples of one grid, stacked along a new first axis.
 
@@ -44,6 +45,8 @@ def follow(
         Of one run at a given rate, in time or steady.
     observe
         What is seen at each step end, or of each steady state.
+    start
+        The modes at the first time; by default as `begun` says.
     """
     flow = protocol.kinematics
     if protocol.control == "steady":
@@ -63,7 +66,7 @@ def follow(
         stress = dynamics.after_step(stress, rates, width, flow)
         return stress, seen(stress, rates[2])
 
-    start = begun(dynamics, fixed, protocol, grid)
+    start = begun(dynamics, fixed, protocol, grid) if start is None else start
     _, later = jax.lax.scan(step, start, (rate, width))
     first = seen(start, rate[0, 0])
     return jax.tree.map(

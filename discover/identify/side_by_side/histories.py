@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.forward.steps.runge_kutta import longest_step
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import FlowProtocol, oscillatory_shear, stack_protocols, start_up
@@ -52,6 +51,16 @@ class Histories:
     def n_random(self) -> int:
         """Number of random histories."""
         return self.amplitude.size
+
+
+def longest_step(law: AbstractConstitutiveLaw) -> float:
+    """Return the longest step, over λ, in which chains that retract are followed.
+
+    Other laws relax in λ, in which any step of the flow's length is short enough.
+    """
+    if not law.retracts:
+        return np.inf
+    return 1.0 / (1.0 + float(jnp.max(jnp.sum(law.relaxations(), axis=1))))
 
 
 @lru_cache(maxsize=4)

@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.steps.runge_kutta import runge_kutta_4
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol
@@ -105,11 +106,7 @@ def _law(library, base, coefficients, inner) -> LibraryExpansion:
 def _march(library, base, coefficients, inner, protocols, grids):
     def one(c, i, protocol, grid):
         law = _law(library, base, c, i)
-
-        def slope(t, stress):
-            return law.stress_rate(stress, protocol.velocity_gradient(t))
-
-        return runge_kutta_4(slope, law.rest(), grid.times)[grid.sample_index, :4]
+        return solve_on_grid(Fluid.dimensionless(law), protocol, grid)
 
     over_runs = jax.vmap(one, in_axes=(None, None, 0, 0))
     return jax.vmap(over_runs, in_axes=(0, 0, None, None))(coefficients, inner, protocols, grids)

@@ -6,8 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from discover.forward.grids.grid import make_grids
-from discover.forward.steps.runge_kutta import longest_step
-from discover.identify.side_by_side.histories import histories_for, observe_differences
+from discover.identify.side_by_side.histories import (
+    histories_for,
+    longest_step,
+    observe_differences,
+)
 from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up

@@ -14,9 +14,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.forward.steps.runge_kutta import runge_kutta_4
+from discover.forward.fluids import dynamics_of_fluid
+from discover.forward.following import follow
 from discover.identify.side_by_side.histories import histories_for
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.multimode import Fluid
 from discover.programs import compiled
 
 _ZERO = 1e-10
@@ -79,7 +81,7 @@ def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
         Any dimensionless law. Histories in which it runs away are left out.
     """
     flows = histories_for(law)
-    arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids.times))
+    arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)
     triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))
@@ -109,21 +111,20 @@ def _readable(rows: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _arrivals(law, protocols, times):
-    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0), (runs, steps, 3), by classical Runge–Kutta steps."""
+def _arrivals(law, protocols, grids):
+    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0) at the samples, (runs, n, 3)."""
 
     def one(protocol, grid):
-        def slope(t, state):
-            stress, change = state
-            rate = protocol.velocity_gradient(t)
-            value, jacobian = (
-                law.stress_rate(stress, rate),
-                jax.jacfwd(law.stress_rate)(stress, rate),
-            )
-            return value, jacobian @ change
+        alone = dynamics_of_fluid(Fluid.dimensionless(law), protocol)
 
-        rest = law.rest()
-        start = (rest, jnp.eye(len(rest))[:, :3])
-        return runge_kutta_4(slope, start, grid)[1][1:, 3]
+        def slope(state, rate):
+            stress, changes = state[:, 0], state[:, 1:]
+            value, push = jax.linearize(lambda s: alone.slope(s, rate), stress)
+            along = jax.vmap(push, in_axes=1, out_axes=1)(changes)
+            return jnp.concatenate([value[:, None], along], axis=1)
 
-    return jax.vmap(one)(protocols, times)
+        beside = alone._replace(slope=slope, columns=3)
+        start = beside.rest()[0].at[:3, 1:, 0].set(jnp.eye(3))
+        return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
+
+    return jax.vmap(one)(protocols, grids)
