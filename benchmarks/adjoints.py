@@ -26,7 +26,7 @@ def main() -> None:
     import jax
     import jax.numpy as jnp
 
-    from discover.forward.steps.exponential_runge_kutta import ExponentialRungeKutta4
+    from discover.forward.integrators.exponential_runge_kutta import ExponentialRungeKutta4
     from discover.learners.tbnn_ude.problem import make_problem
     from discover.learners.tbnn_ude.recipe_paper import make_network
     from discover.learners.tbnn_ude.variational import states_and_jacobian

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
-from discover.forward.steps.exponential_weights import (
+from discover.forward.integrators.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,

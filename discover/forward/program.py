@@ -26,8 +26,8 @@ from discover.forward.batches import (
 )
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series, declared_weights
-from discover.forward.imposed_stress import answer_to_stress
-from discover.forward.integrator import RUNS, Judged, integrate
+from discover.forward.integrators.imposed_stress import answer_to_stress
+from discover.forward.integrators.with_effects import RUNS, Judged, integrate
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import solve_batch
 from discover.forward.grids.flow_batch import lay_out
-from discover.forward.steps.exponential_weights import turned
+from discover.forward.integrators.exponential_weights import turned
 from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate

@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from discover.errors import InputError
 from discover.forward.fluids import solve_batch, solve_on_grid
 from discover.forward.grids import lay_out, make_grid, make_grids
-from discover.forward.steps.exponential_weights import phi_functions
+from discover.forward.integrators.exponential_weights import phi_functions
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell, make_law
 from discover.protocols import (
     oscillatory_shear,

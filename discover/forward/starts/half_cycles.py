@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Array, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.steps.exponential_weights import relax
+from discover.forward.integrators.exponential_weights import relax
 
 # Half a period later the flow is its own mirror image in the plane across it
 _MIRROR = (1.0, 1.0, 1.0, -1.0)

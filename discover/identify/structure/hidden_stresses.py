@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
-from discover.forward.following import follow
+from discover.forward.integrators.at_given_rate import follow
 from discover.identify.side_by_side.histories import histories_for
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid

@@ -20,7 +20,7 @@ from jaxtyping import Array, Float, Int
 
 from discover.forward.cheap_tangents import with_cheap_tangents
 from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
-from discover.forward.following import follow, without_derivatives
+from discover.forward.integrators.at_given_rate import follow, without_derivatives
 from discover.laws.base import as_state, stress_in
 from discover.laws.each_mode import over_modes
 from discover.laws.multimode import Fluid

@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.forward.steps.exponential_weights import krogstad_weights, turned, with_shares
+from discover.forward.integrators.exponential_weights import krogstad_weights, turned, with_shares
 from discover.laws.multimode import Fluid
 
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.steps.exponential_runge_kutta import exponential_steps
+from discover.forward.integrators.exponential_runge_kutta import exponential_steps
 from discover.laws.multimode import Fluid
 from discover.protocols.protocol import FlowProtocol
 

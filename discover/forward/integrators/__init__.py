@@ -1,0 +1,1 @@
+"""Fluids followed in time: one step, and what is asked of it at a given rate and a given stress."""
