@@ -4,8 +4,8 @@ A residual is what is predicted minus what was recorded, times its weight. A wei
 (`Run.weight`, or one of `Run.normal_weights`), over the size of the value (`Run.sizes`: the
 root-mean-square of a transient, in a flow curve or a sweep each value itself), over the root of the
 number of values that the mean is over. So where runs weigh alike the norm of the residuals is the
-relative misfit. The mean is over all values, or over the runs of each one's mean; the batches of
-the closed loop (`discover.forward.batches`) leave out the number of runs.
+relative misfit. The mean is over all values, or over the runs of each one's mean; in the batches of
+the closed loop (`discover.forward.batches`) it is the sum of that over the runs.
 """
 
 from collections.abc import Sequence

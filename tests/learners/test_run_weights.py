@@ -7,6 +7,7 @@ import pytest
 
 import discover as dc
 from discover.dataset.loading import Loading
+from discover.errors import InputError
 from discover.forward import make_batch
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.learners.trajectories.problem import make_problem
@@ -69,11 +70,16 @@ def of_both_learners(runs):
     return of_sparse, of_network, np.asarray(of_sparse.weight)[:, :n, 0]
 
 
-def test_learners_judge_the_same_records_by_the_same_weights_beside_a_solvent_too():
-    of_sparse, of_network, weight = of_both_learners(of_every_kind(20))
+def test_all_judge_the_same_records_by_the_same_weights_beside_a_solvent_too():
+    runs = of_every_kind(20)
+    of_sparse, of_network, weight = of_both_learners(runs)
     np.testing.assert_allclose(of_network.weight, weight, rtol=1e-14)
+    # the loop sums over runs where learners take the mean
+    of_loop = np.asarray(make_batch(runs).weight)[:, :20] / np.sqrt(len(runs))
+    np.testing.assert_allclose(of_loop, weight, rtol=1e-14)
     np.testing.assert_array_equal(of_network.recorded, of_sparse.recorded[:, :20, 0])
-    np.testing.assert_allclose(of_network.loading, of_sparse.loading, rtol=1e-14)
+    own = [np.asarray(records.loading) for records in (of_network, of_sparse)]
+    np.testing.assert_allclose(*own, rtol=1e-14)
 
 
 def test_a_network_counts_runs_alike_and_sparse_regression_values():
@@ -81,6 +87,12 @@ def test_a_network_counts_runs_alike_and_sparse_regression_values():
     _, of_network, weight = of_both_learners(runs)
     share = np.asarray(of_network.weight)[:, 0] / weight[:, 0]
     np.testing.assert_allclose(share, np.sqrt([50.0 / 80.0, 50.0 / 20.0]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("who", list(WEIGHTS)[1:])
+def test_a_record_that_is_zero_throughout_is_refused(who):
+    with pytest.raises(InputError, match=r"b\.csv.*zero throughout"):
+        WEIGHTS[who]([PLAIN, replace(PLAIN, name="b.csv", stress=np.zeros(40))])
 
 
 def test_weights_make_a_residual_the_relative_misfit():
