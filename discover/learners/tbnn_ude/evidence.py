@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import law_misfit
+from discover.learners.tbnn_ude.least_squares import law_misfit, relative_misses
 from discover.learners.tbnn_ude.prior import cloud_of
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
@@ -37,7 +37,7 @@ def surprises(
     the whole one, its samples count as fewer, as a first-order autoregression has it.
     """
     along = [trajectories(law, problem) for law in laws]
-    misses = [np.asarray(problem.records.residual(one.recorded)) for one in along]
+    misses = [np.asarray(relative_misses(one, problem)) for one in along]
     squares = np.array([np.sum(one**2) for one in misses])
     squares = np.where(np.isfinite(squares), squares, np.inf)
     best = int(np.argmin(squares))
@@ -81,7 +81,7 @@ def posterior_draws(
         Largest relative misfit over that of the law.
     """
     along = trajectories(law, problem)
-    misses = np.asarray(problem.records.residual(along.recorded))
+    misses = np.asarray(relative_misses(along, problem))
     least = float(np.sqrt(np.sum(misses**2)))
     precision = _independent(misses, problem.records.seen) / max(least**2, 1e-300)
     rebuild, acts, columns = _sensitivities(law, along, problem)

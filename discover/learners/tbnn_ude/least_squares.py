@@ -176,7 +176,13 @@ def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
 
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
     """Return the data's residuals under a law; their norm is the relative misfit."""
-    return problem.records.residual(trajectories(law, problem).recorded)
+    return relative_misses(trajectories(law, problem), problem)
+
+
+@compiled
+def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "runs n"]:
+    """Return the residuals of what is recorded, by one program."""
+    return problem.records.residual(along.recorded)
 
 
 def minimise(

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.initial_law import constant_scale, without_empty_terms
-from discover.learners.tbnn_ude.least_squares import Objective, minimise
+from discover.learners.tbnn_ude.least_squares import Objective, minimise, relative_misses
 from discover.learners.tbnn_ude.prior import (
     Cloud,
     PriorWeights,
@@ -64,7 +64,7 @@ class Session:
 
     def residual(self, law: TensorBasisNetwork) -> np.ndarray:
         """Return what a law misses, relative to each run, shape (runs, n)."""
-        return np.asarray(self.problem.records.residual(self.along(law).recorded))
+        return np.asarray(relative_misses(self.along(law), self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
         """Return the relative misfit of a law; infinite where it runs away."""
