@@ -44,7 +44,7 @@ def main() -> None:
         """Sum over series of the mean squared error; samples are the grid's own times."""
         fluid = problem.fluid(rebuild(weights))
 
-        def one(protocol, grid, target):
+        def one(protocol, grid):
             solution = diffrax.diffeqsolve(
                 # a closed-over tracer would escape the continuous adjoint
                 diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].rate(t))),
@@ -60,9 +60,10 @@ def main() -> None:
                 max_steps=grid.times.shape[0] - 1,
                 throw=False,
             )
-            return jnp.mean((solution.ys[:, 0, 3] - target) ** 2)
+            return solution.ys[:, 0, 3]
 
-        return jnp.sum(problem.flows.over(one, problem.target))
+        errors = problem.flows.over(one) - problem.records.recorded
+        return jnp.sum(jnp.mean(errors**2, axis=1))
 
     def through(adjoint):
         gradient = eqx.filter_jit(jax.grad(lambda w, p: loss(w, p, adjoint)))
@@ -71,7 +72,7 @@ def main() -> None:
     @eqx.filter_jit
     def variational(weights, problem):
         along, jacobian = states_and_jacobian(weights, rebuild, problem)
-        residual = problem.missed_by(along.recorded)
+        residual = along.recorded - problem.records.recorded
         n = residual.shape[1]
         return 2.0 / n * jnp.einsum("rn,rnp->p", residual, jacobian)
 
@@ -111,7 +112,8 @@ def main() -> None:
             f"relative error {error:.1e}   first call {compiled:.1f} s",
             flush=True,
         )
-    print(f"{weights.size} weights, {problem.target.size} samples, {arguments.repeats} repeats")
+    samples = problem.records.recorded.size
+    print(f"{weights.size} weights, {samples} samples, {arguments.repeats} repeats")
 
 
 if __name__ == "__main__":

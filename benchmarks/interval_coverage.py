@@ -55,7 +55,8 @@ def main() -> None:
         dataset = synthetic_dataset(law, parameters)
         library = TermLibrary(tuple(parse_term(name) for name in names))
         problem = make_problem(list(dataset), library)
-        clean, weight = np.asarray(problem.target), np.asarray(problem.weight)
+        records = problem.records
+        clean, weight = np.asarray(records.recorded), np.asarray(records.weight)
         size = np.where(weight > 0, options.noise / np.maximum(weight, 1e-300), 0.0)
         size /= np.sqrt(np.sum(weight > 0))
         support = tuple(range(len(names)))
@@ -67,7 +68,8 @@ def main() -> None:
             at_one: list[tuple[float, float, bool]] = []
             for _ in range(options.sets):
                 error = noise(rng, clean.shape[0], clean.shape[1], correlation)[..., None]
-                noisy = eqx.tree_at(lambda p: p.target, problem, jnp.asarray(clean + size * error))
+                changed = jnp.asarray(clean + size * error)
+                noisy = eqx.tree_at(lambda p: p.records.recorded, problem, changed)
                 fit = refit(noisy, [support], [start], np.ones(len(names)), slots=2)[0]
                 result = parameter_uncertainty(noisy, fit, misfit_floor=1.0)
                 half = result.factor * np.sqrt(np.diag(result.covariance))

@@ -44,7 +44,7 @@ def batches(call):
     from discover.learners.tensor_sindy.refit import _lay_out
 
     problem, supports, starts, scale, slots, keeps, _ = call
-    everything = np.ones(problem.target.shape[:2], dtype=bool)
+    everything = np.ones(problem.records.recorded.shape[:2], dtype=bool)
     keeps = [everything] * len(supports) if keeps is None else keeps
     jobs = list(zip(supports, starts, keeps, strict=True))
     nothing = ((), starts[0], everything)

@@ -54,15 +54,15 @@ def adaptive_gradient(problem, network):
 
     from discover.learners.tbnn_ude.recipe_paper import paper_loss
 
-    everything = jnp.ones(problem.target.shape[0], bool)
+    everything = jnp.ones(len(problem.flows), bool)
 
     def loss(part, law, problem):
         law = eqx.tree_at(lambda tree: tree.network, law, part)
         fluid = problem.fluid(law)
 
-        def one(protocol, grid, target):
+        def one(protocol, grid):
             # samples of the paper are evenly spaced and start at zero
-            times = jnp.linspace(0.0, grid.times[-1], target.shape[0])
+            times = jnp.linspace(0.0, grid.times[-1], grid.sample_index.shape[0])
             solution = diffrax.diffeqsolve(
                 diffrax.ODETerm(lambda t, y, a: a[0].state_rate(y, a[1].rate(t))),
                 diffrax.Tsit5(),
@@ -79,9 +79,10 @@ def adaptive_gradient(problem, network):
                 max_steps=16**4,
                 throw=False,
             )
-            return jnp.mean((solution.ys[:, 0, 3] - target) ** 2)
+            return solution.ys[:, 0, 3]
 
-        errors = problem.flows.over(one, problem.target)
+        off = problem.flows.over(one) - problem.records.recorded
+        errors = jnp.mean(off**2, axis=1)
         weights = jax.tree.leaves(eqx.filter(part, eqx.is_inexact_array))
         return jnp.sum(errors) + 0.01 * sum(jnp.sum(jnp.abs(w)) for w in weights)
 
@@ -125,13 +126,14 @@ def everything_at_once(problem, seed: int, known: bool):
 
     @eqx.filter_custom_jvp
     def residual(weights, problem):
-        return problem.residual(rebuild(weights)).ravel()
+        return problem.records.residual(problem.predicted(rebuild(weights))).ravel()
 
     @residual.def_jvp
     def _(primals, tangents):
         weights, data = primals
         along, jacobian = states_and_jacobian(weights, rebuild, data)
-        return data.missed_by(along.recorded).ravel(), (jacobian @ tangents[0]).ravel()
+        residual, columns = data.records.linearised(along.recorded, jacobian)
+        return residual.ravel(), (columns @ tangents[0]).ravel()
 
     solution = optx.least_squares(
         residual,

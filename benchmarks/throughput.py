@@ -76,7 +76,7 @@ def by_vmap(seeds: int, repeats: int) -> None:
     for seed in range(seeds):
         data = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, seed=seed)
         made.append(problems.make_problem(data.runs, library, np.ones(1), np.ones(1)))
-    everything = np.ones(made[0].target.shape[:2], dtype=bool)
+    everything = np.ones(made[0].records.recorded.shape[:2], dtype=bool)
     start = (np.zeros(len(library)), library.inner_default)
     scale = np.ones(len(library))
     layouts = [_lay_out(p, support, start, scale, 2, everything) for p in made]

@@ -50,9 +50,8 @@ def test_sensitivities_of_a_flow_curve_beside_a_transient_are_its_differences():
     step = 1e-5  # the difference errs by its square, and by rounding over it
     for i in range(len(FEW)):
         moved = [linearise(problem, at.at[i].add(s), nothing)[0] for s in (step, -step)]
-        # the residual is data less prediction
         np.testing.assert_allclose(
-            -columns[:, i], (moved[0] - moved[1]) / (2.0 * step), rtol=1e-5, atol=1e-7
+            columns[:, i], (moved[0] - moved[1]) / (2.0 * step), rtol=1e-5, atol=1e-7
         )
     # at the law that made them both are reproduced
     right = at.at[FEW.names.index("sigma.sigma")].set(MOBILITY)
@@ -76,14 +75,15 @@ def test_the_network_is_told_of_steady_states_as_their_differences_say():
     direction = jax.random.normal(jax.random.key(2), weights.shape)
     step = 1e-5
     ends = [
-        problem.missed_by(
+        problem.records.residual(
             states_and_jacobian(weights + s * direction, rebuild, problem)[0].recorded
         )
         for s in (step, -step)
     ]
     expected = (ends[0] - ends[1]) / (2.0 * step)
     size = float(jnp.max(jnp.abs(expected)))
-    np.testing.assert_allclose(jacobian @ direction, expected, atol=1e-6 * size)
+    _, columns = problem.records.linearised(along.recorded, jacobian)
+    np.testing.assert_allclose(columns @ direction, expected, atol=1e-6 * size)
     assert bool(jnp.all(jnp.isfinite(along.states)))
 
 

@@ -13,7 +13,6 @@ import discover as dc
 from discover.dataset import Run
 from discover.dataset.loading import Loading
 from discover.learners.own_loadings import signals_of, with_likely_factors
-from discover.learners.tbnn_ude.problem import data_scale
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.learners.trajectories.problem import make_problem
 from discover.learners.trajectories.sensitivities import linearise
@@ -78,8 +77,7 @@ def test_sensitivities_are_those_with_the_factors_let_go():
         moved = at.copy()
         moved[3] += sign * step
         ends.append(np.asarray(linearise(problem, jnp.asarray(moved), jnp.zeros(0))[0]))
-    # residuals are data minus prediction
-    slope = -(ends[0] - ends[1]) / (2.0 * step)
+    slope = (ends[0] - ends[1]) / (2.0 * step)
     assert np.asarray(columns)[:, 3] == pytest.approx(slope, abs=1e-6 * np.max(np.abs(slope)))
 
 
@@ -104,9 +102,8 @@ def test_a_network_sees_no_misfit_in_the_factor_of_a_loading():
     def left(loading):
         runs = runs_of({0.5: 1.03, 2.0: 0.97}, noise=0.0, loading=loading)
         problem = network_problem(runs, np.array([100.0]), np.array([1.0]))
-        exact = [runs[0].stress / 103.0, runs[1].stress / 97.0]
-        missed = problem.missed_by(jnp.asarray(np.stack(exact)))
-        return float(jnp.linalg.norm(problem.less_factors(missed, data_scale(problem))))
+        exact = [runs[0].stress / 1.03, runs[1].stress / 0.97]
+        return float(jnp.linalg.norm(problem.records.residual(jnp.asarray(np.stack(exact)))))
 
     unaware = left(None)
     assert unaware == pytest.approx(0.03, rel=0.05)
@@ -116,11 +113,12 @@ def test_a_network_sees_no_misfit_in_the_factor_of_a_loading():
 
 @pytest.mark.slow
 def test_derivatives_of_a_network_are_those_with_the_factors_let_go():
-    problem = network_problem(runs_of(FACTORS), np.array([100.0]), np.array([1.0]))
-    change = jax.random.normal(jax.random.key(0), (*problem.target.shape, 1))
-    missed, scale = 0.01 * problem.target, jnp.full(problem.target.shape, 0.1)
-    ends = [problem.less_factors(missed + s * 1e-6 * change[..., 0], scale) for s in (1.0, -1.0)]
-    slope = np.asarray(ends[0] - ends[1]) / 2e-6
-    told = np.asarray(problem.columns(missed, scale, change))[..., 0]
-    assert told == pytest.approx(slope, abs=1e-7)
-    assert np.max(np.abs(told - 0.1 * np.asarray(change[..., 0]))) > 0.01
+    records = network_problem(runs_of(FACTORS), np.array([100.0]), np.array([1.0])).records
+    change = jax.random.normal(jax.random.key(0), (*records.recorded.shape, 1))
+    predicted = 1.01 * records.recorded
+    ends = [records.residual(predicted + s * 1e-4 * change[..., 0]) for s in (1.0, -1.0)]
+    slope = np.asarray(ends[0] - ends[1]) / 2e-4
+    told = np.asarray(records.linearised(predicted, change)[1])[..., 0]
+    assert told == pytest.approx(slope, abs=1e-9)
+    held = np.asarray(records.weight * change[..., 0])
+    assert np.max(np.abs(told - held)) > 0.01 * np.max(np.abs(held))

@@ -93,7 +93,7 @@ def test_what_a_law_predicts_is_what_scipy_finds_after_many_cycles():
     active = jnp.array([list(FEW.names).index("sigma.sigma")])
     both = jnp.array([[MOBILITY], [0.5 * MOBILITY]])
     found = np.asarray(predict_many(problem, active, both, jnp.zeros((2, 0)))).reshape(2, -1, 3)
-    weight = np.asarray(problem.weight)[0, : len(run), 0]
+    weight = np.asarray(problem.records.weight)[0, : len(run), 0]
     exact = weight * run.stress
     np.testing.assert_allclose(found[0, : len(run), 0], exact, atol=5e-5 * np.max(np.abs(exact)))
     # the control: another law is told apart

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 import discover as dc
+from discover.dataset.loading import Loading
+from discover.errors import InputError
 from discover.forward import make_batch
-from discover.learners.tbnn_ude.problem import data_scale
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.learners.trajectories.problem import make_problem
+from discover.protocols import imposed_stress, oscillations
+from discover.protocols.control import steady_rates
 from tensor_library.library import build_library
 
 TIMES = np.linspace(0.1, 4.0, 40)
@@ -17,10 +20,15 @@ PLAIN = dc.Run("a.csv", TIMES, dc.start_up(1.0), np.ones(40), 1.0 - np.exp(-TIME
 TWICE = replace(PLAIN, name="b.csv", weight=2.0)
 MODE = np.ones(1), np.ones(1)
 
+
+def sparse_problem(runs, **known):
+    return make_problem(runs, build_library(), *MODE, **known)
+
+
 WEIGHTS = {
     "the closed loop": lambda runs: make_batch(runs).weight,
-    "sparse regression": lambda runs: make_problem(runs, build_library(), *MODE).weight[..., 0],
-    "the network": lambda runs: data_scale(network_problem(runs, *MODE)),
+    "sparse regression": lambda runs: sparse_problem(runs).records.weight[..., 0],
+    "the network": lambda runs: network_problem(runs, *MODE).records.weight,
 }
 
 
@@ -28,3 +36,66 @@ WEIGHTS = {
 def test_a_run_that_weighs_twice_has_residuals_twice_as_large(who):
     once, twice = np.asarray(WEIGHTS[who]([PLAIN, TWICE]))[:, :40] * np.ones((2, 40))
     np.testing.assert_allclose(twice, 2.0 * once, rtol=1e-12)
+
+
+def of_every_kind(n):
+    """A start-up, a heavier one, one of N1, a flow curve, creep and both moduli, n samples each."""
+    times = np.linspace(0.1, 4.0, n)
+    stress = 100.0 * (1.0 - np.exp(-times))
+    up = dc.Run(
+        "up", times, dc.start_up(1.0), np.ones(n), stress, first_normal_stress_difference=stress**2
+    )
+    rates = np.geomspace(0.1, 10.0, n)
+    counted = np.arange(1.0, n + 1.0)
+    held = imposed_stress(times, np.full(n, 40.0))
+    swept = oscillations(rates, np.ones(n))
+    sweep = dc.Run(
+        "sweep", counted, swept, rates, stress, strain=rates, storage_modulus=stress,
+        loss_modulus=1.0 + stress,
+    )  # fmt: skip
+    return [
+        up,
+        replace(up, name="heavier", weight=2.0, loading=Loading(0.03)),
+        up.observing("N1"),
+        dc.Run("curve", counted, steady_rates(rates), rates, rates**0.7),
+        dc.Run("creep", times, held, rates, stress, strain=times),
+        *sweep.records,
+    ]
+
+
+def of_both_learners(runs):
+    of_sparse = sparse_problem(runs, solvent_viscosity=5.0).records
+    of_network = network_problem(runs, *MODE, solvent_viscosity=5.0).records
+    n = of_network.weight.shape[1]
+    return of_sparse, of_network, np.asarray(of_sparse.weight)[:, :n, 0]
+
+
+def test_all_judge_the_same_records_by_the_same_weights_beside_a_solvent_too():
+    runs = of_every_kind(20)
+    of_sparse, of_network, weight = of_both_learners(runs)
+    np.testing.assert_allclose(of_network.weight, weight, rtol=1e-14)
+    # the loop sums over runs where learners take the mean
+    of_loop = np.asarray(make_batch(runs).weight)[:, :20] / np.sqrt(len(runs))
+    np.testing.assert_allclose(of_loop, weight, rtol=1e-14)
+    np.testing.assert_array_equal(of_network.recorded, of_sparse.recorded[:, :20, 0])
+    own = [np.asarray(records.loading) for records in (of_network, of_sparse)]
+    np.testing.assert_allclose(*own, rtol=1e-14)
+
+
+def test_a_network_counts_runs_alike_and_sparse_regression_values():
+    runs = [PLAIN, replace(PLAIN, name="b.csv").window(np.arange(40) < 10)]
+    _, of_network, weight = of_both_learners(runs)
+    share = np.asarray(of_network.weight)[:, 0] / weight[:, 0]
+    np.testing.assert_allclose(share, np.sqrt([50.0 / 80.0, 50.0 / 20.0]), rtol=1e-14)
+
+
+@pytest.mark.parametrize("who", list(WEIGHTS)[1:])
+def test_a_record_that_is_zero_throughout_is_refused(who):
+    with pytest.raises(InputError, match=r"b\.csv.*zero throughout"):
+        WEIGHTS[who]([PLAIN, replace(PLAIN, name="b.csv", stress=np.zeros(40))])
+
+
+def test_weights_make_a_residual_the_relative_misfit():
+    runs = of_every_kind(20)[2:]  # those that weigh alike
+    for records in of_both_learners(runs)[:2]:
+        assert float(np.linalg.norm(records.residual(1.1 * records.recorded))) == pytest.approx(0.1)

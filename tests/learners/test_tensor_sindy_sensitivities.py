@@ -48,8 +48,8 @@ def test_the_augmented_system_predicts_what_the_law_predicts(problem, trial):
     residual, _ = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
     law = LibraryExpansion(jnp.asarray(coefficients), jnp.asarray(inner), LIBRARY)
     stress = solve_batch(Fluid.dimensionless(law), problem.flows)[..., 3]
-    expected = problem.weight[..., 0] * (problem.target[..., 0] - stress)
-    shear_rows = np.asarray(residual).reshape(problem.target.shape)[..., 0]
+    expected = problem.records.weight[..., 0] * (stress - problem.records.recorded[..., 0])
+    shear_rows = np.asarray(residual).reshape(problem.records.recorded.shape)[..., 0]
     # the same method on the same grid: rounding only
     np.testing.assert_allclose(shear_rows, expected, atol=1e-12)
 
@@ -67,7 +67,7 @@ def test_sensitivities_are_derivatives_of_the_trajectory(problem, trial):
             else:
                 i[column - N] += sign * step
             ends.append(np.asarray(linearise(problem, jnp.asarray(c), jnp.asarray(i))[0]))
-        difference = (ends[1] - ends[0]) / (2.0 * step)
+        difference = (ends[0] - ends[1]) / (2.0 * step)
         # central differences: truncation and rounding are both near step² = 1e-10
         np.testing.assert_allclose(columns[:, column], difference, atol=1e-8)
 
@@ -96,12 +96,12 @@ def test_a_runaway_start_is_a_large_misfit_and_not_an_error(problem):
 
 
 def test_samples_left_out_do_not_count(problem):
-    keep = np.zeros(problem.target.shape[:2], dtype=bool)
+    keep = np.zeros(problem.records.recorded.shape[:2], dtype=bool)
     keep[:, :30] = True
-    spoiled = problem.target.at[:, 30:].add(5.0)
+    spoiled = problem.records.recorded.at[:, 30:].add(5.0)
     import equinox as eqx
 
-    spoiled_problem = eqx.tree_at(lambda p: p.target, problem, spoiled)
+    spoiled_problem = eqx.tree_at(lambda p: p.records.recorded, problem, spoiled)
     start = (np.zeros(N), np.array([0.3]))
     kept, whole = refit(
         spoiled_problem,

@@ -124,10 +124,10 @@ def _surely_unexplained(
     sparse: "TensorSINDy", runs: Sequence[Run], expectation: Expectation
 ) -> bool:
     """Return whether the law found leaves so much that no band of its rivals will be asked for."""
-    problem = sparse.search_.problem
+    laid_out = sparse.search_.problem.records
     fit = sparse.path_[sparse.result_.details["chosen"]]
-    weight = np.asarray(problem.weight)[..., 0]
-    apart = (fit.predicted - problem.weighted_target).reshape(problem.target.shape)[..., 0]
+    weight = np.asarray(laid_out.weight)[..., 0]
+    apart = (fit.predicted - laid_out.weighted_record).reshape(laid_out.weight.shape)[..., 0]
     residuals, records = [], []
     for row, weights, run in zip(apart, weight, runs, strict=True):
         seen = weights[: len(run)] > 0

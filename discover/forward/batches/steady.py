@@ -20,8 +20,8 @@ class SteadyBatch(eqx.Module):
     rate
         In 1/s, shape (runs, n).
     weight
-        1/(recorded stress · √samples): of a flow curve the squared residuals sum to the mean
-        squared relative deviation.
+        As in `RunBatch`: the squared residuals of a flow curve sum to the mean squared relative
+        deviation.
     recorded, kinematics
         As in `RunBatch`.
     """

@@ -39,8 +39,8 @@ class RunBatch(eqx.Module):
     sample_index
         Position of the samples among step ends, shape (runs, n).
     weight
-        1/(rms record · √samples) at samples, 0 at padding: the squared residuals of a run then
-        sum to its squared relative error.
+        Of each sample, as `measured` returns it, zero at padding: the squared residuals of a run
+        that weighs as much as others sum to its squared relative error.
     recorded
         What was measured in Pa, shape (runs, n).
     clock_factor

@@ -161,7 +161,7 @@ class RivalTable(SentenceAndTable):
 def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
     """Return the rivals of a fit among all that a search refitted, by the rule of this module."""
     problem = search.problem
-    seen = np.asarray(problem.weight).reshape(-1) > 0
+    seen = problem.records.seen.reshape(-1)
     rows, target = _in_time_order(problem, seen)
     size = len(chosen.support)
     fits = [
@@ -189,7 +189,7 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
         evidence = compare_residuals(
             residual,
             fit.predicted[rows] - target,
-            problem.run_of_row[rows],
+            problem.records.run_of_row[rows],
             nested,
             search.floor,
         )
@@ -212,10 +212,10 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
 
 def _in_time_order(problem, seen):
     """Return the observed rows, kind after kind so that neighbours are neighbours in time."""
-    shape = problem.target.shape
+    shape = problem.records.recorded.shape
     index = np.arange(int(np.prod(shape))).reshape(shape).transpose(0, 2, 1).reshape(-1)
     rows = index[seen[index]]
-    return rows, problem.weighted_target[rows]
+    return rows, problem.records.weighted_record[rows]
 
 
 def _polish(search: SupportSearch, fits: list[Fit], chosen: Fit) -> list[Fit]:

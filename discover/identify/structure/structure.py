@@ -28,6 +28,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.learners.records import Records
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of
@@ -243,7 +244,7 @@ def analyse_structure(
         use_normal_stresses=use_normal_stresses,
         strain_step=_STRAIN_STEP,
     )
-    seen = np.any(np.asarray(problem.weight) > 0, axis=(0, 1))
+    seen = np.any(problem.records.seen, axis=(0, 1))
     known = "the known part alone"
     laws = {known: LawTerms({}), **nominal}
     everywhere = _unit_weights(problem)
@@ -258,21 +259,21 @@ def analyse_structure(
 def _unit_weights(problem: TrajectoryProblem) -> TrajectoryProblem:
     """Return the problem with every sample of σ12, N1 and N2 observed with weight one."""
     sampled = jnp.isfinite(problem.order_of_time)[..., None]
-    weight = jnp.broadcast_to(jnp.where(sampled, 1.0, 0.0), problem.weight.shape)
+    nothing = jnp.zeros_like(problem.records.recorded)
     # what is recorded of each, whatever the loading
-    return replace(problem, target=jnp.zeros_like(problem.target), weight=weight, loading=None)
+    return replace(problem, records=Records(nothing, jnp.where(sampled, 1.0, nothing)))
 
 
 def _at(problem, library, base, name, law, seen) -> LawStructure | None:
     """Return the structure at one law, or None where it runs away in these flows."""
     coefficients, inner = dense(library, law)
     residual, columns = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
-    shape = problem.target.shape
-    stresses = -np.asarray(residual).reshape(shape)
+    shape = problem.records.recorded.shape
+    stresses = np.asarray(residual).reshape(shape)
     sensitivity = np.asarray(columns).reshape(*shape, -1)[..., : len(library)]
     if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
         return None
-    samples = np.asarray(problem.weight)[..., 0] > 0
+    samples = problem.records.seen[..., 0]
     # relative to the root-mean-square of each run; N2 to that of N1
     scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
     scale[:, 2] = scale[:, 1]

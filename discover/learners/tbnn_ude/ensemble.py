@@ -16,7 +16,6 @@ the first, and none repeats its search.
 from collections.abc import Sequence
 from dataclasses import replace
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -48,7 +47,7 @@ def train_others(
     progress: Progress | None = None,
 ) -> tuple[list[Trained], str]:
     """Return one more member for each key, and in words how they came about."""
-    n_runs = problem.target.shape[0]
+    n_runs = len(problem.flows)
     if not first.varies and n_runs < 2:
         return [first] * len(keys), "a single run has no halves: members do not differ"
     if not first.varies:
@@ -95,8 +94,7 @@ def halves_of_runs(
 
 def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
     """Return the problem with only some of the runs looked at; its shapes stay the same."""
-    mask = problem.sample_mask & jnp.asarray(runs)[:, None]
-    return eqx.tree_at(lambda tree: tree.sample_mask, problem, mask)
+    return replace(problem, records=problem.records.only(jnp.asarray(runs)))
 
 
 def choose_member(

@@ -18,9 +18,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import relative_misses
+from discover.learners.tbnn_ude.least_squares import law_misfit, relative_misses
 from discover.learners.tbnn_ude.prior import cloud_of
-from discover.learners.tbnn_ude.problem import TrainingProblem, data_scale
+from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
 from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
 
@@ -43,8 +43,7 @@ def surprises(
     best = int(np.argmin(squares))
     if not 0.0 < squares[best] < np.inf:
         return np.where(squares == squares[best], 0.0, np.inf)
-    mask = np.asarray(problem.sample_mask)
-    precision = _independent(misses[best], mask) / squares[best]
+    precision = _independent(misses[best], problem.records.seen) / squares[best]
     enduring = np.isfinite(squares) & [endures(law, problem) for law in laws]
     found = np.full(len(laws), np.inf)
     usable = enduring if np.any(enduring) else np.isfinite(squares)
@@ -84,7 +83,7 @@ def posterior_draws(
     along = trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))
     least = float(np.sqrt(np.sum(misses**2)))
-    precision = _independent(misses, np.asarray(problem.sample_mask)) / max(least**2, 1e-300)
+    precision = _independent(misses, problem.records.seen) / max(least**2, 1e-300)
     rebuild, acts, columns = _sensitivities(law, along, problem)
     values, vectors = np.linalg.eigh(columns.T @ columns)
     spread = vectors / np.sqrt(1.0 + precision * np.clip(values, 0.0, None))
@@ -95,7 +94,7 @@ def posterior_draws(
         step[acts] = spread @ np.asarray(jax.random.normal(key, (spread.shape[1],)))
         for _ in range(_HALVINGS):
             drawn = rebuilt(rebuild, jnp.asarray(start + step))
-            left = np.asarray(relative_misses(trajectories(drawn, problem), problem))
+            left = np.asarray(law_misfit(drawn, problem))
             if np.max(np.abs(left)) < np.inf and np.linalg.norm(left) <= fits * least:
                 found.append(drawn)
                 break
@@ -128,9 +127,8 @@ def _sensitivities(
     rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
     _, jacobian = side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
-    missed = problem.missed_by(along.recorded)
-    columns = np.asarray(problem.columns(missed, data_scale(problem), jacobian))[..., acts]
-    return rebuild, acts, columns.reshape(-1, int(np.sum(acts)))
+    _, columns = problem.records.linearised(along.recorded, jacobian)
+    return rebuild, acts, np.asarray(columns)[..., acts].reshape(-1, int(np.sum(acts)))
 
 
 def _independent(misses: Float[np.ndarray, "runs n"], mask: np.ndarray) -> float:

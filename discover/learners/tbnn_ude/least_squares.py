@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
-from discover.learners.tbnn_ude.problem import TrainingProblem, data_scale
+from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import (
     Along,
     side_by_side,
@@ -99,16 +99,13 @@ def linearise(
 
 @partial(compiled, runs_long=True)
 def _with_prior(weights, objective, along, jacobian):
-    scale = data_scale(objective.problem)
-    missed = objective.problem.missed_by(along.recorded)
-    misses = objective.problem.less_factors(missed, scale)
+    misses, data = objective.problem.records.linearised(along.recorded, jacobian)
 
     def prior(weights):
         return prior_residual(objective.rebuild(weights), objective.cloud, objective.prior)
 
     rows = jnp.concatenate([misses.ravel(), prior(weights)])
-    data = objective.problem.columns(missed, scale, jacobian).reshape(-1, weights.shape[0])
-    matrix = jnp.concatenate([data, jax.jacfwd(prior)(weights)])
+    matrix = jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
     return Linearised(weights, _AMPLIFICATION * rows, _AMPLIFICATION * matrix)
 
 
@@ -184,8 +181,8 @@ def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array
 
 @compiled
 def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "runs n"]:
-    """Return the data's residuals, whose norm is the relative misfit, from what is recorded."""
-    return problem.less_factors(problem.missed_by(along.recorded), data_scale(problem))
+    """Return the residuals of what is recorded, by one program."""
+    return problem.records.residual(along.recorded)
 
 
 def minimise(

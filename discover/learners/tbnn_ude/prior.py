@@ -83,14 +83,12 @@ def cloud_of(along: Along, problem: TrainingProblem) -> Cloud:
 
 
 def _weights(problem: TrainingProblem) -> Float[Array, "runs states k"]:
-    runs, modes = problem.target.shape[0], problem.modulus.shape[0]
-    shape = (runs, STATES_PER_RUN, modes)
-    if modes == 1:
+    shape = (len(problem.flows), STATES_PER_RUN, problem.modulus.size)
+    if problem.modulus.size == 1:
         return jnp.ones(shape)
-    mask = problem.sample_mask
-    squares = jnp.sum(jnp.where(mask, problem.target, 0.0) ** 2, axis=1)
-    stress = jnp.sqrt(squares / jnp.maximum(jnp.sum(mask, axis=1), 1)) * problem.stress_of_unit
-    stress = jnp.where(stress > 0.0, stress, 1.0)  # a run at rest has no scale of its own
+    # a run at rest, or not looked at, has no scale of its own
+    scaled = (problem.stress > 0.0) & jnp.any(problem.records.weight > 0, axis=1)
+    stress = jnp.where(scaled, problem.stress, jnp.sum(problem.modulus))
     return jnp.broadcast_to(problem.modulus / stress[:, None, None], shape)
 
 

@@ -65,7 +65,7 @@ def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> Tens
 
 def _with_series(problem: TrainingProblem, active: Bool[Array, " runs"]) -> TrainingProblem:
     """Return the problem with the other series at rest, where they cannot run away."""
-    quiet = problem.flows.faster(active.astype(problem.target.dtype))
+    quiet = problem.flows.faster(active.astype(float))
     return eqx.tree_at(lambda p: p.flows, problem, quiet)
 
 
@@ -142,7 +142,7 @@ def train_paper(
     law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
     network = law.network
     state = optax.adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
-    n_runs = problem.target.shape[0]
+    n_runs = len(problem.flows)
     total = n_runs * recipe.iterations_per_series
     losses: list[np.ndarray] = []
     done = 0

@@ -95,7 +95,7 @@ class Session:
 
     def white(self, law: TensorBasisNetwork) -> bool:
         """Return whether what a law leaves looks like noise."""
-        return is_white(self.residual(law), np.asarray(self.problem.sample_mask))
+        return is_white(self.residual(law), self.problem.records.seen)
 
     def settled(self, law: TensorBasisNetwork) -> bool:
         """Return whether a law leaves noise or nothing."""

@@ -20,7 +20,6 @@ from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
 from discover.forward.integrators.at_given_rate import follow
 from discover.forward.starts.steady_states import steady_state
 from discover.laws.each_mode import over_modes
-from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.weights import Rebuild
@@ -35,7 +34,7 @@ class Along(NamedTuple):
     Attributes
     ----------
     recorded
-        What is recorded, in units of `TrainingProblem.target`, shape (runs, n).
+        What is recorded, in Pa, of creep the strain, shape (runs, n).
     states
         Dimensionless stress of every mode, shape (runs, n, k, 4).
     rate
@@ -66,7 +65,7 @@ def side_by_side(
     Left to itself the compiled program uses two cores for longer than it takes on one: what it
     shares out is too small. To be called from outside of any transformation.
     """
-    n = problem.target.shape[0]
+    n = len(problem.flows)
     # halves of one size share a program; of an odd number of runs the middle one is in both
     half = -(-n // 2)
     if n < 2 or not problem.flows.is_uniform:
@@ -92,12 +91,8 @@ def states_and_jacobian(
     first: Int[Array, ""] | np.int32 | int = 0,
 ) -> tuple[Along, Float[Array, "runs n p"]]:
     """Return what is recorded and the states at the samples, and what each weight changes of it."""
-    flows, looked_at = problem.flows, problem.sample_mask
-    if count is not None:
-        flows = flows.some(first, count)
-        looked_at = jax.lax.dynamic_slice_in_dim(looked_at, first, count)
-    modulus = problem.modulus
-    law = rebuild(weights)
+    flows = problem.flows if count is None else problem.flows.some(first, count)
+    modulus, fluid = problem.modulus, problem.fluid(rebuild(weights))
 
     def one_mode(rebuild, state, gradient):
         def change(s, w):
@@ -119,9 +114,7 @@ def states_and_jacobian(
             rate = with_cheap_tangents if cheaply else partial
             return rate(stress_rate, made)(w, *flow)
 
-        modes = problem.modulus, problem.relaxation_time, problem.beside(protocol)
-        known = dynamics_of_fluid(Fluid(law, *modes), protocol)
-        return known._replace(slope=over_modes(of_mode, rebuild, -1))
+        return dynamics_of_fluid(fluid, protocol)._replace(slope=over_modes(of_mode, rebuild, -1))
 
     def followed_run(protocol, grid):
         alone = dynamics(weights, protocol)
@@ -166,8 +159,8 @@ def states_and_jacobian(
             return solved_run(protocol, grid)
         run = steady_run if protocol.control == "steady" else followed_run
         states, by_weight = run(protocol, grid)
-        recorded = protocol.recorded_stress(jnp.tensordot(modulus, states, axes=(0, 1)).T)
+        gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
+        recorded = protocol.recorded_stress(jax.vmap(fluid.stress)(states, gradient).T)
         return Along(recorded, states, jax.vmap(protocol.rate)(grid.sample_times)), by_weight
 
-    along, jacobian = flows.over(one_run)
-    return along, jnp.where(looked_at[..., None], jacobian, 0.0)
+    return flows.over(one_run)

@@ -192,7 +192,7 @@ class TensorDense(RunPrediction):
             law=self.law_,
             terms=self.terms_,
             train_seconds=time.perf_counter() - started,
-            details=_details(found, at, problem.n_observations),
+            details=_details(found, at, problem.records.n_observations),
             message=(
                 f"All {len(self.library_)} terms leave a relative misfit of {at.misfit:.2g}; "
                 f"{len(found.optima)} optima about "

@@ -200,7 +200,7 @@ def explore(
 def _noise(problem, reference, scale, floor: float) -> float:
     """Return the relative noise, from one fit of all terms."""
     constants, misfit = reference
-    at, records = with_reference(problem, constants), float(problem.n_observations)
+    at, records = with_reference(problem, constants), float(problem.records.n_observations)
     noise, start = max(misfit / 3.0, floor), np.zeros(len(scale))
     for _ in range(_NOISE_ROUNDS):
         start, residual, columns = mode(at, scale, _FIRST_WIDTH, noise, records, start)
@@ -211,8 +211,8 @@ def _noise(problem, reference, scale, floor: float) -> float:
 
 def _independent(problem, residual) -> float:
     """Return how many independent records a residual is worth."""
-    worth = noise_model([residual[rows] for rows in problem.sequences()]).effective_samples
-    return float(np.clip(worth, _FEWEST_RECORDS, problem.n_observations))
+    worth = noise_model([residual[rows] for rows in problem.records.sequences()]).effective_samples
+    return float(np.clip(worth, _FEWEST_RECORDS, problem.records.n_observations))
 
 
 def _named_law_fits(problem, references, scale, noise: float, records: float) -> bool:
@@ -243,7 +243,7 @@ def _weights(fitting: list[Optimum], noise: float) -> Float[np.ndarray, " optima
 def _path(problem, name, constants, misfit, scale, noise) -> list[Optimum]:
     """Return the modes about one reference from the narrowest width on, until evidence falls."""
     at, start = with_reference(problem, constants), np.zeros(len(scale))
-    records, path = float(problem.n_observations), []
+    records, path = float(problem.records.n_observations), []
     for width in WIDTHS:
         start, residual, columns = mode(at, scale, width, noise, records, start)
         left = float(np.linalg.norm(residual))
@@ -332,7 +332,7 @@ def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "row
 
 
 def _residuals(problem, optimum: Optimum, coefficients, moduli=None) -> Float[np.ndarray, "m rows"]:
-    target = problem.weighted_target
+    target = problem.records.weighted_record
     at = with_reference(problem, optimum.constants)
     places, inner = jnp.arange(coefficients.shape[1]), jnp.zeros((len(coefficients), 0))
     own = None if moduli is None else jnp.asarray(moduli)

@@ -40,8 +40,8 @@ def _rows(unit, layout: _Layout):
     problem = layout.problem
     everything = jnp.arange(unit.shape[0])
     predicted, sensitivity = observe(problem, everything, layout.scale * unit, jnp.zeros(0))
-    residual = problem.weighted(predicted) - problem.weight * problem.target
-    columns = problem.weighted_columns(predicted, sensitivity) * layout.scale
+    residual, columns = problem.records.linearised(predicted, sensitivity)
+    columns = columns * layout.scale
     sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
     # a constant residual of runaway size is an increase, which the solver rejects
     residual = jnp.where(sane, residual, _RUNAWAY / jnp.sqrt(1.0 * residual.size)).reshape(-1)

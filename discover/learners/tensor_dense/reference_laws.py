@@ -184,7 +184,7 @@ def left_beside_modes(
 
 def _residual(problem: TrajectoryProblem, constants) -> Float[np.ndarray, " rows"]:
     """Return prediction minus data of a reference law; where it runs away, of a size that shows."""
-    target = problem.weighted_target
+    target = problem.records.weighted_record
     at = with_reference(problem, constants)
     nothing = jnp.zeros((1, len(problem.library)))
     predicted = predict_many(at, jnp.arange(nothing.shape[1]), nothing, jnp.zeros((1, 0)))

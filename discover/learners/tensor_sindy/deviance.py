@@ -50,7 +50,7 @@ def _deviance(problem, fit, uncertainty, residual, columns, inner, slots) -> Dev
     """Return the deviance D of laws from the fit.
 
     With d a law's prediction minus the fit's, u = (SᵀS)⁻¹Sᵀd its best imitation by the
-    linearisation and r the residual of the fit, D = uᵀC⁻¹u + (|d − Su|² − 2 r·(d − Su)) / s²: the
+    linearisation and r the residual of the fit, D = uᵀC⁻¹u + (|d − Su|² + 2 r·(d − Su)) / s²: the
     first part alone, with C the covariance of correlated noise, is all where the law is linear.
     """
     n = len(fit.support)
@@ -61,8 +61,9 @@ def _deviance(problem, fit, uncertainty, residual, columns, inner, slots) -> Dev
     scaled = uncertainty.total_covariance / np.outer(scale, scale)
     precision = np.linalg.pinv(scaled, hermitian=True, rcond=1e-13) / np.outer(scale, scale)
     imitate = np.linalg.pinv(columns * scale, rcond=1e-13).T * scale
-    free = max(problem.n_observations - columns.shape[1], 1)
-    remembered = problem.n_observations / max(uncertainty.noise.effective_samples, 1.0)
+    values = problem.records.n_observations
+    free = max(values - columns.shape[1], 1)
+    remembered = values / max(uncertainty.noise.effective_samples, 1.0)
     size = np.sum(residual**2) / free * max(remembered, 1.0) + (uncertainty.floor / HALF_BAND) ** 2
     forms = problem.library.inner_bounds
     bounds = np.array([forms[i] for i in inner], dtype=float).reshape(-1, 2)
@@ -82,7 +83,7 @@ def _deviance(problem, fit, uncertainty, residual, columns, inner, slots) -> Dev
             imitated = np.nan_to_num(apart) @ imitate
             beyond = apart - imitated @ columns.T
             parts = np.einsum("ni,ij,nj->n", imitated, precision, imitated)
-            curved = np.sum(beyond**2, axis=1) - 2.0 * beyond @ residual
+            curved = np.sum(beyond**2, axis=1) + 2.0 * beyond @ residual
             found = parts + curved / size
         return np.where(sane & np.isfinite(found), found, np.inf)
 

@@ -305,11 +305,11 @@ class TensorSINDy(RunPrediction):
                 [member.support for member in path],
                 self.n_stability,
                 self.random_state,
-                search.n_independent / problem.n_observations,
+                search.n_independent / problem.records.n_observations,
             )
         model = search.model_at(fit)
         # the model's rows are divided by √n; a ridge penalty of pysindy's is meant for sums
-        rows = np.sqrt(problem.n_observations)
+        rows = np.sqrt(problem.records.n_observations)
         selectors = compare_selectors(
             library.names,
             path,
@@ -348,7 +348,7 @@ class TensorSINDy(RunPrediction):
                 else type(self.optimizer).__name__,
                 "misfit": fit.misfit,
                 "noise": noise_of(self.uncertainty_),
-                "n_observations": problem.n_observations,
+                "n_observations": problem.records.n_observations,
                 "n_independent": search.n_independent,
             },
             message=(

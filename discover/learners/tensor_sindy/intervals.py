@@ -108,7 +108,7 @@ def parameter_uncertainty(
     if np.any(np.asarray(problem.modulus_error)):
         shared = modulus_columns(problem, fit.support, slots, fit.coefficients, fit.inner)
     covariance, inverse, noise = least_squares_covariance(
-        chosen, residual, problem.sequences(), shared
+        chosen, residual, problem.records.sequences(), shared
     )
     free = max(noise.effective_samples - chosen.shape[1], 1.0)
     return ParameterUncertainty(

@@ -58,10 +58,10 @@ class LinearModel:
             within = np.all(np.abs(columns) < _RUNAWAY, axis=1) & (np.abs(residual) < _RUNAWAY)
         lost = ~within  # so is what is not a number
         if keep is not None:
-            lost |= ~np.repeat(keep.reshape(-1), problem.target.shape[2])
+            lost |= ~np.repeat(keep.reshape(-1), problem.records.recorded.shape[2])
         residual[lost], columns[lost] = 0.0, 0.0
         design, inner = columns[:, :n], columns[:, n:]
-        target = residual + design @ c
+        target = design @ c - residual
         inner = inner[:, np.linalg.norm(inner, axis=0) > 0]
         if inner.shape[1]:
             basis = np.linalg.qr(inner)[0]

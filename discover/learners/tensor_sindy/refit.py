@@ -91,14 +91,13 @@ def _residual_and_jacobian(parameters, problem: TrajectoryProblem, layout: _Layo
     inner, slope = jax.jvp(lambda u: inner_from_free(problem, u), (free,), (jnp.ones_like(free),))
     scale = jnp.where(layout.occupied, layout.scale, 0.0)
     predicted, sensitivity = observe(problem, layout.active, scale * scaled, inner)
-    recorded = jnp.where(layout.keep[..., None], problem.weight * problem.target, 0.0)
-    residual = _AMPLIFICATION * (problem.weighted(predicted, layout.keep) - recorded)
     columns = sensitivity * jnp.concatenate([scale, slope])
-    columns = _AMPLIFICATION * problem.weighted_columns(predicted, columns, layout.keep)
+    residual, columns = problem.records.only(layout.keep).linearised(predicted, columns)
+    residual, columns = _AMPLIFICATION * residual, _AMPLIFICATION * columns
     sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
     # A constant residual of runaway size is an increase, which the solver rejects.
     size = _AMPLIFICATION * _RUNAWAY / jnp.sqrt(1.0 * residual.size)
-    everywhere = jnp.where(sane, problem.weighted(predicted), size)
+    everywhere = jnp.where(sane, problem.records.weighted(predicted), size)
     residual = jnp.where(sane, residual, size)
     columns = jnp.where(sane, columns, 0.0)
     return residual.reshape(-1), columns.reshape(residual.size, -1), everywhere.reshape(-1)
@@ -194,17 +193,17 @@ def refit(
     about 1000, which no search accepts.
     """
     require_wanted()
-    target = problem.weighted_target
-    observed = np.asarray(problem.weight).reshape(-1) > 0
+    target = problem.records.weighted_record
+    observed = problem.records.seen.reshape(-1)
 
     def one(support, begin, keep) -> Fit:
         places, count = list(support), len(support)
         layout, start = _lay_out(problem, support, begin, scale, slots, keep)
         parameters, predicted = _descend(problem, layout, start, jnp.asarray(tolerance))
         parameters, predicted = np.asarray(parameters), np.asarray(predicted)
-        rows = np.repeat(keep.reshape(-1), problem.target.shape[2])
+        rows = np.repeat(keep.reshape(-1), problem.records.recorded.shape[2])
         kept = sum_of_squares((predicted - target)[rows])
-        share = problem.n_observations / max(np.sum(observed & rows), 1)
+        share = problem.records.n_observations / max(np.sum(observed & rows), 1)
         return Fit(
             tuple(int(i) for i in support),
             parameters[:count] * scale[places],
@@ -213,7 +212,7 @@ def refit(
             predicted,
         )
 
-    everything = np.ones(problem.target.shape[:2], dtype=bool)
+    everything = np.ones(problem.records.recorded.shape[:2], dtype=bool)
     keeps = [everything] * len(supports) if keeps is None else keeps
     jobs = list(zip(supports, starts, keeps, strict=True))
     # one support to a program: a batch of them by `vmap` takes as many steps as its slowest member,

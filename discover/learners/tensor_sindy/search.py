@@ -82,7 +82,7 @@ class SupportSearch:
         self.fits: dict[tuple[int, ...], Fit] = {}
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
-        self.n_independent = float(problem.n_observations)
+        self.n_independent = float(problem.records.n_observations)
         self._far: set[tuple[int, ...]] = set()
         self._models: dict[tuple[int, ...], LinearModel] = {}
         self._sparse: dict[tuple[int, ...], list[tuple[int, ...]]] = {}
@@ -242,10 +242,11 @@ class SupportSearch:
             worth = self._independent_in(chosen)
 
     def _independent_in(self, fit: Fit) -> float:
+        records = self.problem.records
         if fit.misfit <= self.floor:
-            return float(self.problem.n_observations)
-        left = self.problem.weighted_target - fit.predicted
-        rows = self.problem.sequences()
+            return float(records.n_observations)
+        left = fit.predicted - records.weighted_record
+        rows = records.sequences()
         return noise_model([left[row] for row in rows], len(fit.support)).effective_samples
 
     def model_at(self, fit: Fit) -> LinearModel:

@@ -81,9 +81,9 @@ def selection_stability(
     c = fit.dense(n)
     residual, columns = linearise(problem, jnp.asarray(c), jnp.asarray(fit.inner))
     design = np.asarray(columns)[:, :n]
-    target = np.asarray(residual) + design @ c
+    target = design @ c - np.asarray(residual)
     usable = np.isfinite(target) & np.all(np.isfinite(design), axis=1)
-    usable &= np.asarray(problem.weight).reshape(-1) > 0
+    usable &= problem.records.seen.reshape(-1)
     rng = np.random.default_rng(seed)
     chosen = np.zeros((2 * n_pairs, n), dtype=bool)
     for pair in range(n_pairs):
@@ -97,9 +97,9 @@ def selection_stability(
 
 
 def _half(problem: TrajectoryProblem, rng: np.random.Generator) -> Bool[np.ndarray, " rows"]:
-    runs, samples, kinds = problem.target.shape
+    runs, samples, kinds = problem.records.recorded.shape
     half = np.zeros((runs, samples, kinds), dtype=bool)
-    seen = np.any(np.asarray(problem.weight) > 0, axis=2)
+    seen = np.any(problem.records.seen, axis=2)
     for run in range(runs):
         blocks = np.array_split(np.flatnonzero(seen[run]), _BLOCKS_PER_RUN)
         for block in rng.permutation(_BLOCKS_PER_RUN)[: _BLOCKS_PER_RUN // 2]:

@@ -25,7 +25,7 @@ def told_by_kinds(search: SupportSearch, fit: Fit, runs: Sequence[Run]) -> tuple
     """Return what tests of each kind tell; nothing where all runs are of one kind."""
     problem = search.problem
     kinds = [kind_of_record(run) for run in runs]
-    seen = np.any(np.asarray(problem.weight) > 0, axis=1)
+    seen = np.any(problem.records.seen, axis=1)
     labels = [
         kind + _OBSERVED[k]
         for kind, of_run in zip(kinds, seen, strict=True)
@@ -49,7 +49,7 @@ def told_by_kinds(search: SupportSearch, fit: Fit, runs: Sequence[Run]) -> tuple
         slots = max(search.slots, len(fit.support))
         shared = modulus_columns(problem, fit.support, slots, fit.coefficients, fit.inner)
     numbers += _normal_stresses(problem, fit, inner, kinds, runs)
-    return told_by_tests(columns, residual, problem.sequences(), labels, numbers, shared)
+    return told_by_tests(columns, residual, problem.records.sequences(), labels, numbers, shared)
 
 
 def _normal_stresses(

@@ -36,7 +36,7 @@ def held_out_misfits(
     """Return the relative misfit of each member on each fold and run, refitted on other folds."""
     n_folds = int(np.max(folds)) + 1
     n_terms = len(problem.library)
-    samples = problem.target.shape[1]
+    samples = problem.records.recorded.shape[1]
     pairs = [(member, fold) for member in range(len(path)) for fold in range(n_folds)]
     fits = refit(
         problem,
@@ -47,19 +47,19 @@ def held_out_misfits(
         [np.repeat((folds != fold)[:, None], samples, axis=1) for _, fold in pairs],
         tolerance=SCREENING**2,
     )
-    target = problem.weighted_target
-    observed = np.asarray(problem.weight).reshape(-1) > 0
-    fold_of_row = folds[problem.run_of_row]
+    target = problem.records.weighted_record
+    observed = problem.records.seen.reshape(-1)
+    fold_of_row = folds[problem.records.run_of_row]
     by_fold = np.empty((len(path), n_folds))
     by_run = np.empty((len(path), len(folds)))
 
     def misfit(fit: Fit, rows: np.ndarray) -> float:
         squares = sum_of_squares(fit.predicted[rows] - target[rows])
         # weights carry 1/√(all observations); here the mean is over the rows asked for
-        return float(np.sqrt(squares * problem.n_observations / max(np.sum(rows), 1)))
+        return float(np.sqrt(squares * problem.records.n_observations / max(np.sum(rows), 1)))
 
     for (member, fold), fit in zip(pairs, fits, strict=True):
         by_fold[member, fold] = misfit(fit, observed & (fold_of_row == fold))
         for run in np.flatnonzero(folds == fold):
-            by_run[member, run] = misfit(fit, observed & (problem.run_of_row == run))
+            by_run[member, run] = misfit(fit, observed & (problem.records.run_of_row == run))
     return by_fold, by_run

@@ -81,7 +81,7 @@ def modulus_columns(
     """
     root = np.asarray(problem.modulus_error)
     if not np.any(root):
-        return np.zeros((problem.weight.size, len(root)))
+        return np.zeros((problem.records.weight.size, len(root)))
     active, filled = np.zeros(slots, dtype=int), np.zeros(slots)
     active[: len(support)], filled[: len(support)] = support, coefficients
     moduli = np.asarray(problem.modulus) + _SHIFT * np.concatenate([root.T, -root.T])

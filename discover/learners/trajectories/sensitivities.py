@@ -197,7 +197,7 @@ def predict_many(
         coefficients, inner, modulus = numbers
         at = problem if modulus is None else eqx.tree_at(lambda p: p.modulus, problem, modulus)
         predicted = problem.flows.over(partial(run, at, (coefficients, inner)))
-        return problem.weighted(predicted).reshape(-1)
+        return problem.records.weighted(predicted).reshape(-1)
 
     # side by side, a law that is given up at once would cost as much as the slowest beside it
     followed = all(protocols.control in FOLLOWED for protocols, _ in problem.flows.parts)
@@ -211,12 +211,11 @@ def linearise(
     coefficients: Float[Array, " n"],
     inner: Float[Array, " m"],
 ) -> tuple[Float[Array, " rows"], Float[Array, "rows n+m"]]:
-    """Return the weighted residual (data − prediction) and weighted sensitivities to every term.
+    """Return the residual and its derivatives with respect to every term.
 
     Rows are run × sample × kind, flattened; those without an observation are zero.
     """
     everything = jnp.arange(len(problem.library))
     predicted, sensitivity = observe(problem, everything, coefficients, inner)
-    residual = problem.weight * problem.target - problem.weighted(predicted)
-    columns = problem.weighted_columns(predicted, sensitivity)
+    residual, columns = problem.records.linearised(predicted, sensitivity)
     return residual.reshape(-1), columns.reshape(residual.size, -1)
