@@ -18,7 +18,6 @@ from typing import Any
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
 from discover.equations.from_law import EXPONENTIAL, combined
-from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.laws.textbook.fene_p import fene_p_terms
 from tensor_library.terms import parse_term
@@ -141,10 +140,9 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
         If rheoTool has no such law; says which term is in the way.
     """
     if equation.named is not None:
-        shares = equation.named.built().as_terms()
-        if shares is None:
+        below = equation.named.built().as_terms()
+        if below is None:
             return _of_name(equation)
-        below = tuple(EquationTerm(*share) for share in shares)
         equation = replace(equation, named=None, terms=combined(below + equation.terms))
     coefficients: dict[str, float] = {}
     inner: dict[str, float] = {}
