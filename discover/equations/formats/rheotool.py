@@ -295,7 +295,7 @@ def _finitely_extensible(found: dict[str, float], tolerance: float) -> tuple[flo
     if growth <= 0.0:
         return None
     inverse = growth / (1.0 + 3.0 * growth)  # k = q/(1 − 3q)
-    wanted = {share.term: share.coefficient for share in fene_p_terms(inverse)}
+    wanted = {term.term: term.coefficient for term in fene_p_terms(inverse)}
     if set(found) != set(wanted):
         return None
     deviation = max(abs(found[name] / value - 1.0) for name, value in wanted.items())
