@@ -16,7 +16,6 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 from independent import (
@@ -138,16 +137,11 @@ def sparse_bands(runs, unseen):
     from discover.comparison.judging.next_measurement import contenders
     from discover.identify.rivals.bands import prediction_bands
     from discover.learners.tensor_sindy import TensorSINDy
-    from tensor_library import build_library
+    from tensor_library import LawTerms, build_library
 
     fitted = TensorSINDy(build_library(degree=1), n_folds=0, n_stability=0).fit(runs)
     result = searched(fitted)
-    rivals = [
-        SimpleNamespace(
-            terms=dict(zip(row["support"], row["coefficients"], strict=True)), inner=row["inner"]
-        )
-        for row in result.details.get("rivals", ())
-    ]
+    rivals = [LawTerms.from_json(row) for row in result.details.get("rivals", ())]
     chosen, others = contenders(result, rivals)  # pyright: ignore[reportArgumentType]
     found = prediction_bands(
         chosen, others, _maxwell(), [run.protocol for run in unseen], [run.time for run in unseen]

@@ -26,13 +26,13 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.identify import LawTerms, analyse_structure, find_rivals, find_twins
+from discover.identify import analyse_structure, find_rivals, find_twins
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.notebook_view import table_of
 from discover.protocols import oscillatory_shear
 from discover.simulate import simulate, synthetic_dataset
-from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library import LawTerms, TermLibrary, build_library, parse_term
 
 flows = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1, 2) for de in (0.5, 1)}
 data = synthetic_dataset(
@@ -73,7 +73,7 @@ model.result_
 # series of the stress in a general history; a simulation checks it.
 
 # %%
-found = LawTerms({term.term: term.coefficient for term in model.terms_})
+found = LawTerms.of(model.terms_)
 twins = find_twins(library, found)
 for twin in twins:
     print("-", twin.text)
@@ -101,8 +101,8 @@ from discover.identify.side_by_side.many_laws import Contender
 
 maxwell = Fluid.dimensionless(UpperConvectedMaxwell())
 covariance = np.array(model.uncertainty_.covariance)
-laws = [Contender("slip", dict(found.coefficients), covariance=covariance)]
-laws += [Contender("twin", {"tr(sigma)*gammadot": 0.32}, covariance=covariance)]
+laws = [Contender("slip", found, covariance=covariance)]
+laws += [Contender("twin", LawTerms({"tr(sigma)*gammadot": 0.32}), covariance=covariance)]
 experiments = candidate_experiments(1.0, ("laos", "start_up"), (1.0, 2.0), (0.5, 1.0))
 proposals = propose_experiments(laws[0], laws[1:], maxwell, experiments, noise=0.02)
 best = proposals[0]

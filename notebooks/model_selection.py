@@ -30,11 +30,11 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.identify import LawTerms, analyse_structure, find_rivals
+from discover.identify import analyse_structure, find_rivals
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
-from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library import LawTerms, TermLibrary, build_library, parse_term
 
 flows = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1, 2) for de in (0.5, 1)}
 
@@ -152,7 +152,7 @@ pd.DataFrame(lines)
 # they change the normal stresses.
 
 # %%
-law = LawTerms({term.term: term.coefficient for term in model.terms_})
+law = LawTerms.of(model.terms_)
 structure = analyse_structure(list(data), library, nominal={"the law found": law})
 structure
 

@@ -20,8 +20,9 @@ from tensor_library.kinematics import (
     uniaxial_extension,
     upper_convected_production,
 )
+from tensor_library.law_terms import LawTerm, LawTerms
 from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import CandidateTerm, TermShare, parse_term
+from tensor_library.terms import CandidateTerm, parse_term
 
 __all__ = [
     "CLOSED_FORMS",
@@ -30,8 +31,9 @@ __all__ = [
     "TENSOR_NAMES",
     "CandidateTerm",
     "ClosedForm",
+    "LawTerm",
+    "LawTerms",
     "TermLibrary",
-    "TermShare",
     "anticommutator",
     "build_library",
     "from_shear",

@@ -3,8 +3,7 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -170,30 +169,6 @@ class CandidateTerm:
     def latex(self) -> str:
         """Return the term as LaTeX, ready for a coefficient in front: a sum has its brackets."""
         return self.spell(LatexNotation())
-
-
-class TermShare(NamedTuple):
-    """A term, by its canonical spelling, with the coefficient that a law or an effect gives it.
-
-    Attributes
-    ----------
-    term
-        The spelling, as `parse_term` reads it.
-    coefficient
-        Dimensionless.
-    inner
-        Inner parameters of a closed form by name, dimensionless.
-
-    Examples
-    --------
-    >>> from tensor_library import TermShare
-    >>> TermShare("sigma.sigma", 0.3).coefficient
-    0.3
-    """
-
-    term: str
-    coefficient: float
-    inner: Mapping[str, float] = MappingProxyType({})
 
 
 def parse_term(name: str) -> CandidateTerm:

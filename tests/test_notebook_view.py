@@ -5,14 +5,13 @@ import pandas as pd
 import pytest
 
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.equations import Box, Equation, EquationTerm
+from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
 from discover.identify import (
     Difference,
     Evidence,
     FittedRival,
     HiddenStresses,
-    LawTerms,
     RivalTable,
     Twin,
 )
@@ -21,6 +20,8 @@ from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm
 from discover.notebook_view import NotebookView, as_html, table_of
+from tensor_library import LawTerm
+from tensor_library.law_terms import LawTerms
 
 LAW = LawTerms({"sigma.sigma": 0.2, "gammadot": -0.01})
 
@@ -87,7 +88,7 @@ def test_lists_of_findings_become_tables():
 
 def test_an_equation_shows_modes_and_where_it_was_tested():
     tested = WhereTested(Box((1.0, 2.0), (0.25, 1.0)), None)
-    terms = (EquationTerm("sigma.sigma", 0.2),)
+    terms = (LawTerm("sigma.sigma", 0.2),)
     shown = Equation(terms, (120.0, 30.0), (0.7, 2.5), tested=tested)._repr_html_()
     assert "<math" in shown
     assert "<th>G_Pa</th>" in shown

@@ -25,7 +25,6 @@ from discover.comparison.outcomes.flows import (
 )
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.outcomes.range import Placement, place
-from discover.comparison.outcomes.truth import TrueTerm
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.rivals.bands import PredictionBand
@@ -34,6 +33,7 @@ from discover.notebook_view import NotebookView, table_of
 from discover.page_view import PageView
 from discover.plain_json import plain
 from discover.statistics import FitVerdict
+from tensor_library.law_terms import LawTerm
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class Comparison(PageView, NotebookView):
     flows: Sequence[Flow]
     before: Mapping[str, Stresses | None]
     outcomes: Mapping[str, LearnerOutcome]
-    truth: Sequence[TrueTerm] | None
+    truth: Sequence[LawTerm] | None
     noise: float | None
     rivals: Sequence[Rival]
     statements: Sequence[Statement]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, relative_errors
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.equations import Equation, EquationTerm, Tested, combined, law_parts
+from discover.equations import Equation, Tested, combined, law_parts
 from discover.equations.box import box_of, flow_numbers
 from discover.errors import InputError
 from discover.learners.registry import learner_title
@@ -39,7 +39,7 @@ def outcome_equation(
     """Return the known part with what a learner found."""
     who = learner_title(outcome.learner)
     who = f"the {who}" if outcome.learner == "tbnn_ude" else who
-    found = EquationTerm.of(outcome.terms)
+    found = tuple(term.in_law for term in outcome.terms)
     time = known.mean_relaxation_time
     judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
     learned_in = box_of(_numbers(flow, time) for flow in flows if flow.kind == "training")

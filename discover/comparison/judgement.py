@@ -284,12 +284,13 @@ def _tested(
 ) -> _Tested:
     flows, normal = known.flows, study.compare.use_normal_stresses
     fluid, bands, others = frame.model.fluid, {}, []
+    laws = [rival.law for rival in rivals]
     if chosen is not None and law is not None and at_first.in_library:
         # where a quantity is said to be determined, its band says how well
         keys = {flow.key for flow in flows if flow.kind in DRAWN}
         banded = [flow for flow in frame.flows if flow.key in keys]
         # bands take it that the law, or a rival, is the fluid's
-        bands = bands_of_law(chosen, rivals, fluid, banded, seed)
+        bands = bands_of_law(chosen, laws, fluid, banded, seed)
         bands = with_fitted_constants(bands, law, frame.flows)
         others = other_constants(chosen.terms, frame.model)
         bands = bands if normal else with_other_gain(bands, others)
@@ -304,7 +305,7 @@ def _tested(
     # outliers are no noise of the next experiment
     misfit = left.misfit if left.outliers else None
     options = study.compare.next
-    following = next_measurement(chosen, rivals, fluid, options, seed, misfit)
+    following = next_measurement(chosen, laws, fluid, options, seed, misfit)
     return _Tested(explanation, bands, others, following)
 
 

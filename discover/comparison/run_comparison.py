@@ -18,7 +18,7 @@ from discover.comparison.fitting.step_instants import with_step_instants
 from discover.comparison.fitting.training import study_library
 from discover.comparison.instrument.known import Known, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher
-from discover.comparison.outcomes.truth import TrueTerm, true_terms
+from discover.comparison.outcomes.truth import true_terms
 from discover.comparison.own_loadings import judged, with_own_loadings
 from discover.comparison.own_noise import learned_by_noise
 from discover.comparison.sweep import sweep_points, sweep_studies
@@ -34,6 +34,7 @@ from discover.study.data import StudyData, load_study_data
 from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
+from tensor_library.law_terms import LawTerm
 from tensor_library.library import TermLibrary
 
 
@@ -172,7 +173,7 @@ _BY_LOADING = ". The fitted records are shown without the factor of their loadin
 _TAKEN_OUT = ". What the known instrument did is taken out of the records"
 
 
-def _truth(study: Study, model: DeclaredModel) -> tuple[TrueTerm, ...] | None:
+def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:
     synthetic = study.data.synthetic
     if synthetic is None or model.law_name != "ucm":
         return None

@@ -10,7 +10,7 @@ from jaxtyping import Array, Complex, Float
 
 from discover.effects.written_state import WrittenState
 from tensor_library.algebra import Symmetric
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 Kind = Literal["constitutive", "kinematic", "signal"]
 
@@ -150,7 +150,7 @@ class ConstitutiveEffect(AbstractEffect):
         del values, rate
         return jnp.zeros_like(stress)
 
-    def as_terms(self, values: Sequence[float]) -> tuple[TermShare, ...] | None:
+    def as_terms(self, values: Sequence[float]) -> tuple[LawTerm, ...] | None:
         """Return `extra_term` as a sum of library terms, so that the law can be written out.
 
         None if it is no such sum, which is also what an effect that does not say is taken to be.

@@ -4,8 +4,9 @@ from collections.abc import Container
 from dataclasses import dataclass
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
+from tensor_library.law_terms import LawTerm
 from tensor_library.library import build_library
-from tensor_library.terms import CandidateTerm, TermShare
+from tensor_library.terms import CandidateTerm
 
 # Terms that are an effect with a name already, or the base law's own
 _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
@@ -25,7 +26,7 @@ class LibraryTerm(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return c · term."""
-        return (TermShare(self.name, values[0]),)
+        return (LawTerm(self.name, values[0]),)
 
 
 def library_term(term: CandidateTerm) -> LibraryTerm:

@@ -9,7 +9,6 @@ from discover.equations.has_equation import HasEquation
 from discover.equations.named_part import NamedPart
 from discover.equations.parts import law_parts
 from discover.equations.state_part import StatePart
-from discover.equations.term import EquationTerm
 from discover.equations.write import FORMATS, write_equation
 
 __all__ = [
@@ -17,7 +16,6 @@ __all__ = [
     "AugmentedLaw",
     "Box",
     "Equation",
-    "EquationTerm",
     "HasEquation",
     "NamedPart",
     "StatePart",

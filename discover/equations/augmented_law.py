@@ -10,7 +10,7 @@ from discover.equations.from_law import effect_terms, law_terms
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
 from tensor_library.algebra import Symmetric
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class AugmentedLaw(AbstractExtendedLaw):
@@ -40,7 +40,7 @@ class AugmentedLaw(AbstractExtendedLaw):
             extra = extra + as_state(effect.extra_term(jnp.asarray(values), own, rate), stress)
         return extra
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return the terms of the declared law, then those of the effects.
 
         None if the declared law is no sum of library terms.
@@ -53,7 +53,7 @@ class AugmentedLaw(AbstractExtendedLaw):
         below = self.base.as_terms()
         return None if below is None else below + self._added_terms()
 
-    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[TermShare, ...]]:
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
         """Return the declared law, and the terms of the effects.
 
         Raises
@@ -92,9 +92,9 @@ class AugmentedLaw(AbstractExtendedLaw):
                 return whole, next(iter(law.parameters))
         return None
 
-    def _added_terms(self) -> tuple[TermShare, ...]:
+    def _added_terms(self) -> tuple[LawTerm, ...]:
         return tuple(
-            TermShare(term.term, term.coefficient, term.inner)
+            term
             for effect, values in zip(self.effects, self.values, strict=True)
             for term in effect_terms(effect, np.asarray(values))
         )

@@ -11,13 +11,13 @@ from discover.equations.named_part import NamedPart
 from discover.equations.spelling.latex import SEPARATOR, law_latex
 from discover.equations.spelling.mathml import law_element
 from discover.equations.state_part import StatePart
-from discover.equations.term import EquationTerm, Interval
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.notebook_view import NotebookView
 from discover.words import percent_of
+from tensor_library.law_terms import Interval, LawTerm, LawTerms
 
 if TYPE_CHECKING:
     import sympy
@@ -101,14 +101,14 @@ class Equation(NotebookView):
     --------
     A Giesekus fluid with a mobility of 0.2, 100 Pa and 2 s:
 
-    >>> fluid = Equation((EquationTerm("sigma.sigma", 0.2),), (100.0,), (2.0,))
+    >>> fluid = Equation((LawTerm("sigma.sigma", 0.2),), (100.0,), (2.0,))
     >>> fluid.sympy()
     0.2*sigma**2
     >>> fluid.mean_relaxation_time
     2.0
     """
 
-    terms: tuple[EquationTerm, ...]
+    terms: tuple[LawTerm, ...]
     modulus: tuple[float, ...] = (1.0,)
     relaxation_time: tuple[float, ...] = (1.0,)
     linear_relaxation: bool = True
@@ -165,7 +165,7 @@ class Equation(NotebookView):
         if law is not None and not self.terms:
             return law
         # one expansion has one value of each inner parameter; terms that differ stack
-        groups: list[tuple[dict[str, float], list[EquationTerm]]] = []
+        groups: list[tuple[dict[str, float], list[LawTerm]]] = []
         for term in self.terms:
             for inner, members in groups:
                 if all(inner.get(key, value) == value for key, value in term.inner.items()):
@@ -174,14 +174,8 @@ class Equation(NotebookView):
                     break
             else:
                 groups.append((dict(term.inner), [term]))
-        for inner, members in groups or [({}, [])]:
-            law = law_of_terms(
-                [t.term for t in members],
-                [t.coefficient for t in members],
-                inner,
-                self.linear_relaxation,
-                law,
-            )
+        for _, members in groups or [({}, [])]:
+            law = law_of_terms(LawTerms.of(members), self.linear_relaxation, law)
         assert law is not None
         return law
 

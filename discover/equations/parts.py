@@ -8,16 +8,16 @@ import numpy as np
 from discover.equations.augmented_law import AugmentedLaw
 from discover.equations.from_law import combined, law_terms
 from discover.equations.named_part import NamedPart
-from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, law_of_mode
 from discover.laws.registry import LAWS, name_of
+from tensor_library.law_terms import LawTerm
 
 _Named = tuple[str, dict[str, float]]
 
 
-def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[EquationTerm, ...]]:
+def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[LawTerm, ...]]:
     """Return h of a law as a law with a name, where it is no sum of terms, and a sum of terms.
 
     A law with constants of its own in each mode needs a name.
@@ -37,7 +37,7 @@ def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[Equ
         if named is None:
             return None, law_terms(core)
         part = NamedPart(named[0], (named[1],))
-    return part, combined(tuple(EquationTerm(*one) for one in added))
+    return part, combined(added)
 
 
 def _of_each_mode(law: LawOfEachMode) -> NamedPart:
@@ -74,7 +74,7 @@ def _names_of(law: AbstractConstitutiveLaw) -> dict[str, dict[str, float]]:
     return found
 
 
-def _same(terms: tuple[EquationTerm, ...], others: tuple[EquationTerm, ...]) -> bool:
+def _same(terms: tuple[LawTerm, ...], others: tuple[LawTerm, ...]) -> bool:
     if len(terms) != len(others) or any(t.inner for t in (*terms, *others)):
         return terms == others
     sizes = {t.term: t.coefficient for t in others}

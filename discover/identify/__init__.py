@@ -5,7 +5,6 @@ from discover.identify.exact.relations import TermRelation, term_relations
 from discover.identify.rivals.evidence import Evidence, compare_residuals
 from discover.identify.rivals.fitted_rivals import FittedRival, RivalTable, find_rivals
 from discover.identify.side_by_side.histories import Difference, differences, random_histories
-from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.identify.side_by_side.separation import Separation, separations
 from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport, check_physics
 from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
@@ -24,7 +23,6 @@ __all__ = [
     "FittedRival",
     "HiddenStresses",
     "LawStructure",
-    "LawTerms",
     "PhysicsCheck",
     "PhysicsReport",
     "QuantityVerdict",

@@ -14,7 +14,7 @@ from tensor_library.kinematics import (
     rate_of_deformation,
     upper_convected_production,
 )
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 State = Symmetric | Float[Array, " s"]
 """σ, (3, 3) or four components; of a law with structure variables these behind the components."""
@@ -79,7 +79,7 @@ class AbstractConstitutiveLaw(eqx.Module):
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, γ̇), in the storage of `stress`, with the variables where there are some."""
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return h as a sum of library terms, so that the law can be written out.
 
         None if it is no such sum, which is also what a law that does not say is taken to be.
@@ -91,7 +91,7 @@ class AbstractConstitutiveLaw(eqx.Module):
         """
         return None
 
-    def split(self) -> tuple["AbstractConstitutiveLaw", tuple[TermShare, ...]]:
+    def split(self) -> tuple["AbstractConstitutiveLaw", tuple[LawTerm, ...]]:
         """Return the law below, and the library terms that are added to its h."""
         return self, ()
 

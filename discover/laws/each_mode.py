@@ -13,7 +13,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, State
 from tensor_library.algebra import Symmetric
 from tensor_library.kinematics import VelocityGradient
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 Tree = TypeVar("Tree")
 
@@ -55,7 +55,7 @@ class LawOfEachMode(AbstractConstitutiveLaw):
         """Return h of the law, of one mode."""
         return self.law.extra_term(stress, rate)
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return None: no sum of terms is the law of all modes."""
         return None
 

@@ -1,7 +1,5 @@
 """A law as a sum of library terms: what sparse regression finds."""
 
-from collections.abc import Mapping, Sequence
-
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -14,8 +12,9 @@ from discover.laws.base import (
     stress_in,
 )
 from tensor_library.algebra import Symmetric
+from tensor_library.law_terms import LawTerm, LawTerms
 from tensor_library.library import TermLibrary
-from tensor_library.terms import TermShare, parse_term
+from tensor_library.terms import parse_term
 
 
 class LibraryExpansion(AbstractExtendedLaw):
@@ -43,40 +42,34 @@ class LibraryExpansion(AbstractExtendedLaw):
         extra = as_state(jnp.tensordot(self.coefficients, terms, axes=1), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return the terms whose coefficients differ from zero, behind those of the base law."""
         below = () if self.base is None else self.base.as_terms()
         return None if below is None else below + self._own_terms()
 
-    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[TermShare, ...]]:
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
         """Return the base law, and the terms."""
         if self.base is None:
             return self, ()
         core, terms = self.base.split()
         return core, terms + self._own_terms()
 
-    def _own_terms(self) -> tuple[TermShare, ...]:
+    def _own_terms(self) -> tuple[LawTerm, ...]:
         inner = dict(zip(self.library.inner_names, map(float, self.inner), strict=True))
         return tuple(
-            TermShare(term.name, float(value), {name: inner[name] for name in term.inner_names})
+            LawTerm(term.name, float(value), {name: inner[name] for name in term.inner_names})
             for term, value in zip(self.library.terms, self.coefficients, strict=True)
             if float(value) != 0.0
         )
 
 
 def law_of_terms(
-    names: Sequence[str],
-    coefficients: Sequence[float],
-    inner: Mapping[str, float],
-    linear_relaxation: bool,
-    base: AbstractConstitutiveLaw | None = None,
+    terms: LawTerms, linear_relaxation: bool, base: AbstractConstitutiveLaw | None = None
 ) -> LibraryExpansion:
-    """Return the law h = Σ c term from the canonical spelling of its terms.
+    """Return the law h = Σ c term.
 
     Parameters
     ----------
-    names, coefficients
-        The terms; none means h = 0.
     linear_relaxation
         Whether −σ is part of the known law.
     base
@@ -87,15 +80,11 @@ def law_of_terms(
     ValueError
         If a spelling is not canonical.
     """
-    pairs = list(zip(names, coefficients, strict=True)) or [("sigma", 0.0)]
-    library = TermLibrary(tuple(parse_term(name) for name, _ in pairs))
-    values = [
-        inner.get(name, default)
-        for name, default in zip(library.inner_names, library.inner_default, strict=True)
-    ]
+    library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
+    coefficients, inner = terms.over(library)
     return LibraryExpansion(
-        coefficients=jnp.asarray([c for _, c in pairs], float),
-        inner=jnp.asarray(values, float),
+        coefficients=jnp.asarray(coefficients),
+        inner=jnp.asarray(inner),
         library=library,
         linear_relaxation=linear_relaxation,
         base=base,

@@ -217,7 +217,7 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
     --------
     >>> import discover as dc
     >>> law = dc.make_law("giesekus", {"alpha": 0.3})
-    >>> [(share.term, share.coefficient) for share in law.as_terms()]
+    >>> [(term.term, term.coefficient) for term in law.as_terms()]
     [('sigma.sigma', 0.3)]
     """
     if not (parameters is None or isinstance(parameters, Mapping)):

@@ -16,7 +16,7 @@ from discover.laws.base import (
 from tensor_library.algebra import Symmetric
 from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
 from tensor_library.invariants import scalar_invariants
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 N_COEFFICIENTS = 8
 
@@ -93,7 +93,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
         extra = as_state(self.own_term(stress_in(stress), rate), stress)
         return extra if self.base is None else extra + self.base.extra_term(stress, rate)
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return the constants as coefficients, behind the terms of the base law.
 
         Raises
@@ -107,7 +107,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
                 "Write out its projection on the library: the terms of its result."
             )
         own = tuple(
-            TermShare(name, float(value))
+            LawTerm(name, float(value))
             for name, value in zip(TENSOR_NAMES, self.constants, strict=True)
             if float(value) != 0.0
         )

@@ -18,7 +18,6 @@ from discover.equations import (
     AugmentedLaw,
     Box,
     Equation,
-    EquationTerm,
     StatePart,
     equation_to_json,
 )
@@ -27,6 +26,7 @@ from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.read import read_result_laws
 from discover.inference.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
+from tensor_library import LawTerm
 
 
 def invoke(*arguments):
@@ -38,7 +38,7 @@ def results(tmp_path):
     """The part of comparison.json that an export reads; a whole one is read in test_commands.py."""
     tested = Where(Box((1.0, 2.0), (0.25, 1.0)), Box((2.0, 3.0), (0.1, 1.5)), {"sigma12": 0.01})
     laws = {
-        name: Equation((EquationTerm("sigma.sigma", value),), tested=tested)
+        name: Equation((LawTerm("sigma.sigma", value),), tested=tested)
         for name, value in (("tensor_sindy", 0.2), ("tbnn_ude", 0.25))
     }
     content = {name: {"law": equation_to_json(law)} for name, law in laws.items()}

@@ -14,7 +14,8 @@ from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
 from discover.cli import app
-from discover.equations import Equation, EquationTerm, equation_to_json
+from discover.equations import Equation, equation_to_json
+from tensor_library import LawTerm
 
 MODULI, RELAXATION = (120.0, 35.0, 4.0), (0.2, 1.3, 9.0)
 SOLVENT, XI, EPSILON = 2.5, 0.24, 0.15
@@ -23,15 +24,15 @@ UNIT = np.eye(3)
 # shear and extension at once, so that no component stays zero
 GRADIENT = np.array([[0.3, 1.8, 0.0], [0.0, -0.2, 0.1], [0.2, 0.0, -0.1]])
 RATE = GRADIENT + GRADIENT.T
-SLIP = EquationTerm("sigma.gammadot+gammadot.sigma", 0.5 * XI)
+SLIP = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * XI)
 LAWS = {
     "johnson_segalman": ((SLIP,), lambda trace: 1.0),
     "ptt_linear with slip": (
-        (SLIP, EquationTerm("tr(sigma)*sigma", EPSILON)),
+        (SLIP, LawTerm("tr(sigma)*sigma", EPSILON)),
         lambda trace: 1.0 + EPSILON * trace,
     ),
     "ptt_exponential with slip": (
-        (SLIP, EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": EPSILON})),
+        (SLIP, LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": EPSILON})),
         lambda trace: np.exp(EPSILON * trace),
     ),
 }

@@ -22,6 +22,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.study import RunFolder, parse_study
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import build_library
 
 
@@ -45,7 +46,7 @@ def fake_study(**compare_options):
 def trained(learner, study, model, runs, seed=0, progress=None):
     mobility = 0.2 if learner == "tensor_sindy" else 0.22
     law = make_law("giesekus", {"alpha": mobility})
-    term = RecoveredTerm("sigma.sigma", mobility, 0.19, (0.19, 0.21))
+    term = RecoveredTerm("sigma.sigma", mobility, coefficient_penalised=0.19, ci95=(0.19, 0.21))
     history = (np.arange(1, 3), np.array([1.0, 0.1]))
     result = LearnerResult(learner, law, (term,), 1.5, history, {}, "fake")
     return result, Fluid.dimensionless(law)
@@ -88,7 +89,7 @@ def test_what_was_not_measured_has_no_error():
 
 
 def test_an_outcome_comes_back_from_its_state_unchanged():
-    term = RecoveredTerm("sigma.sigma", 0.22, 0.19, (0.19, 0.21))
+    term = RecoveredTerm("sigma.sigma", 0.22, coefficient_penalised=0.19, ci95=(0.19, 0.21))
     wave = {"sigma12": np.sin(np.arange(5.0)) / 3.0, "N1": np.array([0.1, np.nan])}
     history = (np.arange(2), np.ones(2))
     outcome = LearnerOutcome(
@@ -143,7 +144,7 @@ def test_the_twin_of_johnson_segalman_is_found_and_separated_by_n2(slip_case):
     chosen = [RecoveredTerm("sigma.gammadot+gammadot.sigma", 0.2)]
     # even where the library that was searched does not hold the twin
     rivals = find_rivals(chosen, [], model, flows, build_library(degree=0))
-    twin = next(r for r in rivals if set(r.terms) == {"tr(sigma)*gammadot"})
+    twin = next(r for r in rivals if set(r.law.coefficients) == {"tr(sigma)*gammadot"})
     assert "does not hold tr(sigma)*gammadot" in twin.reason
     assert twin.terms["tr(sigma)*gammadot"] == pytest.approx(0.32)  # ξ(1 − ξ/2) at ξ = 0.4
     assert twin.errors_to_chosen["sigma12"] < 1e-6
@@ -173,11 +174,13 @@ def test_rivals_of_other_terms_are_simulated_in_one_program(slip_case, monkeypat
     monkeypatch.setattr("discover.comparison.judging.identifiability.predict", watched)
     known = {flow.key: predict(model.fluid, flow) for flow in flows}
     rivals = find_rivals(chosen, met, model, flows, build_library(degree=0), known)
-    assert {frozenset(r.terms) for r in rivals} >= {frozenset(row["support"]) for row in met}
+    assert {frozenset(r.law.coefficients) for r in rivals} >= {
+        frozenset(row["support"]) for row in met
+    }
     assert len({fluid.law.library for fluid, _, _ in simulated}) == 1
     # the zeros for the others' terms change nothing
     _, flow, together = simulated[-1]
-    law = law_of_terms([exponential], [1.0], {"epsilon": 0.2}, True, model.law)
+    law = law_of_terms(LawTerms.from_json(met[-1]), True, model.law)
     alone = predict(Fluid(law, model.modulus, model.relaxation_time), flow)
     np.testing.assert_allclose(together["N1"], alone["N1"], rtol=1e-9, atol=1e-9)
 
@@ -203,10 +206,7 @@ def test_true_terms_make_the_true_law():
         wanted = make_law(name, values).stress_rate(stress, rate)
         for known in (True, False):
             terms = true_terms(name, values, known)
-            inner = {k: v for t in terms for k, v in t.inner.items()}
-            law = law_of_terms(
-                [t.term for t in terms], [t.coefficient for t in terms], inner, known
-            )
+            law = law_of_terms(LawTerms.of(terms), known)
             assert np.allclose(law.stress_rate(stress, rate), wanted, rtol=1e-12), name
 
 

@@ -22,6 +22,7 @@ from discover.laws import make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners import RecoveredTerm
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 MODULUS, TIME, MOBILITY = 110.0, 1.0, 0.3
 DECLARED_MODULUS, DECLARED_TIME = 100.0, 0.7
@@ -45,7 +46,7 @@ TERMS = found(
 
 
 def test_with_a_wrong_declaration_the_linear_terms_are_the_right_constants():
-    law = law_of_terms([t.term for t in TERMS], [t.coefficient for t in TERMS], {}, True)
+    law = law_of_terms(LawTerms.of(TERMS), True)
     truth = Giesekus(MOBILITY, MODULUS, TIME)
     generator = np.random.default_rng(0)
     for _ in range(3):
@@ -124,7 +125,7 @@ def test_a_small_linear_term_that_the_data_saw_is_another_constant_too():
 
 
 def test_where_relaxation_is_left_to_the_learner_its_term_is_no_wrong_time():
-    elastic = law_of_terms([], [], {}, linear_relaxation=False)
+    elastic = law_of_terms(LawTerms(), linear_relaxation=False)
     model = replace(declared(), law=elastic)
     assert other_constants(found(("sigma", 1.0)), model) == []
     (one,) = other_constants(found(("sigma", 0.7)), model)

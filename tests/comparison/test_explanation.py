@@ -14,7 +14,7 @@ from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.judging.statements import IN_LIBRARY, claimed, make_statements
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.identify import HiddenStresses, LawTerms
+from discover.identify import HiddenStresses
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
@@ -26,6 +26,7 @@ from discover.protocols.protocol import (
     start_up,
 )
 from discover.statistics.residual import Expectation
+from tensor_library.law_terms import LawTerms
 
 TIMES = np.linspace(0.0, 20.0, 201)
 PAPER = [(wi, de) for wi in (1.0, 2.0) for de in (0.25, 0.5, 0.75, 1.0)]

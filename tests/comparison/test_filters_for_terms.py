@@ -19,6 +19,7 @@ from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {
@@ -31,7 +32,7 @@ EMPTY = (np.zeros(0), np.zeros(0))
 
 
 def fluid_of(names, values):
-    law = law_of_terms(names, [float(v) for v in values], {}, True)
+    law = law_of_terms(LawTerms(dict(zip(names, map(float, values), strict=True))), True)
     return Fluid(law, np.array([MODULUS]), np.array([1.0]))
 
 

@@ -14,6 +14,7 @@ from discover.protocols import oscillatory_shear, start_up
 from discover.statistics.reading.misread import CLEAR, misread
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 TIMES = np.linspace(0.1, 8.0, 80)
 RATES = (0.3, 1.0, 3.0)
@@ -54,7 +55,7 @@ def fitted(modes, correlation, size, seed=0, told=None, rates=RATES):
     free = () if told else ("modulus_Pa", "relaxation_time_s")
     modulus, time = np.array([best[0]]), np.array([best[1]])
     declared = DeclaredModel(make_law("ucm"), "ucm", {}, modulus, time, free, None)
-    return MovedLaw(declared, {}, {}, free), flows
+    return MovedLaw(declared, LawTerms(), free), flows
 
 
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])

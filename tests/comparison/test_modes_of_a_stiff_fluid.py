@@ -13,6 +13,7 @@ from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -66,7 +67,7 @@ def test_a_coefficient_beyond_the_range_of_the_loop_lies_in_its_own_interval(mon
     monkeypatch.setattr(before_learning, "CLASSICAL_EFFECTS", own)
     fitted = along(held(EXTENSIBILITY))
     term = RecoveredTerm("tr(sigma)*sigma", EXTENSIBILITY, ci95=(0.0, 20.0))
-    law = law_of_terms(["tr(sigma)*sigma"], [EXTENSIBILITY], {}, True)
+    law = law_of_terms(LawTerms.of([term]), True)
     found = LearnerResult(
         "tensor_sindy", law, (term,), 0.0, (np.ones(1), np.ones(1)), {}, "made up"
     )

@@ -8,12 +8,13 @@ import pytest
 from discover.comparison.judging.bands.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.outcomes.flows import Flow
-from discover.identify import HiddenStresses, LawTerms
+from discover.identify import HiddenStresses
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.one_term_more import OneTermMore
 from discover.identify.structure.structure import LawStructure, Structure
 from discover.protocols import start_up
 from discover.statistics.lack_of_fit import LackOfFit
+from tensor_library.law_terms import LawTerms
 
 TIMES = np.linspace(0.1, 8.0, 40)
 N1 = 100.0 * TIMES

@@ -11,6 +11,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.protocols import start_up
 from discover.protocols.protocol import in_flow
+from tensor_library.law_terms import LawTerms
 
 TIMES = np.linspace(0.0, 4.0, 9)
 FLOW = Flow("startup", "held_out", start_up(2.0), TIMES, np.full(9, 2.0), {})
@@ -41,7 +42,8 @@ def test_a_law_that_fits_far_worse_and_a_runaway_say_nothing():
 
 
 def test_rivals_and_members_of_the_network_count_and_extension_does_not():
-    rival = Rival({"gammadot": 0.1}, errors_to_chosen={"sigma12": 0.0, "N1": 0.4, "N2": None})
+    apart = {"sigma12": 0.0, "N1": 0.4, "N2": None}
+    rival = Rival(LawTerms({"gammadot": 0.1}), errors_to_chosen=apart)
     sparse = {"tensor_sindy": BOTH["tensor_sindy"]}
     assert room_left(sparse, {"tensor_sindy": 0.02}, [rival], [FLOW]) == {"N1": 0.4}
     limits = {q: (0.9 * RISING, 1.1 * RISING) for q in ("sigma12", "N1")}

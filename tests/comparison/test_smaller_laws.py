@@ -20,6 +20,7 @@ from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import what_is_left
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 MODULUS = 100.0
 GROWTH, WAVE = np.linspace(0.1, 8.0, 60), np.linspace(0.1, 12.0, 60)
@@ -47,7 +48,7 @@ def fitted(material, names, start, path=(), **faults):
     values = np.array(start)
     weights = [1.0 / np.sqrt(np.mean(flow.measured**2)) for flow in flows]
     for _ in range(4):
-        law = MovedLaw(model, dict(zip(names, map(float, values), strict=True)), {}, ())
+        law = MovedLaw(model, LawTerms(dict(zip(names, map(float, values), strict=True))), ())
         told = [law.derivatives(flow) for flow in flows]
         rows = zip(flows, told, weights, strict=True)
         off = np.concatenate([w * (f.measured - t[0][:, 0]) for f, t, w in rows])

@@ -255,14 +255,13 @@ def test_reference_page_in_docs_is_what_the_dictionary_writes():
 )
 def test_an_effect_written_out_in_library_terms_is_what_it_adds(effect):
     values = [0.17, 0.4][: len(effect.parameters)]
-    shares = effect.as_terms(values)
-    if shares is None:
+    terms = effect.as_terms(values)
+    if terms is None:
         pytest.skip("no sum of library terms")
     total = jnp.zeros(4)
-    for name, coefficient, inner in shares:
-        term = parse_term(name)
-        chosen = {key: jnp.asarray(value) for key, value in inner.items()}
-        total = total + coefficient * term.evaluate(STRESS, RATE, chosen)
+    for term in terms:
+        chosen = {key: jnp.asarray(value) for key, value in term.inner.items()}
+        total = total + term.coefficient * parse_term(term.term).evaluate(STRESS, RATE, chosen)
     # the same sums in another order: rounding only
     np.testing.assert_allclose(
         total, effect.extra_term(jnp.array(values), STRESS, RATE), atol=1e-14

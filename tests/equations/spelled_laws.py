@@ -13,8 +13,9 @@ import numpy as np
 from discover.effects import ConstitutiveEffect
 from discover.effects.library_term import library_term
 from discover.effects.registry import named_effects
-from discover.equations import Equation, EquationTerm, effect_terms, law_terms
+from discover.equations import Equation, effect_terms, law_terms
 from discover.laws import make_law
+from tensor_library import LawTerm
 from tensor_library.integrity_basis import TENSOR_NAMES
 from tensor_library.invariants import INVARIANT_NAMES
 from tensor_library.library import build_library
@@ -84,7 +85,7 @@ _VALUES = np.array([LIBRARY.evaluate(*map(jnp.asarray, s), _INNER_VALUES) for s 
 def sum_of(indices, coefficients):
     """Return the sum of these terms of the library."""
     terms = tuple(
-        EquationTerm(LIBRARY.names[i], c, {n: INNER[n] for n in LIBRARY.terms[i].inner_names})
+        LawTerm(LIBRARY.names[i], c, {n: INNER[n] for n in LIBRARY.terms[i].inner_names})
         for i, c in zip(indices, coefficients, strict=True)
     )
     return Spelled(Equation(terms), np.einsum("n,snij->sij", coefficients, _VALUES[:, indices]))

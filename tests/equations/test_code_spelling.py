@@ -16,8 +16,9 @@ from spelled_laws import (
     sum_of,
 )
 
-from discover.equations import Equation, EquationTerm, equation_from_json, write_equation
+from discover.equations import Equation, equation_from_json, write_equation
 from discover.errors import InputError
+from tensor_library import LawTerm
 from tensor_library.symbolic import RATE, STRESS, UNIT, Trace
 from tensor_library.terms import parse_term
 
@@ -178,22 +179,22 @@ def test_rheotool_takes_a_term_as_it_is_or_refuses_it_by_name():
                 assert agree(_rheotool_rate(text, *state), wanted), name
 
 
-_SLIP = EquationTerm("sigma.gammadot+gammadot.sigma", 0.1)
-_EXPONENTIAL = EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3})
+_SLIP = LawTerm("sigma.gammadot+gammadot.sigma", 0.1)
+_EXPONENTIAL = LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3})
 
 
 @pytest.mark.parametrize(
     "terms",
     [
-        (_SLIP, EquationTerm("tr(sigma)*sigma", 0.3)),
+        (_SLIP, LawTerm("tr(sigma)*sigma", 0.3)),
         (_SLIP, _EXPONENTIAL),
-        (_SLIP, _EXPONENTIAL, EquationTerm("gammadot", 0.3)),
+        (_SLIP, _EXPONENTIAL, LawTerm("gammadot", 0.3)),
         (
-            EquationTerm("sigma", 0.5),
-            EquationTerm("sigma.sigma", 0.3),
-            EquationTerm("gammadot", 0.3),
+            LawTerm("sigma", 0.5),
+            LawTerm("sigma.sigma", 0.3),
+            LawTerm("gammadot", 0.3),
         ),
-        (EquationTerm("sigma", 0.5), EquationTerm("tr(sigma)*sigma", 0.3), _SLIP),
+        (LawTerm("sigma", 0.5), LawTerm("tr(sigma)*sigma", 0.3), _SLIP),
     ],
     ids=lambda terms: " and ".join(t.term for t in terms),
 )

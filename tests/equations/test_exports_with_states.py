@@ -18,13 +18,13 @@ from scipy.integrate import solve_ivp
 from discover.effects import StateEffect, make_effect, named_effects
 from discover.equations import (
     Equation,
-    EquationTerm,
     StatePart,
     equation_from_json,
     equation_to_json,
     write_equation,
 )
 from discover.errors import InputError
+from tensor_library import LawTerm
 
 ALPHA, MODULUS, TIME = 0.2, 100.0, 1.5
 CRITICAL = {"inverse_critical_rate": 0.5, "build_up_time": 2.0}
@@ -63,7 +63,7 @@ named = pytest.mark.parametrize("name", CASES)
 
 
 def equation_of(name, values):
-    terms = (EquationTerm("sigma.sigma", ALPHA),)
+    terms = (LawTerm("sigma.sigma", ALPHA),)
     return Equation(terms, (MODULUS,), (TIME,), states=(StatePart(name, values),))
 
 

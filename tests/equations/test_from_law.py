@@ -4,9 +4,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.equations import Equation, EquationTerm, law_terms
+from discover.equations import Equation, law_terms
 from discover.errors import InputError
 from discover.laws import LibraryExpansion, TensorBasisNetwork, make_law
+from tensor_library import LawTerm
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -40,7 +41,7 @@ def test_a_named_law_and_its_terms_are_the_same_law_in_any_flow(name):
 
 
 def test_one_parameter_with_two_values_keeps_both():
-    terms = tuple(EquationTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
+    terms = tuple(LawTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
     stress = jnp.asarray([0.7, 0.1, 0.2, 0.4])
     trace = 1.0
     wanted = (np.expm1(0.1 * trace) + 0.5 * np.expm1(0.3 * trace)) * np.asarray(stress)
@@ -61,7 +62,7 @@ def test_a_network_that_is_more_than_constants_is_refused():
     network = eqx.tree_at(
         lambda n: (n.network_mask, n.constants), network, (jnp.zeros(8), constants)
     )
-    assert law_terms(network) == (EquationTerm("sigma.sigma", float(constants[3])),)
+    assert law_terms(network) == (LawTerm("sigma.sigma", float(constants[3])),)
 
 
 def test_a_known_law_below_is_part_of_what_is_written():

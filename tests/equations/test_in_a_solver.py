@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from discover.equations import Box, Equation, EquationTerm, NamedPart, write_equation
+from discover.equations import Box, Equation, NamedPart, write_equation
 from discover.equations import Tested as Where
 from discover.equations.formats.in_a_solver import in_a_solver
+from tensor_library import LawTerm
 
 WI = 3.0
 # oscillation so fast that start-up goes furthest
@@ -42,10 +43,10 @@ def test_the_step_follows_the_relaxation_that_the_flow_quickens():
 
 def test_a_law_that_loses_its_conformation_and_one_that_runs_away_say_so():
     # h = 3 γ̇ turns the sign of σ around; h = −tr(σ) σ lets the trace grow on itself
-    beyond = Equation((EquationTerm("gammadot", 3.0),), tested=TESTED)
+    beyond = Equation((LawTerm("gammadot", 3.0),), tested=TESTED)
     text = write_equation(beyond, "python")
     assert "no conformation any more" in text
-    runaway = Equation((EquationTerm("tr(sigma)*sigma", -1.0),), tested=TESTED)
+    runaway = Equation((LawTerm("tr(sigma)*sigma", -1.0),), tested=TESTED)
     assert "mode 1 runs away" in write_equation(runaway, "ufl")
     # negative controls: UCM does neither, and without a box nothing is said
     text = write_equation(Equation((), tested=TESTED), "python")

@@ -11,8 +11,9 @@ from spelled_laws import EFFECTS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agr
 from sympy.parsing.latex import parse_latex
 
 from discover.comparison.comparison import Comparison
-from discover.equations import Equation, EquationTerm, NamedPart, write_equation
+from discover.equations import Equation, NamedPart, write_equation
 from discover.report.comparison.report import equations_tex
+from tensor_library import LawTerm
 from tensor_library.terms import CandidateTerm, parse_term
 
 # The reader knows letters and functions of one letter; \left and \right only size a bracket.
@@ -130,7 +131,7 @@ def test_a_sum_without_its_brackets_is_another_law():
 def test_a_second_value_and_a_negative_value_of_an_inner_parameter_are_read_back():
     name = "(exp(epsilon*tr(sigma))-1)*sigma"
     for first, second in ((0.3, -0.2), (-0.2, 0.3), (2e-5, -3e-5)):
-        terms = [EquationTerm(name, 1.0, {"epsilon": e}) for e in (first, second)]
+        terms = [LawTerm(name, 1.0, {"epsilon": e}) for e in (first, second)]
         wanted = [
             (np.expm1(first * np.trace(s)) + np.expm1(second * np.trace(s))) * s for s, _ in STATES
         ]
@@ -138,11 +139,11 @@ def test_a_second_value_and_a_negative_value_of_an_inner_parameter_are_read_back
 
 
 def test_an_inner_parameter_that_nobody_gave_is_written_as_the_number_in_use():
-    term = EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0)
+    term = LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0)
     wanted = np.array([np.expm1(0.25 * np.trace(s)) * s for s, _ in STATES])
     assert agree(extra_by_latex(law_line(Equation((term,)))), wanted)
     with pytest.raises(ValueError, match="no inner parameter 'kappa'"):
-        EquationTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"kappa": 0.1})
+        LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"kappa": 0.1})
 
 
 def test_equations_tex_writes_what_latex_writes():
@@ -155,7 +156,7 @@ def test_equations_tex_writes_what_latex_writes():
     assert spelled.equation.latex() in text
     # the known part is part of the law
     named = NamedPart("rolie_poly", ({"stretch_time_ratio": 0.2, "beta": 1.0},))
-    below = (EquationTerm("sigma.sigma", 0.3),)
+    below = (LawTerm("sigma.sigma", 0.3),)
     object.__setattr__(comparison, "known", Equation(below, named=named))
     whole = Equation(below + spelled.equation.terms, named=named)
     assert whole.latex() in equations_tex(comparison, True)

@@ -20,7 +20,6 @@ from sympy.parsing.latex import parse_latex
 from discover.equations import (
     FORMATS,
     Equation,
-    EquationTerm,
     NamedPart,
     equation_from_json,
     equation_to_json,
@@ -32,6 +31,7 @@ from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
 from discover.laws import LAWS, make_law
 from discover.laws.registry import starting_values
+from tensor_library import LawTerm
 
 MODULUS, TIME = (40.0, 5.0), (0.3, 1.5)
 TIMES = np.linspace(0.1, 1.5, 8)
@@ -355,7 +355,7 @@ def test_json_and_rheotool_give_back_the_constants_of_each_mode(name):
 
 def test_terms_are_added_to_a_law_with_a_name():
     law = make_law("rolie_poly", CONSTANTS["rolie_poly"][0])
-    term = EquationTerm("sigma.gammadot+gammadot.sigma", 0.1)
+    term = LawTerm("sigma.gammadot+gammadot.sigma", 0.1)
     both = Equation((term,), named=law_parts(law)[0])
     again = equation_from_json(equation_to_json(both))
     module = {}

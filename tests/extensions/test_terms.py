@@ -7,13 +7,20 @@ import numpy as np
 import pytest
 import sympy
 
-from discover.equations import Equation, EquationTerm, equation_from_json, equation_to_json
+from discover.equations import Equation, equation_from_json, equation_to_json
 from discover.equations.formats.code import numpy_code, sympy_code
 from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
 from discover.programs.fingerprint import NotDescribable, fingerprint
 from discover.study import read_study
-from tensor_library import CLOSED_FORMS, ClosedForm, build_library, parse_term, register_closed_form
+from tensor_library import (
+    CLOSED_FORMS,
+    ClosedForm,
+    LawTerm,
+    build_library,
+    parse_term,
+    register_closed_form,
+)
 
 PAGE = "adding-a-term.md"
 FORM = ClosedForm(
@@ -29,9 +36,9 @@ FORM = ClosedForm(
 )
 SAMPLES = """
 import jax.numpy as jnp, numpy as np, pathlib, discover as dc
-from discover.equations import Equation, EquationTerm
+from discover.equations import Equation
 from discover.simulate import simulate
-fluid = Equation((EquationTerm("(tanh(mu*tr(sigma)))*sigma", 0.8, {"mu": 0.7}),)).fluid()
+fluid = Equation((LawTerm("(tanh(mu*tr(sigma)))*sigma", 0.8, {"mu": 0.7}),)).fluid()
 folder = pathlib.Path("data"); folder.mkdir()
 names, noise = [], np.random.default_rng(3)
 for number, run in enumerate(list(dc.synthetic_dataset("ucm", {}, n_samples=51))[::4]):
@@ -85,7 +92,7 @@ def test_without_the_package_the_study_of_the_page_is_refused(workplace):
 def test_every_notation_writes_the_same_function(form, tmp_path):
     name = f"{form.spelling}*sigma"
     assert parse_term(name).name == name
-    equation = Equation((EquationTerm(name, 0.8, {"mu": 0.3}),))
+    equation = Equation((LawTerm(name, 0.8, {"mu": 0.3}),))
     stress, rate = jnp.diag(jnp.array([2.0, -0.5, 0.25])), jnp.zeros((3, 3))
     wanted = np.asarray(equation.law().extra_term(stress, rate))
     np.testing.assert_allclose(wanted[0, 0], 0.8 * 1.75 / np.sqrt(1 + (0.3 * 1.75) ** 2) * 2.0)

@@ -12,6 +12,7 @@ from discover.identify.rivals.bands import bands_of_predictions
 from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws import Fluid, make_law
 from discover.protocols.control import oscillations
+from tensor_library.law_terms import LawTerms
 
 TIMES = np.linspace(0.0, 1.0, 5)
 N_DRAWS = 40
@@ -57,20 +58,23 @@ def test_a_law_whose_constants_exchange_each_other_has_no_band_rather_than_none_
 
 def test_weighed_draws_are_taken_for_those_of_the_covariance():
     kept = np.column_stack([np.linspace(1.0, 2.0, 60), np.linspace(0.1, 0.2, 60)])
-    law = Contender("law", {"sigma": 1.5}, {"epsilon": 0.15}, 1e6 * np.eye(2), kept)
+    law = Contender("law", LawTerms({"sigma": 1.5}, {"epsilon": 0.15}), 1e6 * np.eye(2), kept)
     chosen, *others = draws(law, 40, np.random.default_rng(0))
     assert chosen is law
     assert len(others) == 40
-    assert all(1.0 <= other.terms["sigma"] <= 2.0 for other in others)
-    unknown = Contender("law", {"sigma": 1.5}, {}, 1e6 * np.eye(1), without_band="no band")
+    assert all(1.0 <= other.law.coefficients["sigma"] <= 2.0 for other in others)
+    unknown = Contender("law", LawTerms({"sigma": 1.5}), 1e6 * np.eye(1), without_band="no band")
     assert draws(unknown, 40, np.random.default_rng(0)) == (unknown,)
 
 
 def test_forty_draws_of_one_constant_are_as_wide_as_its_interval_whatever_the_seed():
-    law = Contender("law", {"sigma": 1.0}, covariance=np.array([[0.04]]))
+    law = Contender("law", LawTerms({"sigma": 1.0}), covariance=np.array([[0.04]]))
     ratios = []
     for seed in range(20):
-        values = [one.terms["sigma"] for one in draws(law, N_DRAWS, np.random.default_rng(seed))]
+        values = [
+            one.law.coefficients["sigma"]
+            for one in draws(law, N_DRAWS, np.random.default_rng(seed))
+        ]
         low, high = np.percentile(values, [2.5, 97.5], method="median_unbiased")
         ratios.append((high - low) / (3.92 * 0.2))
     # as of numbers evenly spaced in probability, above; at random they differ by a sixth
@@ -79,9 +83,9 @@ def test_forty_draws_of_one_constant_are_as_wide_as_its_interval_whatever_the_se
 
 def test_draws_have_the_covariance_of_constants_that_exchange_each_other():
     covariance = np.array([[1.0, 0.95], [0.95, 1.0]])
-    law = Contender("law", {"sigma": 0.0, "gammadot": 0.0}, covariance=covariance)
+    law = Contender("law", LawTerms({"sigma": 0.0, "gammadot": 0.0}), covariance=covariance)
     others = draws(law, 400, np.random.default_rng(0))[1:]
-    values = np.array([list(other.terms.values()) for other in others])
+    values = np.array([other.law.values for other in others])
     # an axis is drawn evenly, so its variance is nearly exact; how axes combine is left to chance
     np.testing.assert_allclose(np.cov(values.T), covariance, atol=0.1)
 
@@ -91,9 +95,11 @@ def test_laws_in_a_sweep_have_the_moduli_that_scipy_gives_each():
     strains, alphas = np.array([0.1, 1.0, 4.0]), (0.1, 0.4)
     sweep = oscillations(strains, np.ones(3))
     moduli = ("storage_modulus", "loss_modulus")
-    laws = [Contender("", {"sigma.sigma": alpha}) for alpha in alphas]
+    laws = [Contender("", LawTerms({"sigma.sigma": alpha})) for alpha in alphas]
     # of a shear-thickening law that runs away there is no state at the largest strain
-    laws.append(Contender("", {"tr(gammadot.gammadot)*gammadot": -1.0, "sigma.sigma": -0.5}))
+    laws.append(
+        Contender("", LawTerms({"tr(gammadot.gammadot)*gammadot": -1.0, "sigma.sigma": -0.5}))
+    )
     declared = Fluid(make_law("ucm"), 100.0, 1.0)
     flows = [replace(sweep, modulus=modulus) for modulus in moduli]
     found = predict_laws(fluid_of(laws, declared), flows, [np.arange(1.0, 4.0)] * 2)[..., 0]

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from discover.dataset import Run
-from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.identify.structure.one_term_more import one_term_more
 from discover.identify.structure.structure import analyse_structure
 from discover.protocols import start_up
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import build_library
 
 ROWS = 200

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from discover.identify.exact.directions import weak_directions
-from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.identify.structure.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
 from tensor_library import build_library, parse_term
+from tensor_library.law_terms import LawTerms
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}

@@ -9,7 +9,7 @@ import pytest
 from discover.forward.grids import make_grids
 from discover.identify.exact.exact_series import compare_series
 from discover.identify.side_by_side.histories import SAME, differences, random_histories
-from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.laws_side_by_side import stresses_of_laws
 from discover.identify.side_by_side.separation import separations
 from discover.identify.structure.hidden_stresses import hidden_stresses
 from discover.identify.structure.twins import find_twins
@@ -23,6 +23,7 @@ from discover.laws import (
 from discover.protocols import in_flow, stack_protocols, start_up
 from discover.simulate import simulate_homogeneous_flow
 from tensor_library import build_library, parse_term, uniaxial_extension
+from tensor_library.law_terms import LawTerms
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 PTT = "(exp(epsilon*tr(sigma))-1)*sigma"

@@ -22,6 +22,7 @@ from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.learners.trajectories.problem import make_problem
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -153,9 +154,11 @@ def test_parameters_move_with_the_moduli_as_the_response_says():
 
 def test_moduli_are_drawn_with_the_parameters_that_go_with_them():
     errors = ModulusErrors(root=np.diag([2.0, 0.0]), response=np.array([[0.1, 0.0]]))
-    law = Contender("law", {"sigma": 1.0}, covariance=np.array([[0.01]]), modulus_errors=errors)
+    law = Contender(
+        "law", LawTerms({"sigma": 1.0}), covariance=np.array([[0.01]]), modulus_errors=errors
+    )
     drawn = draws(law, 50, np.random.default_rng(0), np.array([10.0, 5.0]))
-    terms = np.array([one.terms["sigma"] for one in drawn[1:]])
+    terms = np.array([one.law.coefficients["sigma"] for one in drawn[1:]])
     moduli = np.array([one.modulus for one in drawn[1:]])
     # all of the parameter's variance comes from the first modulus: θ = 1 − 0.1 u, G = 10 + 2 u
     np.testing.assert_allclose(moduli[:, 0], 10.0 - 20.0 * (terms - 1.0), atol=1e-6)

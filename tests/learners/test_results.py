@@ -7,6 +7,7 @@ import sympy
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.giesekus import Giesekus
 from discover.learners import LearnerResult, RecoveredTerm
+from tensor_library.law_terms import LawTerms
 from tensor_library.symbolic import STRESS, Trace
 
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
@@ -14,10 +15,10 @@ EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 
 def result(base=None):
     terms = (
-        RecoveredTerm("sigma.sigma", 0.25, 0.24, (0.2, 0.3)),
+        RecoveredTerm("sigma.sigma", 0.25, coefficient_penalised=0.24, ci95=(0.2, 0.3)),
         RecoveredTerm(EXPONENTIAL, 1.0, inner={"epsilon": 0.5}),
     )
-    law = law_of_terms([t.term for t in terms], [0.25, 1.0], {"epsilon": 0.5}, True, base)
+    law = law_of_terms(LawTerms.of(terms), True, base)
     history = (np.arange(1, 3), np.array([1.0, 0.1]))
     return LearnerResult("tensor_sindy", law, terms, 1.0, history, {}, "ended <b>well</b>")
 

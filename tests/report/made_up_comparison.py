@@ -13,6 +13,7 @@ from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
 from discover.statistics import LackOfFit
 from discover.study import RunFolder
+from tensor_library.law_terms import LawTerms
 
 NOT_THERE = (None, float("nan"), float("inf"))
 TIMES = np.linspace(0.0, 10.0, 41)
@@ -37,7 +38,7 @@ def flow(name, kind):
 def outcome(learner, number, predicted):
     """Return an outcome in which every number that may be missing is `number`."""
     ends = None if number is None else (number, number)
-    term = RecoveredTerm("sigma.sigma", 0.2, number, ends, {"epsilon": 0.1})
+    term = RecoveredTerm("sigma.sigma", 0.2, coefficient_penalised=number, ci95=ends)
     path = [{**ROW, "size": 0, "support": [], "bic": number, "misfit": 0.4}, {**ROW, "bic": number}]
     for row in path:
         row["held_out"] = number
@@ -67,7 +68,8 @@ def made_up(number=0.01, predicted=True, sparse="explained", network="explained"
     flows = [flow("a", "training"), flow("b", "held_out")]
     learners = {"tensor_sindy": sparse, "tbnn_ude": network}
     learners = {name: verdict for name, verdict in learners.items() if verdict}
-    rival = Rival({"sigma": 0.1}, {}, "A twin.", dict.fromkeys(("sigma12", "N1", "N2"), number))
+    apart = dict.fromkeys(("sigma12", "N1", "N2"), number)
+    rival = Rival(LawTerms({"sigma": 0.1}), "A twin.", apart)
     content = {
         "name": "made up",
         "data_summary": "none",

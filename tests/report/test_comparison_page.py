@@ -22,6 +22,7 @@ from discover.report.wording import (
     terms_text,
 )
 from discover.study import RunFolder
+from tensor_library import LawTerms
 
 
 @pytest.mark.parametrize("number", NOT_THERE[:2])
@@ -116,8 +117,8 @@ def test_errors_inside_and_beyond_the_range_are_told_apart_and_so_is_a_runaway()
 def test_a_law_as_simple_that_fits_as_well_stands_beside_the_one_found():
     # Rolie–Poly and this law have the same σ12, and the first sentence named one of them alone
     other = made_up().rivals[0]
-    beside = replace(other, terms={"tr(sigma.gammadot)*I": 0.3})
-    bigger = replace(other, terms={"sigma.sigma": 0.2, "gammadot.gammadot": -0.1})
+    beside = replace(other, law=LawTerms({"tr(sigma.gammadot)*I": 0.3}))
+    bigger = replace(other, law=LawTerms({"sigma.sigma": 0.2, "gammadot.gammadot": -0.1}))
     found = comparison_verdict(made_up(rivals=[beside, bigger]))[0]
     assert ", or 0.3 tr(σ·γ̇) I, which fits as well" in found
     assert "one of 2 other laws as simple" in comparison_verdict(made_up(rivals=[beside, other]))[0]

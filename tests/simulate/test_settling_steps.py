@@ -20,6 +20,7 @@ from discover.protocols import (
     start_up,
     step_rates,
 )
+from tensor_library.law_terms import LawTerms
 
 TIME = 0.4
 RATES = [0.0, 1.0], [0.1, 20.0]
@@ -69,7 +70,7 @@ def test_growing_steps_are_as_accurate_as_short_ones(law):
 def test_what_a_law_adds_to_the_relaxation_does_not_make_steps_unstable():
     # h = 2σ: σ12 = Wi/3 (1 − e^(−3t/λ)); the rate turns the fluid by 0.4 in a relaxation time
     time, flow = 0.02, start_up(20.0)
-    fluid = Fluid(law_of_terms(["sigma"], [2.0], {}, True), 1.0, time)
+    fluid = Fluid(law_of_terms(LawTerms({"sigma": 2.0}), True), 1.0, time)
     steady = 20.0 * time / 3.0
     times = np.append(0.0, np.geomspace(2e-3, 30.0, 60))
 

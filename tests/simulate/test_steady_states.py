@@ -19,6 +19,7 @@ from discover.laws.textbook.giesekus import Giesekus
 from discover.protocols import in_flow, start_up
 from discover.protocols.control import steady_rates
 from discover.simulate import SimulationError, simulate
+from tensor_library.law_terms import LawTerms
 
 MODULUS, TIME, MOBILITY = (100.0, 300.0), (1.0, 0.1), 0.3
 RATES = np.array([0.02, 1.0, 30.0])
@@ -68,7 +69,7 @@ def test_a_batch_holds_what_goes_on_in_time_and_what_is_steady_in_the_order_of_i
 
 def test_a_law_without_a_steady_state_says_so():
     # h = −2 γ̇²: nothing relaxes, and the stress grows for ever
-    fluid = Fluid(law_of_terms(["gammadot.gammadot"], [-2.0], {}, False), 1.0, 1.0)
+    fluid = Fluid(law_of_terms(LawTerms({"gammadot.gammadot": -2.0}), False), 1.0, 1.0)
     with pytest.raises(SimulationError, match="no steady state"):
         simulate(fluid, steady_rates(RATES), COUNTED)
 

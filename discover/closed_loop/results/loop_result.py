@@ -26,7 +26,6 @@ from discover.closed_loop.results.stages import (
 from discover.equations import (
     AugmentedLaw,
     Equation,
-    EquationTerm,
     HasEquation,
     NamedPart,
     StatePart,
@@ -45,6 +44,7 @@ from discover.page_view import PageView
 from discover.plain_json import json_text, plain
 from discover.statistics import Told
 from discover.words import percent_of
+from tensor_library.law_terms import LawTerm
 
 if TYPE_CHECKING:
     import xarray
@@ -201,7 +201,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             states=self.states,
         )
 
-    def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[EquationTerm, ...]]:
+    def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[LawTerm, ...]]:
         """Return the law of the fluid with a name, if it needs one, and its terms."""
         differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
         if not differing:
@@ -233,7 +233,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
             known | {n: float(np.clip(m[k].value, *ranges[n])) for n, m in differing.items()}
             for k in range(fluid.n_modes)
         )
-        return NamedPart(named[0], constants), tuple(EquationTerm(*one) for one in added)
+        return NamedPart(named[0], constants), added
 
     @cached_property
     def readings(self) -> tuple[Reading, Reading]:

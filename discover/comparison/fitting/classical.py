@@ -22,6 +22,7 @@ from discover.laws.registry import LAWS
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.tensor_sindy.selection import extended_bic
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 CLASSICAL = ("ucm", "johnson_segalman", "giesekus", "ptt_linear", "ptt_exponential")
 """Named laws with one constant at the most, as `discover.laws.registry.LAWS` spells them."""
@@ -190,8 +191,7 @@ def contender(name: str, value: float | None, known_relaxation: bool) -> Contend
     parameters = {} if value is None else {parameter_of(name): float(value)}
     terms = true_terms(name, parameters, known_relaxation)
     assert terms is not None  # the classical laws are sums of library terms
-    inner = {key: number for term in terms for key, number in term.inner.items()}
-    return Contender(name, {term.term: term.coefficient for term in terms}, inner)
+    return Contender(name, LawTerms.of(terms))
 
 
 def _predictions(

@@ -17,6 +17,7 @@ from discover.identify.side_by_side.many_laws import Contender, fluid_of, predic
 from discover.laws.multimode import Fluid
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import another_between_samples, unknown_between_samples
+from tensor_library.law_terms import LawTerms
 
 LARGEST = 5e-3
 """A larger relative misfit is not put down to arithmetic, as in the closed loop: a rate read 24
@@ -90,11 +91,11 @@ def _taken_up(
     changes: Sequence[np.ndarray],
 ) -> tuple[tuple[RecoveredTerm, ...], Mapping[str, float], list[np.ndarray]]:
     """Return terms with wider intervals, shifts over half-widths, and what is left of changes."""
-    values = {term.term: term.coefficient for term in terms}
-    inner = {name: value for term in terms for name, value in term.inner.items()}
+    law = LawTerms.of(terms)
+    values = law.coefficients
     steps = {name: max(abs(value), 1.0) * _STEP for name, value in values.items()}
-    laws = [Contender("found", values, inner)]
-    laws += [Contender(n, {**values, n: values[n] + steps[n]}, inner) for n in values]
+    laws = [Contender("found", law)]
+    laws += [Contender(n, LawTerms({**values, n: values[n] + steps[n]}, law.inner)) for n in values]
     protocols, times = [flow.protocol for flow in flows], [flow.times for flow in flows]
     predicted = predict_laws(fluid_of(laws, declared), protocols, times)[..., 0]
     scale = np.concatenate([np.full(len(f.times), 1.0 / _size(f)) for f in flows])

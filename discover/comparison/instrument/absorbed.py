@@ -11,6 +11,7 @@ from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerms
 
 ONLY_LOOP = (
     "Leave it out of [model] effects, or, where it comes from an earlier result, give it an "
@@ -59,18 +60,16 @@ def _with_effect(
 ) -> DeclaredModel:
     values = jnp.asarray([value for value in known.values if value is not None])
     assert len(values) == len(known.values)  # what was to be fitted has a value by now
-    shares = effect.as_terms([float(value) for value in values])
-    if shares is None:
+    terms = effect.as_terms([float(value) for value in values])
+    if terms is None:
         raise InputError(
             f"compare cannot take {known.name} as known: what it adds to the law is no sum of "
             f"library terms. {ONLY_LOOP}"
         )
     law = declared.law
-    for share in shares:
+    for term in terms:
         base = None if isinstance(law, UpperConvectedMaxwell) else law
-        law = law_of_terms(
-            [share.term], [share.coefficient], share.inner, law.linear_relaxation, base
-        )
+        law = law_of_terms(LawTerms.of([term]), law.linear_relaxation, base)
     beside = np.asarray(effect.instantaneous_stress(values, jnp.asarray(_RATES)))
     if not np.isclose(beside[1], _RATES[1] * beside[0], rtol=1e-9):
         raise InputError(
@@ -88,7 +87,7 @@ def _with_effect(
     return replace(
         declared,
         law=law,
-        law_name=f"{declared.law_name} with {known.text}" if shares else declared.law_name,
+        law_name=f"{declared.law_name} with {known.text}" if terms else declared.law_name,
         modulus=modulus,
         relaxation_time=relaxation_time,
         solvent_viscosity=declared.solvent_viscosity + float(beside[0]),

@@ -17,6 +17,7 @@ from discover.forward.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
 from discover.learners.results.result import LearnerResult
 from discover.statistics import least_squares_covariance, root_of
+from tensor_library.law_terms import LawTerms
 
 _SETTLED = 0.5
 """Change of a constant, in halves of its 95 % interval, that is none: one standard deviation. The
@@ -181,11 +182,7 @@ class ConstantsGivenLaw:
             for term, position in zip(result.terms, self._positions(result), strict=True)
         )
         law = law_of_terms(
-            [term.term for term in terms],
-            [term.coefficient for term in terms],
-            {},
-            result.law.linear_relaxation,
-            getattr(result.law, "base", None),
+            LawTerms.of(terms), result.law.linear_relaxation, getattr(result.law, "base", None)
         )
         details: dict[str, Any] = {**result.details, **self._uncertainty(joint)}
         drawn = details.get("draws") or {}

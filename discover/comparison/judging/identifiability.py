@@ -6,7 +6,7 @@ beside the flows of the comparison.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,6 @@ from discover.dataset.run import Run
 from discover.forward.grids.flow_batch import lay_out
 from discover.identify import (
     LawStructure,
-    LawTerms,
     Structure,
     Twin,
     analyse_structure,
@@ -27,8 +26,8 @@ from discover.identify.exact.relations import spell
 from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
-from discover.learners import RecoveredTerm
 from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerm, LawTerms
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 
@@ -53,10 +52,8 @@ class Rival:
 
     Attributes
     ----------
-    terms
-        Term → coefficient.
-    inner
-        Inner parameters by name.
+    law
+        Its terms, beyond the known part.
     reason
         Why it is a rival, in one sentence.
     errors_to_chosen
@@ -66,8 +63,7 @@ class Rival:
         where they differ nowhere that was tried.
     """
 
-    terms: Mapping[str, float]
-    inner: Mapping[str, float] = field(default_factory=dict)
+    law: LawTerms
     reason: str = ""
     errors_to_chosen: Mapping[str, float | None] = field(default_factory=dict)
     separated_by: Mapping[str, str] | None = None
@@ -77,15 +73,13 @@ class Rival:
         apart = {f"{name}_apart": error for name, error in self.errors_to_chosen.items()}
         separated = dict(self.separated_by or {})
         told_by = " in ".join(separated[key] for key in ("quantity", "protocol") if separated)
-        return {"law": spell(self.terms), **apart, "told_by": told_by}
+        return {"law": spell(self.law.coefficients), **apart, "told_by": told_by}
 
     def to_json(self) -> dict[str, Any]:
         """Return the rival as the contract spells it."""
         return {
-            "terms": [
-                {"term": name, "coefficient": value, "inner": self.inner}
-                for name, value in self.terms.items()
-            ],
+            # each with the inner parameters of the whole law
+            "terms": [{**term.to_json(), "inner": self.law.inner} for term in self.law.terms],
             "reason": self.reason,
             "errors_to_chosen": self.errors_to_chosen,
             "separated_by": self.separated_by,
@@ -93,7 +87,7 @@ class Rival:
 
 
 def find_rivals(
-    terms: Sequence[RecoveredTerm],
+    terms: Sequence[LawTerm],
     met: Iterable[Mapping[str, Any]],
     model: DeclaredModel,
     flows: Sequence[Flow],
@@ -116,7 +110,7 @@ def find_rivals(
     predictions
         Of the chosen law, by the key of the flow, where they are known already.
     """
-    chosen = law_terms(terms)
+    chosen = LawTerms.of(terms)
     searched = () if library is None else library.terms
     basis = build_library(degree=1)
     library = basis if library is None else library.extended(basis.terms)
@@ -125,7 +119,7 @@ def find_rivals(
     flows = [*seen, *unseen]
     reference = predictions
     if reference is None:
-        reference = _simulate(chosen.coefficients, chosen.inner, model, flows)
+        reference = _simulate(chosen, model, flows)
     candidates: dict[frozenset[str], Rival] = {}
     twins = find_twins(library, chosen, model.law)
     twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
@@ -136,28 +130,20 @@ def find_rivals(
     for twin in twins:
         beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
         rival = _rival_of(twin, beyond if searched else [])
-        predictions = _simulate(rival.terms, rival.inner, model, flows, names)
+        predictions = _simulate(rival.law, model, flows, names)
         rival = _judge(rival, reference, predictions, seen, unseen)
         if rival is not None and (rival.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
             candidates.setdefault(frozenset(twin.law.coefficients), rival)
     for row in met:
-        other = dict(zip(row["support"], row["coefficients"], strict=True))
-        if frozenset(other) in candidates or len(candidates) >= MOST_RIVALS:
+        other = LawTerms.from_json(row)
+        if frozenset(other.coefficients) in candidates or len(candidates) >= MOST_RIVALS:
             continue
         reason = row.get("text") or "The data fit it as well within their noise."
-        predictions = _simulate(other, row["inner"], model, flows, names)
-        rival = _judge(Rival(other, row["inner"], reason), reference, predictions, seen, unseen)
+        predictions = _simulate(other, model, flows, names)
+        rival = _judge(Rival(other, reason), reference, predictions, seen, unseen)
         if rival is not None:
-            candidates[frozenset(other)] = rival
+            candidates[frozenset(other.coefficients)] = rival
     return list(candidates.values())
-
-
-def law_terms(terms: Sequence[RecoveredTerm]) -> LawTerms:
-    """Return recovered terms as a law."""
-    return LawTerms(
-        {term.term: term.coefficient for term in terms},
-        {name: value for term in terms for name, value in term.inner.items()},
-    )
 
 
 def _concerns_shear(twin: Twin, size: int) -> bool:
@@ -174,17 +160,15 @@ def _rival_of(twin: Twin, beyond: Sequence[str]) -> Rival:
     reason = twin.text
     if beyond:
         reason += f" (The library that was searched does not hold {', '.join(beyond)}.)"
-    return Rival(twin.law.coefficients, twin.law.inner, reason, separated_by=place)
+    return Rival(twin.law, reason, separated_by=place)
 
 
 def _simulate(
-    terms, inner, model: DeclaredModel, flows, names: Iterable[str] = ()
+    terms: LawTerms, model: DeclaredModel, flows, names: Iterable[str] = ()
 ) -> dict[str, Stresses | None]:
     """Return what a law does in each flow, in a program for all laws of terms of these names."""
-    whole = dict.fromkeys(names or terms, 0.0) | dict(terms)
-    law = law_of_terms(
-        list(whole), list(whole.values()), inner, model.law.linear_relaxation, model.law
-    )
+    whole = LawTerms({**dict.fromkeys(names, 0.0), **terms.coefficients}, terms.inner)
+    law = law_of_terms(whole, model.law.linear_relaxation, model.law)
     fluid = Fluid(law, model.modulus, model.relaxation_time, model.solvent_viscosity)
     return {flow.key: predict(fluid, flow) for flow in flows}
 
@@ -205,14 +189,9 @@ def _judge(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
                 separation, place = error, {"protocol": flow.name, "quantity": quantity}
     if worst["sigma12"] is None:
         return None
-    return Rival(
-        rival.terms,
-        rival.inner,
-        rival.reason,
-        worst,
-        # among the flows of the comparison if one of them will do
-        place if separation > SEPARATED else rival.separated_by,
-    )
+    # among the flows of the comparison if one of them will do
+    place = place if separation > SEPARATED else rival.separated_by
+    return replace(rival, errors_to_chosen=worst, separated_by=place)
 
 
 def law_structure(structure: Structure | None) -> LawStructure | None:
@@ -223,14 +202,14 @@ def law_structure(structure: Structure | None) -> LawStructure | None:
 
 
 def structure_of(
-    terms: Sequence[RecoveredTerm],
+    terms: Sequence[LawTerm],
     runs: Sequence[Run],
     library: TermLibrary,
     model: DeclaredModel,
     use_normal_stresses: bool,
 ) -> Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""
-    found = law_terms(terms)
+    found = LawTerms.of(terms)
     return analyse_structure(
         runs,
         library,

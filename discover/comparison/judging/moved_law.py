@@ -1,6 +1,6 @@
 """A law of terms whose coefficients, and constants of the known part, can be moved."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,8 +12,8 @@ from discover.laws.each_mode import LawOfEachMode
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
-from discover.learners.results.recovered_term import RecoveredTerm
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from tensor_library.law_terms import LawTerm, LawTerms
 
 _STEP = 1e-3
 """Of a difference, relative; of what is near zero, of `_SMALL`."""
@@ -40,16 +40,13 @@ class MovedLaw:
     declared
         The known part.
     terms
-        Coefficients of the terms, by their spelling.
-    inner
-        Inner parameters of the terms.
+        The terms found, beyond the known part.
     names
         Constants that move beside the coefficients: of the modes, or of the declared law.
     """
 
     declared: DeclaredModel
-    terms: Mapping[str, float]
-    inner: Mapping[str, float]
+    terms: LawTerms
     names: tuple[str, ...]
     _kept: dict[tuple[str, str], tuple[Flow, Any]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -57,18 +54,17 @@ class MovedLaw:
 
     @classmethod
     def of(
-        cls, terms: Sequence[RecoveredTerm], declared: DeclaredModel, names: tuple[str, ...] = ()
+        cls, terms: Sequence[LawTerm], declared: DeclaredModel, names: tuple[str, ...] = ()
     ) -> "MovedLaw":
         """Return the law of these terms beside the known part."""
-        inner = {name: value for term in terms for name, value in term.inner.items()}
-        return cls(declared, {term.term: term.coefficient for term in terms}, inner, names)
+        return cls(declared, LawTerms.of(terms), names)
 
     @property
     def start(self) -> Float[np.ndarray, " q"]:
         """Logarithms of factors on the modes, constants of the law, and coefficients."""
         law = self.declared.parameters
         constants = [0.0 if name in MODE_CONSTANTS else law[name] for name in self.names]
-        return np.array([*constants, *self.terms.values()])
+        return np.array([*constants, *self.terms.coefficients.values()])
 
     def fluid(self, values: Float[np.ndarray, " q"]) -> Fluid:
         """Return the fluid with other values."""
@@ -76,10 +72,8 @@ class MovedLaw:
         modulus, time = (np.exp(own.pop(name, 0.0)) for name in MODE_CONSTANTS)
         known = self.declared
         law = make_law(known.law_name, {**known.parameters, **own}) if own else known.law
-        coefficients = [float(value) for value in values[len(self.names) :]]
-        found = law_of_terms(
-            list(self.terms), coefficients, self.inner, known.law.linear_relaxation, law
-        )
+        terms = self.terms.at([*values[len(self.names) :], *self.terms.inner.values()])
+        found = law_of_terms(terms, known.law.linear_relaxation, law)
         return Fluid(
             found, known.modulus * modulus, known.relaxation_time * time, known.solvent_viscosity
         )

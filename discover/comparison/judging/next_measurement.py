@@ -17,6 +17,7 @@ from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.protocols import another_between_samples
 from discover.study.schema import NextExperiment
+from tensor_library.law_terms import LawTerms
 
 LEAST_NOISE = 0.01
 """Relative noise assumed of the next experiment where the data at hand show less."""
@@ -121,7 +122,7 @@ class NextMeasurement:
 
 def bands_of_law(
     outcome: LearnerOutcome,
-    rivals: Iterable[Any],
+    rivals: Iterable[LawTerms],
     declared: Fluid,
     flows: Sequence[Flow],
     seed: int = 0,
@@ -131,7 +132,7 @@ def bands_of_law(
     Parameters
     ----------
     rivals
-        Laws with ``terms`` and ``inner``, closest first.
+        Laws, closest first.
     declared
         The known part.
     flows
@@ -157,7 +158,7 @@ def bands_of_law(
 
 def next_measurement(
     outcome: LearnerOutcome,
-    rivals: Iterable[Any],
+    rivals: Iterable[LawTerms],
     declared: Fluid,
     options: NextExperiment,
     seed: int = 0,
@@ -230,33 +231,26 @@ def _with_sampled_rates(
     return found
 
 
-def contenders(outcome: LearnerOutcome, rivals: Iterable[Any]) -> tuple[Contender, list[Contender]]:
+def contenders(
+    outcome: LearnerOutcome, rivals: Iterable[LawTerms]
+) -> tuple[Contender, list[Contender]]:
     """Return the chosen law and its rivals, with the covariances that the search knows."""
     details = outcome.details
-    known = {frozenset(row["support"]): row for row in details.get("rivals", ())}
-    terms = {term.term: term.coefficient for term in outcome.terms}
-    inner = {name: value for term in outcome.terms for name, value in term.inner.items()}
-    size = len(terms) + len(inner)
-    chosen = Contender(law_name(terms), terms, inner, **_uncertainty(details, size))
+    known = [(LawTerms.from_json(row), row) for row in details.get("rivals", ())]
     others = []
     for rival in list(rivals)[:_MOST_RIVALS]:
-        row = known.get(frozenset(rival.terms))
-        if row is not None and dict(zip(row["support"], row["coefficients"], strict=True)) == dict(
-            rival.terms
-        ):
-            size = len(row["support"]) + len(row["inner"])
-            fitted = dict(zip(row["support"], row["coefficients"], strict=True))
-            known_row = _uncertainty(row, size)
-            others.append(Contender(law_name(fitted), fitted, row["inner"], **known_row))
-        else:
-            used = dict(rival.inner)
-            others.append(Contender(law_name(rival.terms), dict(rival.terms), used))
-    return chosen, others
+        same = (one for one in known if one[0].coefficients == rival.coefficients)
+        others.append(_contender(*next(same, (rival, {}))))
+    return _contender(LawTerms.of(outcome.terms), details), others
 
 
-def law_name(terms: Mapping[str, float]) -> str:
+def _contender(law: LawTerms, row: Mapping[str, Any]) -> Contender:
+    return Contender(law_name(law), law, **_uncertainty(row, len(law.values)))
+
+
+def law_name(law: LawTerms) -> str:
     """Return a law as the sum of its terms, for tables."""
-    text = " ".join(f"{value:+.3g} {name}" for name, value in terms.items())
+    text = " ".join(f"{value:+.3g} {name}" for name, value in law.coefficients.items())
     return text.removeprefix("+") or "no term"
 
 

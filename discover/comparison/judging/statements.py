@@ -313,7 +313,7 @@ def _without_structure(
         if example is not None:
             text += (
                 " Checked by simulation: "
-                + spell_briefly(example.terms)
+                + spell_briefly(example.law.coefficients)
                 + f" gives the same σ12 but an N2 that differs by "
                 f"{percent_of(example.errors_to_chosen['N2'] or 0.0)} of N1."
             )

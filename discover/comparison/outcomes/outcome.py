@@ -20,9 +20,6 @@ from discover.plain_json import plain
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 """Lowest and highest value of some of `QUANTITIES`, each of shape (n,)."""
 
-_INTERVALS = ("ci95", "ci95_given_equal_modes", "ci95_given_declared")
-"""Intervals of a coefficient, as `RecoveredTerm` and results spell them."""
-
 
 @dataclass(frozen=True)
 class LearnerOutcome(TermTables):
@@ -108,7 +105,7 @@ class LearnerOutcome(TermTables):
         """Return everything as JSON-able values; `from_state` undoes it exactly."""
         return {
             "learner": self.learner,
-            "terms": [asdict(term) for term in self.terms],
+            "terms": [term.to_json() for term in self.terms],
             "train_seconds": self.train_seconds,
             "loss_history": [np.asarray(part).tolist() for part in self.loss_history],
             "details": plain(self.details),
@@ -131,17 +128,7 @@ class LearnerOutcome(TermTables):
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
         """Return the outcome that was kept."""
-        terms = tuple(
-            RecoveredTerm(
-                **{
-                    **t,
-                    **{n: t.get(n) and tuple(t[n]) for n in _INTERVALS},
-                    "inner_ci95": {k: tuple(v) for k, v in t.get("inner_ci95", {}).items()},
-                    "inner_at_one": {k: tuple(v) for k, v in t.get("inner_at_one", {}).items()},
-                }
-            )
-            for t in state["terms"]
-        )
+        terms = tuple(RecoveredTerm.from_json(term) for term in state["terms"])
         iterations, losses = (np.asarray(part, dtype=float) for part in state["loss_history"])
         predictions = {
             name: None if p is None else {q: np.asarray(v, dtype=float) for q, v in p.items()}

@@ -2,7 +2,7 @@
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import identity_like, inner
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
@@ -22,8 +22,8 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
         """Return both parts."""
         c, beta = values
         return (
-            TermShare("tr(sigma.gammadot)*sigma", c * (1.0 + beta)),
-            TermShare("tr(sigma.gammadot)*I", c),
+            LawTerm("tr(sigma.gammadot)*sigma", c * (1.0 + beta)),
+            LawTerm("tr(sigma.gammadot)*I", c),
         )
 
 

@@ -2,7 +2,7 @@
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import square
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class GiesekusMobility(ConstitutiveEffect):
@@ -15,7 +15,7 @@ class GiesekusMobility(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return α σ·σ."""
-        return (TermShare("sigma.sigma", values[0]),)
+        return (LawTerm("sigma.sigma", values[0]),)
 
 
 EFFECT = GiesekusMobility(

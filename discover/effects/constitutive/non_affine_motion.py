@@ -2,7 +2,7 @@
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import anticommutator
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class NonAffineMotion(ConstitutiveEffect):
@@ -14,7 +14,7 @@ class NonAffineMotion(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return (ξ/2)(σ·γ̇ + γ̇·σ)."""
-        return (TermShare("sigma.gammadot+gammadot.sigma", 0.5 * values[0]),)
+        return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * values[0]),)
 
 
 EFFECT = NonAffineMotion(

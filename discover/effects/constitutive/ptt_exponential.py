@@ -4,7 +4,7 @@ import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import trace
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class ExponentialNetworkLoss(ConstitutiveEffect):
@@ -18,7 +18,7 @@ class ExponentialNetworkLoss(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return (exp(ε tr σ) − 1) σ."""
-        return (TermShare("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": values[0]}),)
+        return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": values[0]}),)
 
 
 EFFECT = ExponentialNetworkLoss(

@@ -2,7 +2,7 @@
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
 from tensor_library.algebra import trace
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class LinearNetworkLoss(ConstitutiveEffect):
@@ -15,7 +15,7 @@ class LinearNetworkLoss(ConstitutiveEffect):
 
     def as_terms(self, values):
         """Return ε tr(σ) σ."""
-        return (TermShare("tr(sigma)*sigma", values[0]),)
+        return (LawTerm("tr(sigma)*sigma", values[0]),)
 
 
 EFFECT = LinearNetworkLoss(

@@ -7,9 +7,9 @@ from pydantic import Field
 from discover.equations.equation import Box, Equation, Tested
 from discover.equations.named_part import NamedPart
 from discover.equations.state_part import StatePart
-from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.validation import Section, validated
+from tensor_library.law_terms import LawTerm
 
 FORMAT = "discover law 1"
 
@@ -75,13 +75,9 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
         "title": equation.title,
         "notes": list(equation.notes),
         "terms": [
-            {
-                "term": t.term,
-                "coefficient": t.coefficient,
-                "inner": dict(t.inner),
-                "ci95": None if t.ci95 is None else list(t.ci95),
-            }
-            for t in equation.terms
+            # in an equation, where there is none as well
+            {**term.to_json(), "ci95": None if term.ci95 is None else list(term.ci95)}
+            for term in equation.terms
         ],
         "linear_relaxation": equation.linear_relaxation,
         "modes": [
@@ -122,7 +118,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
     tested, named = law.tested, law.named
     try:
         return Equation(
-            terms=EquationTerm.of(law.terms),
+            terms=tuple(LawTerm.from_json(term.model_dump()) for term in law.terms),
             modulus=tuple(mode.modulus_Pa for mode in law.modes),
             relaxation_time=tuple(mode.relaxation_time_s for mode in law.modes),
             linear_relaxation=law.linear_relaxation,

@@ -18,7 +18,6 @@ from typing import Any
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
 from discover.equations.from_law import EXPONENTIAL, combined
-from discover.equations.term import EquationTerm
 from discover.errors import InputError
 from discover.laws.textbook.fene_p import fene_p_terms
 from tensor_library.terms import parse_term
@@ -141,10 +140,9 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
         If rheoTool has no such law; says which term is in the way.
     """
     if equation.named is not None:
-        shares = equation.named.built().as_terms()
-        if shares is None:
+        below = equation.named.built().as_terms()
+        if below is None:
             return _of_name(equation)
-        below = tuple(EquationTerm(*share) for share in shares)
         equation = replace(equation, named=None, terms=combined(below + equation.terms))
     coefficients: dict[str, float] = {}
     inner: dict[str, float] = {}
@@ -297,7 +295,7 @@ def _finitely_extensible(found: dict[str, float], tolerance: float) -> tuple[flo
     if growth <= 0.0:
         return None
     inverse = growth / (1.0 + 3.0 * growth)  # k = q/(1 − 3q)
-    wanted = {share.term: share.coefficient for share in fene_p_terms(inverse)}
+    wanted = {term.term: term.coefficient for term in fene_p_terms(inverse)}
     if set(found) != set(wanted):
         return None
     deviation = max(abs(found[name] / value - 1.0) for name, value in wanted.items())

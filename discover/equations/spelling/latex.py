@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from discover.equations.named_part import NamedPart
-from discover.equations.term import TermLike
 from tensor_library.latex import LatexNotation, latex_number
+from tensor_library.law_terms import LawTerm
 from tensor_library.terms import parse_term
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
@@ -17,7 +17,7 @@ SEPARATOR = r", \qquad "
 
 
 def law_latex(
-    terms: Sequence[TermLike],
+    terms: Sequence[LawTerm],
     linear_relaxation: bool,
     digits: int = 5,
     named: NamedPart | None = None,

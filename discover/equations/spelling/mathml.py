@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.equations.named_part import NamedPart
-from discover.equations.term import TermLike
+from tensor_library.law_terms import LawTerm
 from tensor_library.notation import Notation, greek_letter, printed
 from tensor_library.terms import parse_term
 
@@ -119,7 +119,7 @@ _SIGN = "<mo form='infix'>{}</mo>"
 
 
 def law_element(
-    terms: Sequence[TermLike], linear_relaxation: bool, named: NamedPart | None = None
+    terms: Sequence[LawTerm], linear_relaxation: bool, named: NamedPart | None = None
 ) -> str:
     """Return the whole dimensionless law, displayed; a long one goes on in the next line.
 

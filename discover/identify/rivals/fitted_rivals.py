@@ -11,7 +11,6 @@ be the simplest: fewest terms, then lowest complexity, then fewest invariants, t
 library; `RivalTable.simplest` says whether it is.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,10 +19,10 @@ import pandas as pd
 
 from discover.identify.exact.relations import spell
 from discover.identify.rivals.evidence import LEVEL, Evidence, compare_residuals
-from discover.identify.side_by_side.laws_side_by_side import LawTerms
 from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
 from discover.notebook_view import SentenceAndTable, table_of
+from tensor_library.law_terms import LawTerms
 
 MOST_RIVALS = 8
 
@@ -94,9 +93,7 @@ class FittedRival:
     def to_json(self) -> dict[str, Any]:
         """Return the rival as JSON-able values that `from_json` undoes."""
         return {
-            "support": list(self.law.coefficients),
-            "coefficients": list(self.law.coefficients.values()),
-            "inner": dict(self.law.inner),
+            **self.law.to_json(),
             "misfit": self.misfit,
             "difference": self.difference,
             "exact": self.evidence.test == "tie",
@@ -197,7 +194,7 @@ def find_rivals(search: SupportSearch, chosen: Fit) -> RivalTable:
             continue
         found.append(
             FittedRival(
-                _terms(search, fit),
+                fit.law(problem.library),
                 fit.misfit,
                 float(np.linalg.norm(fit.predicted - chosen.predicted)),
                 evidence,
@@ -240,17 +237,3 @@ def _refitted(search: SupportSearch, fits: list[Fit], tolerance: float) -> list[
         tolerance=tolerance,
     )
     return [new if new.misfit <= old.misfit else old for new, old in zip(again, fits, strict=True)]
-
-
-def _terms(search: SupportSearch, fit: Fit) -> LawTerms:
-    library = search.problem.library
-    used = {library.terms[i].closed_form for i in fit.support}
-    inner: Mapping[str, float] = {
-        form.inner_name: float(fit.inner[i])
-        for i, form in enumerate(library.forms)
-        if form.name in used
-    }
-    coefficients = {
-        library.names[i]: float(c) for i, c in zip(fit.support, fit.coefficients, strict=True)
-    }
-    return LawTerms(coefficients, inner)

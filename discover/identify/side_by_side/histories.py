@@ -9,9 +9,10 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.laws_side_by_side import stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import FlowProtocol, oscillatory_shear, stack_protocols, start_up
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 
 SAME = 1e-5

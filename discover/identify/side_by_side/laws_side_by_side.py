@@ -1,7 +1,6 @@
 """Many laws of one library in many flows at once: one compiled program, laws side by side."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
 import jax
 import numpy as np
@@ -16,25 +15,12 @@ from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import FlowProtocol
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
 LAWS_AT_ONCE = 8
 """Laws simulated side by side; fewer are padded, so that any number shares one program."""
-
-
-@dataclass(frozen=True)
-class LawTerms:
-    """A law by the canonical spelling of its terms, beyond a known part that laws share.
-
-    Attributes
-    ----------
-    inner
-        Inner parameters of closed forms by name.
-    """
-
-    coefficients: Mapping[str, float]
-    inner: Mapping[str, float] = field(default_factory=dict)
 
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
@@ -47,21 +33,9 @@ def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary
     return library.extended(terms)
 
 
-def dense(library: TermLibrary, law: LawTerms) -> tuple[np.ndarray, np.ndarray]:
-    """Return coefficients over a library, shape (n,), and its inner parameters, shape (m,)."""
-    coefficients = np.zeros(len(library))
-    for name, value in law.coefficients.items():
-        coefficients[library.names.index(name)] = value
-    inner = [
-        law.inner.get(name, default)
-        for name, default in zip(library.inner_names, library.inner_default, strict=True)
-    ]
-    return coefficients, np.asarray(inner, dtype=float)
-
-
 def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
     for first in range(0, len(laws), LAWS_AT_ONCE):
-        some = [dense(library, law) for law in laws[first : first + LAWS_AT_ONCE]]
+        some = [law.over(library) for law in laws[first : first + LAWS_AT_ONCE]]
         count = len(some)
         some += some[-1:] * (LAWS_AT_ONCE - count)
         coefficients, inner = (on_device(np.stack(part)) for part in zip(*some, strict=True))

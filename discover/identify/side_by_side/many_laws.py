@@ -1,7 +1,7 @@
 """Many laws in one compiled simulation: rivals, or draws of one law's parameters."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,6 @@ from scipy.stats.qmc import LatinHypercube
 from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch, lay_out
-from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
@@ -23,6 +22,7 @@ from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
 from discover.statistics import root_of
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -35,11 +35,10 @@ class Contender:
     ----------
     name
         For tables and pictures.
-    terms
-        Canonical spelling → coefficient; empty for h = 0.
+    law
+        Its terms, beyond a known part that laws share.
     covariance
-        Of the coefficients in the order of `terms`, then of the inner parameters in the order of
-        `inner`, shape (p, p); None where the parameters count as exact.
+        Of the `values` of the law, shape (p, p); None where the parameters count as exact.
     drawn
         Equally likely parameters in the same order, shape (draws, p), where the covariance does
         not serve; None where it does.
@@ -52,8 +51,7 @@ class Contender:
     """
 
     name: str
-    terms: Mapping[str, float]
-    inner: Mapping[str, float] = field(default_factory=dict)
+    law: LawTerms
     covariance: Float[np.ndarray, "p p"] | None = None
     drawn: Float[np.ndarray, "draws p"] | None = None
     without_band: str = ""
@@ -72,9 +70,9 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
     declared
         The known part: its law is the base, its modes are shared where a law has no own.
     """
-    names = sorted({name for c in contenders for name in c.terms}) or ["sigma"]
+    names = sorted({name for c in contenders for name in c.law.coefficients}) or ["sigma"]
     library = TermLibrary(tuple(parse_term(name) for name in names))
-    rows = [dense(library, LawTerms(c.terms, c.inner)) for c in contenders]
+    rows = [c.law.over(library) for c in contenders]
     coefficients, inner = (np.stack(part) for part in zip(*rows, strict=True))
 
     declared_modulus = np.asarray(declared.modulus)
@@ -113,12 +111,12 @@ def draws(
         root = root_of(contender.covariance)
         # evenly along every axis, or the ends of a band of few draws would be a matter of luck
         even = norm.ppf(LatinHypercube(len(root), scramble=False, rng=rng).random(n_draws))
-        drawn = _centre(contender) + even @ root.T
+        drawn = contender.law.values + even @ root.T
     else:
         drawn = rng.permutation(contender.drawn)[:n_draws]
     errors, moduli = contender.modulus_errors, None
     if errors is not None and modulus is not None and contender.covariance is not None:
-        moved = drawn - _centre(contender)
+        moved = drawn - contender.law.values
         moduli = modulus + errors.draw(moved, contender.covariance, rng)
     return (contender, *_with_parameters(contender, drawn, moduli))
 
@@ -146,7 +144,7 @@ def sigma_points(
     if 2 * len(seen) > most:
         return draws(contender, most, rng)
     far = np.sqrt(len(seen)) * seen
-    return (contender, *_with_parameters(contender, _centre(contender) + np.array([*far, *-far])))
+    return (contender, *_with_parameters(contender, contender.law.values + np.array([*far, *-far])))
 
 
 def _is_uncertain(contender: Contender) -> bool:
@@ -155,26 +153,16 @@ def _is_uncertain(contender: Contender) -> bool:
     return contender.drawn is not None or contender.covariance is not None
 
 
-def _centre(contender: Contender) -> Float[np.ndarray, " p"]:
-    return np.array([*contender.terms.values(), *contender.inner.values()])
-
-
 def _with_parameters(
     contender: Contender,
     values: Float[np.ndarray, "draws p"],
     moduli: Float[np.ndarray, "draws k"] | None = None,
 ) -> list[Contender]:
     """Return the law with other parameters and, where they are given, other moduli."""
-    names, inner = list(contender.terms), list(contender.inner)
-    split = len(names)
+    own = [None] * len(values) if moduli is None else moduli
     return [
-        Contender(
-            contender.name,
-            dict(zip(names, row[:split], strict=True)),
-            dict(zip(inner, row[split:], strict=True)),
-            modulus=None if moduli is None else moduli[i],
-        )
-        for i, row in enumerate(values)
+        Contender(contender.name, contender.law.at(row), modulus=modulus)
+        for row, modulus in zip(values, own, strict=True)
     ]
 
 

@@ -11,11 +11,12 @@ from discover.identify.side_by_side.histories import (
     longest_step,
     observe_differences,
 )
-from discover.identify.side_by_side.laws_side_by_side import LawTerms, stresses_of_laws
+from discover.identify.side_by_side.laws_side_by_side import stresses_of_laws
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.protocols.protocol import in_flow, stack_protocols, start_up
 from discover.statistics.projection import rms
 from discover.words import percent_of
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 
 _EXTENSION_RATES = (0.1, 0.3, 1.0)

@@ -21,7 +21,7 @@ from discover.dataset.run import Run
 from discover.identify.exact.directions import Direction, weak_directions
 from discover.identify.exact.exact_series import compare_series
 from discover.identify.exact.relations import TermRelation, spell_briefly, term_relations
-from discover.identify.side_by_side.laws_side_by_side import LawTerms, dense, joint_library
+from discover.identify.side_by_side.laws_side_by_side import joint_library
 from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.identify.structure.one_term_more import OneTermMore, each_moved
 from discover.laws.base import AbstractConstitutiveLaw
@@ -33,6 +33,7 @@ from discover.learners.trajectories.problem import TrajectoryProblem, make_probl
 from discover.learners.trajectories.sensitivities import linearise
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
+from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -266,7 +267,7 @@ def _unit_weights(problem: TrajectoryProblem) -> TrajectoryProblem:
 
 def _at(problem, library, base, name, law, seen) -> LawStructure | None:
     """Return the structure at one law, or None where it runs away in these flows."""
-    coefficients, inner = dense(library, law)
+    coefficients, inner = law.over(library)
     residual, columns = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
     shape = problem.records.recorded.shape
     stresses = np.asarray(residual).reshape(shape)

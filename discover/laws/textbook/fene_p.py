@@ -7,7 +7,7 @@ from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
 from tensor_library.isotropic_function import IsotropicFunction, scalars
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class FenePeterlin(AbstractConstitutiveLaw):
@@ -35,21 +35,21 @@ class FenePeterlin(AbstractConstitutiveLaw):
         )
         return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
         return fene_p_terms(1.0 / float(self.maximum_extension_squared))
 
 
-def fene_p_terms(inverse: float) -> tuple[TermShare, ...]:
+def fene_p_terms(inverse: float) -> tuple[LawTerm, ...]:
     """Return the extra term of FENE-P, with q = 1/L², multiplied out."""
     growth = inverse / (1.0 - 3.0 * inverse)
     return (
-        TermShare("tr(sigma)*sigma", inverse + growth),
-        TermShare("tr(sigma)^2*sigma", growth * inverse),
-        TermShare("tr(sigma.gammadot)*sigma", -growth),
-        TermShare("tr(sigma)*I", growth),
-        TermShare("tr(sigma)^2*I", growth * inverse),
-        TermShare("tr(sigma.gammadot)*I", -growth),
+        LawTerm("tr(sigma)*sigma", inverse + growth),
+        LawTerm("tr(sigma)^2*sigma", growth * inverse),
+        LawTerm("tr(sigma.gammadot)*sigma", -growth),
+        LawTerm("tr(sigma)*I", growth),
+        LawTerm("tr(sigma)^2*I", growth * inverse),
+        LawTerm("tr(sigma.gammadot)*I", -growth),
     )
 
 

@@ -7,7 +7,7 @@ from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, square
 from tensor_library.isotropic_function import IsotropicFunction, scalars
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class Giesekus(AbstractConstitutiveLaw):
@@ -21,9 +21,9 @@ class Giesekus(AbstractConstitutiveLaw):
         del rate  # this law has no explicit rate dependence
         return self.mobility * square(stress)
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
-        return (TermShare("sigma.sigma", float(self.mobility)),)
+        return (LawTerm("sigma.sigma", float(self.mobility)),)
 
 
 NAMED = {

@@ -7,7 +7,7 @@ from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, anticommutator
 from tensor_library.isotropic_function import IsotropicFunction, scalars
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class JohnsonSegalman(AbstractConstitutiveLaw):
@@ -20,9 +20,9 @@ class JohnsonSegalman(AbstractConstitutiveLaw):
         """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
         return 0.5 * self.slip_parameter * anticommutator(stress, rate)
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
-        return (TermShare("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
+        return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
 
 
 NAMED = {

@@ -7,7 +7,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric
 from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class UpperConvectedMaxwell(AbstractConstitutiveLaw):
@@ -20,7 +20,7 @@ class UpperConvectedMaxwell(AbstractConstitutiveLaw):
         del rate
         return jnp.zeros_like(stress)
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
         return ()
 

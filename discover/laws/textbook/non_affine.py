@@ -12,7 +12,7 @@ from discover.laws.textbook.johnson_segalman import NAMED as JOHNSON_SEGALMAN
 from discover.laws.textbook.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
 from tensor_library.algebra import Symmetric, anticommutator
 from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class NonAffine(AbstractConstitutiveLaw):
@@ -27,9 +27,9 @@ class NonAffine(AbstractConstitutiveLaw):
         slip = 0.5 * self.slip_parameter * anticommutator(stress, rate)
         return self.affine.extra_term(stress, rate) + slip
 
-    def as_terms(self) -> tuple[TermShare, ...] | None:
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return both as a sum of library terms."""
-        slip = TermShare("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
+        slip = LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter))
         affine = self.affine.as_terms()
         return None if affine is None else (*affine, slip)
 

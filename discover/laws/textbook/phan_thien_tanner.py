@@ -8,7 +8,7 @@ from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.named import NamedLaw
 from tensor_library.algebra import Symmetric, trace
 from tensor_library.isotropic_function import IsotropicFunction, scalars
-from tensor_library.terms import TermShare
+from tensor_library.law_terms import LawTerm
 
 
 class LinearPhanThienTanner(AbstractConstitutiveLaw):
@@ -22,9 +22,9 @@ class LinearPhanThienTanner(AbstractConstitutiveLaw):
         del rate
         return self.extensibility * trace(stress) * stress
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
-        return (TermShare("tr(sigma)*sigma", float(self.extensibility)),)
+        return (LawTerm("tr(sigma)*sigma", float(self.extensibility)),)
 
 
 class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
@@ -38,10 +38,10 @@ class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
         del rate
         return jnp.expm1(self.extensibility * trace(stress)) * stress
 
-    def as_terms(self) -> tuple[TermShare, ...]:
+    def as_terms(self) -> tuple[LawTerm, ...]:
         """Return h as a sum of library terms."""
         inner = {"epsilon": float(self.extensibility)}
-        return (TermShare("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
+        return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
 
 
 def _written_linear() -> IsotropicFunction:

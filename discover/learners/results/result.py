@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float, Num
 
-from discover.equations import Equation, EquationTerm, HasEquation, combined, law_parts
+from discover.equations import Equation, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.learners.results.term_tables import TermTables
@@ -63,7 +63,7 @@ class LearnerResult(HasEquation, TermTables):
         Of a network this is its projection on the library.
         """
         base = getattr(self.law, "base", None)
-        found = EquationTerm.of(self.terms)
+        found = tuple(term.in_law for term in self.terms)
         named, known = (None, ()) if base is None else law_parts(base)
         # one mode stands for all, but where each has constants of its own
         unit = (1.0,) * (1 if named is None else len(named.constants))

@@ -15,6 +15,8 @@ from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled, in_threads, on_device
 from discover.progress import require_wanted
+from tensor_library.law_terms import LawTerms
+from tensor_library.library import TermLibrary
 
 _MAX_STEPS = 40
 SCREENING = 1e-3
@@ -57,6 +59,17 @@ class Fit:
         full = np.zeros(n_terms)
         full[list(self.support)] = self.coefficients
         return full
+
+    def law(self, library: TermLibrary) -> LawTerms:
+        """Return the terms of the support, with the inner parameters of their closed forms."""
+        names = [library.names[i] for i in self.support]
+        used = {library.terms[i].closed_form for i in self.support}
+        inner = {
+            form.inner_name: float(value)
+            for form, value in zip(library.forms, self.inner, strict=True)
+            if form.name in used
+        }
+        return LawTerms(dict(zip(names, map(float, self.coefficients), strict=True)), inner)
 
 
 class _Layout(eqx.Module):

@@ -17,16 +17,8 @@ _CLOSE = 10.0  # difference of an information criterion beyond which evidence is
 
 
 def _describe(search: SupportSearch, fit: Fit) -> dict[str, Any]:
-    library = search.problem.library
-    used = {library.terms[i].closed_form for i in fit.support}
     return {
-        "support": [library.names[i] for i in fit.support],
-        "coefficients": [float(c) for c in fit.coefficients],
-        "inner": {
-            form.inner_name: float(fit.inner[i])
-            for i, form in enumerate(library.forms)
-            if form.name in used
-        },
+        **fit.law(search.problem.library).to_json(),
         "misfit": fit.misfit,
         "bic": search.criterion(fit),
     }

@@ -203,12 +203,12 @@ def _or_another(comparison: Comparison, sparse: LearnerOutcome) -> str:
     alike = [
         rival
         for rival in comparison.rivals
-        if len(rival.terms) <= len(own) and {*rival.terms} != own
+        if len(rival.law.coefficients) <= len(own) and {*rival.law.coefficients} != own
     ]
     if not alike:
         return ""
     if len(alike) == 1:
-        return f", or {readable(spell_briefly(alike[0].terms))}, which fits as well"
+        return f", or {readable(spell_briefly(alike[0].law.coefficients))}, which fits as well"
     return f", or one of {len(alike)} other laws as simple, which fit as well"
 
 

@@ -339,9 +339,9 @@ def rival_row(rival: Rival, titles: Mapping[str, str]) -> dict[str, Any]:
     """Return a law that the data do not tell from the one found."""
     # one element a term, so that a long law breaks between them
     terms = [
-        f"<math><mrow>{_sign(value, first=not i)}{term_mathml(name, rival.inner, abs(value))}"
+        f"<math><mrow>{_sign(value, first=not i)}{term_mathml(name, rival.law.inner, abs(value))}"
         "</mrow></math>"
-        for i, (name, value) in enumerate(rival.terms.items())
+        for i, (name, value) in enumerate(rival.law.coefficients.items())
     ]
     place = rival.separated_by
     return {

@@ -20,8 +20,7 @@ from discover.comparison.judging.constants.declared_constants import (
 )
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners import RecoveredTerm
-
-Interval = tuple[float, float]
+from tensor_library.law_terms import Interval
 
 
 def with_other_coefficients(

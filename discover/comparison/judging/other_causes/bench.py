@@ -23,6 +23,7 @@ from discover.statistics.noise.outliers import stray
 from discover.statistics.projection import rms
 from discover.statistics.reading.small_faults import HALF_BAND, WIDTHS
 from discover.study.declared_model import MODE_CONSTANTS
+from tensor_library.law_terms import LawTerms
 
 WIDTH = max(WIDTHS)
 """Standard deviation of factors that all runs share: of rates, times and stresses."""
@@ -77,11 +78,11 @@ class Bench:
         flows
             The fitted runs.
         """
-        if found.inner or not flows or not all(map(_tells, flows)):
+        if found.terms.inner or not flows or not all(map(_tells, flows)):
             return None
         names = tuple(dict.fromkeys([*MODE_CONSTANTS, *found.names]))
-        every = dict.fromkeys([*found.terms, *terms], 0.0)
-        law = MovedLaw(found.declared, {**every, **found.terms}, {}, names)
+        every = dict.fromkeys([*found.terms.coefficients, *terms], 0.0)
+        law = MovedLaw(found.declared, LawTerms({**every, **found.terms.coefficients}), names)
         try:
             predicted = _predicted(law, law.start, flows, 0.0)
         except _RunsAway:
@@ -120,7 +121,7 @@ class Bench:
         start
             Its coefficients, by the spelling of its terms.
         """
-        names, terms = self.law.names, tuple(self.law.terms)
+        names, terms = self.law.names, tuple(self.law.terms.coefficients)
         places = [len(names) + i for i, term in enumerate(terms) if term in start]
         columns = [*places, *range(len(names))]
         free = [np.inf if name in self.fitted else WIDTH for name in names]
@@ -171,7 +172,7 @@ class Bench:
         square = self.worth * slopes @ slopes.T + np.diag(1.0 / widths**2)
         covariance = _inverse(square)
         half = HALF_BAND * np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        names, terms = self.law.names, tuple(self.law.terms)
+        names, terms = self.law.names, tuple(self.law.terms.coefficients)
         coefficients = {
             terms[at - len(names)]: (
                 float(place.values[at]),

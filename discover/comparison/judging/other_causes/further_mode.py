@@ -120,7 +120,7 @@ class _Asked:
     def of(cls, law: MovedLaw, flows: Sequence[Flow]) -> "_Asked | None":
         plain = all(f.protocol.control == "rate" and f.measured is not None for f in flows)
         several = len(law.declared.modulus) > 1 or isinstance(law.declared.law, LawOfEachMode)
-        if not flows or not plain or several or law.inner:
+        if not flows or not plain or several or law.terms.inner:
             return None
         try:
             laid_out = lay_out([f.protocol for f in flows], [f.times for f in flows])

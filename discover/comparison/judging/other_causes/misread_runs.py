@@ -85,7 +85,7 @@ def _beyond_the_sweep(
 ) -> Refutation | None:
     """Return what refutes a law that only the sweep's error excuses, of what that cannot change."""
     spectrum = law.declared.spectrum
-    if spectrum is None or law.inner:
+    if spectrum is None or law.terms.inner:
         return None
     fitted = readings_of(law, [flow for flow in flows if flow.kind == "training"])
     every = readings_of(law, flows) if len(fitted) < len(flows) else []
@@ -125,7 +125,7 @@ def _described_better(
     """Return how else the records were read if a law describes them clearly better so."""
     flows = sorted(flows, key=lambda flow: flow.kind != "training")
     # directions of a band hold errors of the moduli too, which here are no free constants
-    runs = [] if law is None or law.inner else readings_of(law, flows)
+    runs = [] if law is None or law.terms.inner else readings_of(law, flows)
     if not runs:
         told = runs_as_predicted(explanation, name, outcome, flows, bands)
         runs = [_reading(run, law) for run in told]

@@ -22,6 +22,7 @@ from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.evidence import WINDOW
+from tensor_library.law_terms import LawTerms
 
 _MOST = 8  # terms of a law whose subsets are all weighed
 _FITTED = 6  # of these, the likeliest to first order
@@ -57,11 +58,11 @@ def hold_against_smaller_laws(
     """
     if law is None or SPARSE not in explanation.by:
         return explanation
-    own = set(law.terms)
+    own = set(law.terms.coefficients)
     path = outcomes[SPARSE].details.get("path", ())
     farthest = float(np.hypot(explanation.lack_of_fit[SPARSE].misfit, _FARTHEST))
     others = [
-        dict(zip(one["support"], one["coefficients"], strict=True))
+        LawTerms.from_json(one).coefficients
         for one in path
         if 0 < len(one["support"]) < len(own)
         and not own.issuperset(one["support"])
@@ -99,11 +100,11 @@ def holding_smaller_laws(
     law, flows
         As in `hold_against_smaller_laws`.
     """
-    wider, held, terms = dict(outcomes), dict(bands), tuple(law.terms)
+    wider, held, terms = dict(outcomes), dict(bands), tuple(law.terms.coefficients)
     bench, fit = _on_bench(law, flows, ()) if 1 < len(terms) <= _MOST else (None, None)
     if bench is None or fit is None:
         return wider, held, ()
-    found = _as_good(bench, fit, _worth_fitting(bench, fit, law.terms))
+    found = _as_good(bench, fit, _worth_fitting(bench, fit, law.terms.coefficients))
     if not found:
         return wider, held, ()
     banded = [flow for flow in flows if flow.key in held]
@@ -125,7 +126,7 @@ def _on_bench(
     """Return the bench for the law found and others, and the law found on it."""
     terms = list(dict.fromkeys(term for one in others for term in one))
     bench = Bench.of(law, terms, [flow for flow in flows if flow.kind == "training"])
-    return bench, None if bench is None else bench.fit(law.terms)
+    return bench, None if bench is None else bench.fit(law.terms.coefficients)
 
 
 def _worth_fitting(

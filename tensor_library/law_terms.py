@@ -1,0 +1,180 @@
+"""A law as a sum of terms: one term with its coefficient, and the whole sum over a library."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
+
+import numpy as np
+from jaxtyping import Float
+
+from tensor_library.closed_forms import CLOSED_FORMS
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+Interval = tuple[float, float]
+_Term = TypeVar("_Term", bound="LawTerm")
+
+
+@dataclass(frozen=True)
+class LawTerm:
+    """One term c·term of the extra term h of a law.
+
+    Attributes
+    ----------
+    term
+        Its spelling, as `parse_term` reads it; kept in its canonical form.
+    coefficient
+        c, dimensionless.
+    inner
+        Inner parameters of a closed form by name, dimensionless; the form's default is put in where
+        one is missing, so that every format writes the same number.
+    ci95
+        95 % interval of c, or None where c was declared or the interval not computed.
+
+    Raises
+    ------
+    ValueError
+        If `parse_term` cannot read the spelling, or the term has no such inner parameter.
+
+    Examples
+    --------
+    >>> from tensor_library import LawTerm
+    >>> LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3}).inner
+    {'epsilon': 0.3}
+    """
+
+    term: str
+    coefficient: float
+    inner: Mapping[str, float] = field(default_factory=dict)
+    ci95: Interval | None = None
+
+    def __post_init__(self):
+        # what nobody could write out again is refused here
+        parsed = parse_term(self.term)
+        form = parsed.form
+        values = {} if form is None else {form.inner_name: form.inner_default}
+        unknown = [name for name in self.inner if name not in values]
+        if unknown:
+            raise ValueError(
+                f"The term {self.term!r} has no inner parameter {unknown[0]!r}; it has "
+                f"{', '.join(values) or 'none'}."
+            )
+        object.__setattr__(self, "term", parsed.name)
+        object.__setattr__(self, "inner", values | dict(self.inner))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the term as JSON-able values; an interval only where there is one."""
+        told = {} if self.ci95 is None else {"ci95": list(self.ci95)}
+        return {
+            "term": self.term,
+            "coefficient": self.coefficient,
+            "inner": dict(self.inner),
+            **told,
+        }
+
+    @classmethod
+    def from_json(cls: type[_Term], content: Mapping[str, Any]) -> _Term:
+        """Return the term that `to_json` wrote; keys beside are passed over."""
+        known = [one.name for one in fields(cls) if one.name in content]
+        return cls(**{name: _tuples(content[name]) for name in known})
+
+
+@dataclass(frozen=True)
+class LawTerms:
+    """A sum of terms as a library holds it: each once, and one value of each inner parameter.
+
+    Attributes
+    ----------
+    coefficients
+        Canonical spelling → coefficient, dimensionless; empty for h = 0.
+    inner
+        Inner parameters of closed forms by name, dimensionless.
+
+    Examples
+    --------
+    >>> from tensor_library import LawTerm, LawTerms
+    >>> LawTerms.of([LawTerm("sigma.sigma", 0.2)])
+    LawTerms(coefficients={'sigma.sigma': 0.2}, inner={})
+    """
+
+    coefficients: Mapping[str, float] = field(default_factory=dict)
+    inner: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, terms: Iterable[LawTerm]) -> "LawTerms":
+        """Return the sum of these terms.
+
+        Raises
+        ------
+        ValueError
+            If a term stands there twice, or an inner parameter has two values.
+        """
+        coefficients: dict[str, float] = {}
+        inner: dict[str, float] = {}
+        for term in terms:
+            if term.term in coefficients:
+                raise ValueError(f"The term {term.term!r} stands there twice.")
+            coefficients[term.term] = term.coefficient
+            for name, value in term.inner.items():
+                if inner.setdefault(name, value) != value:
+                    raise ValueError(f"{name} has two values, {inner[name]:g} and {value:g}.")
+        # in the order of a library's, which covariances of a fit follow
+        order = [form.inner_name for form in CLOSED_FORMS.values() if form.inner_name in inner]
+        return cls(coefficients, {name: inner[name] for name in order})
+
+    @property
+    def terms(self) -> tuple[LawTerm, ...]:
+        """The terms one by one."""
+        return tuple(
+            LawTerm(name, value, {n: self.inner[n] for n in own if n in self.inner})
+            for name, value in self.coefficients.items()
+            for own in [parse_term(name).inner_names]
+        )
+
+    @property
+    def values(self) -> Float[np.ndarray, " p"]:
+        """Coefficients, then inner parameters, in their order."""
+        return np.array([*self.coefficients.values(), *self.inner.values()], dtype=float)
+
+    def at(self, values: Iterable[float]) -> "LawTerms":
+        """Return the sum with other `values`."""
+        numbers = [float(value) for value in values]
+        split = len(self.coefficients)
+        return LawTerms(
+            dict(zip(self.coefficients, numbers[:split], strict=True)),
+            dict(zip(self.inner, numbers[split:], strict=True)),
+        )
+
+    def over(self, library: TermLibrary) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
+        """Return coefficients over a library that holds the terms, and its inner parameters.
+
+        A form's default where the sum has no value of its inner parameter.
+        """
+        coefficients = np.zeros(len(library))
+        for name, value in self.coefficients.items():
+            coefficients[library.names.index(name)] = value
+        defaults = zip(library.inner_names, library.inner_default, strict=True)
+        inner = [self.inner.get(name, default) for name, default in defaults]
+        return coefficients, np.asarray(inner, dtype=float)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the sum as JSON-able values, as rows of a search hold it."""
+        return {
+            "support": list(self.coefficients),
+            "coefficients": list(self.coefficients.values()),
+            "inner": dict(self.inner),
+        }
+
+    @classmethod
+    def from_json(cls, row: Mapping[str, Any]) -> "LawTerms":
+        """Return the sum that `to_json` wrote; keys beside are passed over."""
+        return cls(
+            dict(zip(row["support"], row["coefficients"], strict=True)), dict(row.get("inner", {}))
+        )
+
+
+def _tuples(value: Any) -> Any:
+    """Return what JSON holds with tuples for lists."""
+    if isinstance(value, Mapping):
+        return {name: _tuples(item) for name, item in value.items()}
+    return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
