@@ -53,9 +53,10 @@ def synthetic():
         when = np.geomspace(0.02, 25.0, 300) / rate
         stress = np.asarray(simulate(fluid, start_up(float(rate)), when).shear_stress)
         noisy = stress * (1.0 + 0.01 * generator.standard_normal(stress.size))
-        runs.append(Run(f"run_{i:02d}", start_up(float(rate)), when, noisy))
-    held = tuple(run.name for run in runs[-3:])
-    return Dataset("made", tuple(runs)), DeclaredModel.maxwell(moduli, times), held
+        held = np.full(when.size, rate)
+        runs.append(Run(f"run_{i:02d}", when, start_up(float(rate)), held, noisy))
+    unseen = tuple(run.name for run in runs[-3:])
+    return Dataset("made", tuple(runs)), DeclaredModel.maxwell(moduli, times), unseen
 
 
 def main() -> None:
