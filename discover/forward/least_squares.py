@@ -12,10 +12,15 @@ from discover.forward.batches import Batch
 from discover.forward.modulus_errors import response
 from discover.statistics import NoiseModel, least_squares_covariance
 
-_LARGEST_DAMPING = 1e7
+_LARGEST_DAMPING, _LEAST_DAMPING = 1e7, 1e-8
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
 _FREE = 1.0
 """Damping, relative to the curvature, below which a step is the problem's own."""
+
+_GROWTH = 5.0  # of the damping where a step is rejected, twice that at the next and so on
+
+_FORETOLD = 0.25
+"""Of the gain that derivatives foretell, below which they are taken anew."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,7 @@ def fit_batch(
     batch: Batch,
     starts: Sequence[np.ndarray],
     free: Sequence[Sequence[int]],
-    max_steps: int = 60,
+    max_steps: int = 200,
     tolerance: float = 1e-4,
     prior: Prior = NO_PRIOR,
     rivals: bool = False,
@@ -104,8 +109,10 @@ def fit_batch(
     Derivatives are differences: a residual costs so little beside a compilation of its derivative
     that this is several times faster here. A step taken corrects them as far as it tells about
     them   [Broyden 1965, Math. Comput. 19, 577], and they are taken anew when a step so found is
-    rejected, or so short that the problem would count as finished: a step then costs one residual
-    instead of one for each parameter. A trial that cannot be integrated has no finite residual and
+    rejected, gains far less than they foretold, or is so short that the problem would count as
+    finished: a step then costs one residual instead of one for each parameter. Damping falls as far
+    as what was foretold is gained, and rises ever faster while it is not   [Madsen, Nielsen &
+    Tingleff 2004, Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot be integrated has no finite residual and
     is a rejected step. Parameters stay in their admissible range by projection   [Marquardt 1963,
     J. SIAM 11, 431].
 
@@ -136,7 +143,7 @@ def fit_batch(
         return costs + np.array(known)
 
     cost = priced(_costs(residual), theta, range(count))
-    damping = np.full(count, 1e-2)
+    damping, growth = np.full(count, 1e-2), np.full(count, _GROWTH)
     done = ~np.isfinite(cost) | np.array([len(positions) == 0 for positions in free])
     jacobian: list[np.ndarray | None] = [None] * count
     fresh = np.zeros(count, dtype=bool)
@@ -148,30 +155,35 @@ def fit_batch(
         for i, value in zip(stale, taken, strict=True):
             jacobian[i], fresh[i] = value, True
         going = [int(i) for i in np.flatnonzero(~done)]
-        trial = theta[going].copy()
+        trial, foretold = theta[going].copy(), np.zeros(len(going))
         for row, i in enumerate(going):
             at = list(free[i])
             known = prior.rows(theta[i], free[i])
             moved = theta[i, at] + gauss_newton_step(jacobian[i], residual[i], damping[i], known)
             trial[row, at] = np.clip(moved, model.low[at], model.high[at])
+            foretold[row] = _foretold(jacobian[i], residual[i], trial[row, at] - theta[i, at])
         trial_residual = model.residuals(trial, batch, cost[going])
         trial_cost = priced(_costs(trial_residual), trial, going)
         for row, i in enumerate(going):
             if trial_cost[row] < cost[i]:
                 gain = 1.0 - trial_cost[row] / cost[i]
                 short = gain < tolerance
+                # at most all of it: a model that foretells nothing says nothing
+                share = min((cost[i] - trial_cost[row]) / max(foretold[row], 1e-300), 1.0)
                 behind = rivals and cost[i] > _FAR_BEHIND * np.min(cost) and gain < _HARDLY
                 # a step that damping cut short gains little anywhere
                 done[i] = damping[i] < _FREE and ((short and fresh[i]) or behind)
                 step = trial[row, list(free[i])] - theta[i, list(free[i])]
                 change = trial_residual[row] - residual[i]
                 theta[i], residual[i], cost[i] = trial[row], trial_residual[row], trial_cost[row]
-                damping[i] = max(damping[i] / 5.0, 1e-10)
+                less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
+                damping[i], growth[i] = max(damping[i] * less, _LEAST_DAMPING), _GROWTH
                 if not done[i]:
-                    jacobian[i] = None if short else _corrected(jacobian[i], step, change)
+                    anew = short or share < _FORETOLD
+                    jacobian[i] = None if anew else _corrected(jacobian[i], step, change)
                     fresh[i] = False
             elif fresh[i]:
-                damping[i] *= 5.0
+                damping[i], growth[i] = damping[i] * growth[i], 2.0 * growth[i]
                 done[i] = damping[i] > _LARGEST_DAMPING
             else:
                 jacobian[i] = None
@@ -222,6 +234,14 @@ def _corrected(jacobian, step, change):
     """Return derivatives that explain the change that a step made."""
     missed = change - np.tensordot(step, jacobian, axes=1)
     return jacobian + np.multiply.outer(step / (step @ step), missed)
+
+
+def _foretold(jacobian, residual, step) -> float:
+    """Return by how much a step lowers the cost if derivatives stay what they are."""
+    if not len(step):
+        return 0.0
+    change = np.tensordot(step, jacobian, axes=1)
+    return float(-np.sum(change * (2.0 * residual + change)))
 
 
 def _costs(residual):
