@@ -112,9 +112,9 @@ def fit_batch(
     rejected, gains far less than they foretold, or is so short that the problem would count as
     finished: a step then costs one residual instead of one for each parameter. Damping falls as far
     as what was foretold is gained, and rises ever faster while it is not   [Madsen, Nielsen &
-    Tingleff 2004, Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot be integrated has no finite residual and
-    is a rejected step. Parameters stay in their admissible range by projection   [Marquardt 1963,
-    J. SIAM 11, 431].
+    Tingleff 2004, Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot
+    be integrated has no finite residual and is a rejected step. Parameters stay in their admissible
+    range by projection   [Marquardt 1963, J. SIAM 11, 431].
 
     Parameters
     ----------
