@@ -3,10 +3,12 @@
 from dataclasses import dataclass, field
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from discover.identify.rivals.evidence import compare_residuals
+from discover.learners.records import Records
 from discover.learners.tensor_sindy.search import SupportSearch
 
 N = 400
@@ -90,13 +92,7 @@ def test_a_coefficient_is_missed_only_where_it_matters(size, told):
 @dataclass
 class FakeProblem:
     library: Any
-    target: np.ndarray
-    weight: np.ndarray
-    run_of_row: np.ndarray
-
-    @property
-    def weighted_target(self):
-        return (self.weight * self.target).reshape(-1)
+    records: Records
 
 
 @dataclass
@@ -128,9 +124,7 @@ def test_the_rule_keeps_ties_and_drops_what_the_data_rule_out(monkeypatch):
     truth[..., 0] = np.sin(0.1 * np.arange(N // 2))
     target = truth.copy()
     target[..., 0] += 0.02 * noise(3).reshape(2, -1)
-    problem = FakeProblem(
-        build_library(), target, weight, np.repeat(np.arange(2), shape[1] * shape[2])
-    )
+    problem = FakeProblem(build_library(), Records(jnp.asarray(target), jnp.asarray(weight)))
 
     def fit(support, change):
         predicted = (weight * (truth + change)).reshape(-1)

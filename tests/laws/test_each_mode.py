@@ -12,7 +12,8 @@ from discover.effects import make_effect
 from discover.equations import AugmentedLaw, law_parts
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.starts.approach import steady_state
+from discover.forward.fluids import at_samples
+from discover.forward.grids import lay_out
 from discover.identify.soundness.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.checking import check_law
@@ -24,6 +25,7 @@ from discover.learners.tbnn_ude.variational import trajectories
 from discover.learners.trajectories.problem import make_problem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.protocols import start_up
+from discover.protocols.control import steady_rates
 from discover.simulate import simulate
 from discover.simulate.synthetic import linear_sweep
 from tensor_library.library import TermLibrary
@@ -88,11 +90,12 @@ def test_the_model_of_the_loop_gives_an_added_mode_constants_between_its_neighbo
 
 def test_steady_states_and_linear_sweeps_are_those_of_each_mode():
     fluid = Fluid(giesekus(), MODULI, TIMES)
-    solved = jax.jit(steady_state)
-    states = np.asarray(solved(fluid, jnp.asarray(RATE)))
+    flows = lay_out([steady_rates(np.array([RATE]))], [np.array([1.0])])
+    solved = jax.jit(lambda fluid: flows.over(lambda *flow: at_samples(fluid, *flow).states)[0, 0])
+    states = np.asarray(solved(fluid))
     for number, (alpha, time) in enumerate(zip(MOBILITIES, TIMES, strict=True)):
         alone = Fluid(make_law("giesekus", {"alpha": alpha}), 1.0, time)
-        assert states[number] == pytest.approx(np.asarray(solved(alone, jnp.asarray(RATE)))[0])
+        assert states[number] == pytest.approx(np.asarray(solved(alone))[0])
     sweep, omega = linear_sweep(fluid), linear_sweep(fluid).angular_frequency
     x = np.multiply.outer(omega, TIMES)
     assert sweep.storage_modulus == pytest.approx((x**2 / (1 + x**2)) @ np.array(MODULI))
