@@ -12,7 +12,7 @@ the ratio, and how far the costs reached are apart.
 import time
 
 import numpy as np
-from loop_speed import STRAIN, measured, synthetic
+from loop_speed import with_all_candidates
 
 LAWS = "ptt_exponential", "ptt_linear", "giesekus_mobility", "non_affine_motion"
 
@@ -28,15 +28,9 @@ def main() -> None:
     import jax.numpy as jnp
     import optimistix
 
-    from discover.closed_loop.candidates import candidates_of
-    from discover.closed_loop.judging.before_after import cut_to_strain
-    from discover.forward import AugmentedModel, data_scales, make_batch
     from discover.forward.least_squares import fit_batch
 
-    data, declared, held = measured() or synthetic()
-    runs = cut_to_strain([run for run in data.runs if run.name not in held], STRAIN)
-    batch = make_batch(runs)
-    model = AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch)
+    model, batch = with_all_candidates()
     starts, free = [], []
     for name in LAWS:
         positions = [*model.positions(name), *model.positions("rate_rise_time")]

@@ -59,6 +59,19 @@ def synthetic():
     return Dataset("made", tuple(runs)), DeclaredModel.maxwell(moduli, times), unseen
 
 
+def with_all_candidates():
+    """Return a model with every candidate, and the melt's fitted runs as a batch."""
+    from discover.closed_loop.candidates import candidates_of
+    from discover.closed_loop.judging.before_after import cut_to_strain
+    from discover.forward import AugmentedModel, make_batch
+    from discover.forward.batches import data_scales
+
+    data, declared, held = measured() or synthetic()
+    runs = cut_to_strain([run for run in data.runs if run.name not in held], STRAIN)
+    batch = make_batch(runs)
+    return AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch), batch
+
+
 def main() -> None:
     """Print errors and seconds."""
     from discover.compilation_cache import enable_compilation_cache

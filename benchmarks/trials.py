@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from loop_speed import STRAIN, measured, synthetic
+from loop_speed import with_all_candidates
 
 ROUNDS = 5
 
@@ -23,17 +23,10 @@ def main() -> None:
 
     enable_x64()
     enable_compilation_cache()
-    from discover.closed_loop.candidates import candidates_of
-    from discover.closed_loop.judging.before_after import cut_to_strain
     from discover.closed_loop.search.scoring.attribution import attribute
-    from discover.forward import AugmentedModel, make_batch
-    from discover.forward.batches import data_scales
     from discover.inference.problem import FitProblem
 
-    data, declared, held = measured() or synthetic()
-    runs = cut_to_strain([run for run in data.runs if run.name not in held], STRAIN)
-    batch = make_batch(runs)
-    model = AugmentedModel(declared, candidates_of(None), data_scales(runs), batch)
+    model, batch = with_all_candidates()
     fit = FitProblem(model, batch).at(model.zero(), [])
     residuals, weights = model.residuals, model._program.weights
 
@@ -70,8 +63,8 @@ def main() -> None:
             begun = time.process_time()
             scores[name] = score()
             seconds[name].append(time.process_time() - begun)
-    modes, effects = len(declared.modulus), len(model.effects)
-    print(f"{data.name}: {modes} modes, {len(runs)} runs, {effects} effects")
+    modes, effects = len(model.declared.modulus), len(model.effects)
+    print(f"{modes} modes, {len(batch.recorded)} runs, {effects} effects")
     least = min(seconds["as it is"])
     for name, each in seconds.items():
         difference = max(abs(scores[name][e] - scores["as it is"][e]) for e in scores[name])

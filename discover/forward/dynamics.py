@@ -176,6 +176,10 @@ class Dynamics(NamedTuple):
             first = last
         return tuple(pieces)
 
+    def weights_alone(self, width: Float[Array, ""]) -> tuple[Float[Array, "kinds 11 _"], ...]:
+        """Return what `weights_of_step` wants of one step of this width in s."""
+        return tuple(piece[0] for piece in self.weights(width[None]))
+
     def weights_of_step(
         self,
         pieces: tuple[Float[Array, "kinds 11 _"], ...],
@@ -198,7 +202,7 @@ class Dynamics(NamedTuple):
         if any(effect.changes_times for effect in self.states):
             pieces = jax.lax.cond(
                 self.times_change,
-                lambda: tuple(piece[0] for piece in self.weights((width / slow)[None])),
+                lambda: self.weights_alone(width / slow),
                 lambda: pieces,
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
@@ -312,7 +316,7 @@ class Dynamics(NamedTuple):
         width
             Of the step in s.
         """
-        w = self.weights_of_step(tuple(piece[0] for piece in self.weights(width[None])), width, 1.0)
+        w = self.weights_of_step(self.weights_alone(width), width, 1.0)
         stage = self.stage(w, 1.0, flow)
         first, middle, last = rates
         felt = jnp.stack([first, middle, middle, last])

@@ -142,7 +142,7 @@ def _step(dynamics: Dynamics, width, unroll: int):
     A step is of rates at its beginning, middle and end, and comes with σ12 at its end.
     """
     combined = dynamics.combined
-    weights = tuple(piece[0] for piece in dynamics.weights(width[None]))
+    weights = dynamics.weights_alone(width)
 
     def relaxed(levels, rate, stress, share):
         pairs = [e.source_and_decay(v, rate, stress) for e, v in dynamics.states.items()]
