@@ -29,7 +29,8 @@ from discover.dataset import Run
 from discover.dataset.records.coarse_rates import CoarseRates
 from discover.dataset.records.repeats import repeats_among
 from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
-from discover.forward.least_squares import Fit, intervals
+from discover.forward.fit_uncertainty import intervals
+from discover.forward.least_squares import Fit
 from discover.forward.modulus_errors import modulus_shifts
 from discover.forward.step_instants import with_own_instants
 from discover.inference.by_mode import constants_by_mode

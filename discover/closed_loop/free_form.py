@@ -20,7 +20,8 @@ from discover.closed_loop.runs import all_at_a_rate_in_shear
 from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.forward import Batch
-from discover.forward.least_squares import covariance_and_noise, gauss_newton_step, jacobians
+from discover.forward.fit_uncertainty import covariance_and_noise
+from discover.forward.least_squares import gauss_newton_step, jacobians, room_of
 from discover.inference.evidence import INDISTINGUISHABLE, WINDOW, criterion
 from discover.statistics.residual import judged_cost, summarise
 
@@ -158,7 +159,9 @@ def _fitted(
         if not np.all(np.isfinite(slopes)):
             return None
         rows = np.concatenate([slopes, np.moveaxis(changed, -1, 0)])
-        step = gauss_newton_step(rows, left, _DAMPING)[: len(free)]
+        room = np.full((2, len(rows)), [[-np.inf], [np.inf]])  # a function has no bounds
+        room[:, : len(free)] = room_of(model, theta, free)
+        step = gauss_newton_step(rows, left, _DAMPING, room=room)[: len(free)]
         before = float(np.sum(left**2))
         for halving in range(_HALVINGS):
             trial = theta.copy()

@@ -11,7 +11,8 @@ from dataclasses import replace
 from discover.closed_loop.search import Search
 from discover.effects import AbstractEffect, make_effect
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit, Prior, intervals
+from discover.forward.fit_uncertainty import intervals
+from discover.forward.least_squares import Fit, Prior
 from discover.forward.modulus_errors import modulus_shifts
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode, ModeConstant

@@ -1,16 +1,14 @@
 """Levenberg–Marquardt for many small problems that share one compiled model."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
+from scipy.optimize import lsq_linear
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import Batch
-from discover.forward.modulus_errors import response
-from discover.statistics import NoiseModel, least_squares_covariance
 
 _LARGEST_DAMPING, _LEAST_DAMPING = 1e7, 1e-8
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
@@ -113,8 +111,9 @@ def fit_batch(
     finished: a step then costs one residual instead of one for each parameter. Damping falls as far
     as what was foretold is gained, and rises ever faster while it is not   [Madsen, Nielsen &
     Tingleff 2004, Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot
-    be integrated has no finite residual and is a rejected step. Parameters stay in their admissible
-    range by projection   [Marquardt 1963, J. SIAM 11, 431].
+    be integrated has no finite residual and is a rejected step. A step is the best that the
+    admissible range of the parameters holds, so the others go on where one is at its bound
+    [Kanzow, Yamashita & Fukushima 2004, J. Comput. Appl. Math. 172, 375].
 
     Parameters
     ----------
@@ -132,71 +131,135 @@ def fit_batch(
         Whether only the best problems matter: one that is far behind and hardly gains any more is
         left where it is.
     """
-    theta = np.array(starts, dtype=float)
-    count = len(theta)
-    residual = model.residuals(theta, batch)
-
-    def priced(costs, vectors, problems):
-        known = [
-            np.sum(prior.rows(v, free[i])[0] ** 2) for v, i in zip(vectors, problems, strict=True)
-        ]
-        return costs + np.array(known)
-
-    cost = priced(_costs(residual), theta, range(count))
-    damping, growth = np.full(count, 1e-2), np.full(count, _GROWTH)
-    done = ~np.isfinite(cost) | np.array([len(positions) == 0 for positions in free])
-    jacobian: list[np.ndarray | None] = [None] * count
-    fresh = np.zeros(count, dtype=bool)
-    for _ in range(max_steps):
-        if done.all():
-            break
-        stale = [int(i) for i in np.flatnonzero(~done) if jacobian[i] is None]
-        taken = jacobians(model, batch, theta[stale], residual[stale], [free[i] for i in stale])
-        for i, value in zip(stale, taken, strict=True):
-            jacobian[i], fresh[i] = value, True
-        going = [int(i) for i in np.flatnonzero(~done)]
-        trial, foretold = theta[going].copy(), np.zeros(len(going))
-        for row, i in enumerate(going):
-            at = list(free[i])
-            known = prior.rows(theta[i], free[i])
-            moved = theta[i, at] + gauss_newton_step(jacobian[i], residual[i], damping[i], known)
-            trial[row, at] = np.clip(moved, model.low[at], model.high[at])
-            foretold[row] = _foretold(jacobian[i], residual[i], trial[row, at] - theta[i, at])
-        trial_residual = model.residuals(trial, batch, cost[going])
-        trial_cost = priced(_costs(trial_residual), trial, going)
-        for row, i in enumerate(going):
-            if trial_cost[row] < cost[i]:
-                gain = 1.0 - trial_cost[row] / cost[i]
-                short = gain < tolerance
-                # at most all of it: a model that foretells nothing says nothing
-                share = min((cost[i] - trial_cost[row]) / max(foretold[row], 1e-300), 1.0)
-                behind = rivals and cost[i] > _FAR_BEHIND * np.min(cost) and gain < _HARDLY
-                # a step that damping cut short gains little anywhere
-                done[i] = damping[i] < _FREE and ((short and fresh[i]) or behind)
-                step = trial[row, list(free[i])] - theta[i, list(free[i])]
-                change = trial_residual[row] - residual[i]
-                theta[i], residual[i], cost[i] = trial[row], trial_residual[row], trial_cost[row]
-                less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
-                damping[i], growth[i] = max(damping[i] * less, _LEAST_DAMPING), _GROWTH
-                if not done[i]:
-                    anew = short or share < _FORETOLD
-                    jacobian[i] = None if anew else _corrected(jacobian[i], step, change)
-                    fresh[i] = False
-            elif fresh[i]:
-                damping[i], growth[i] = damping[i] * growth[i], 2.0 * growth[i]
-                done[i] = damping[i] > _LARGEST_DAMPING
-            else:
-                jacobian[i] = None
-    # those of the last step, unless that was not the last
-    missing = [i for i in range(count) if not fresh[i]]
-    taken = jacobians(model, batch, theta[missing], residual[missing], [free[i] for i in missing])
-    for i, value in zip(missing, taken, strict=True):
-        jacobian[i] = value
-    return [
-        Fit(theta[i], tuple(free[i]), residual[i], derivatives)
-        for i, derivatives in enumerate(jacobian)
-        if derivatives is not None
+    thetas = np.array(starts, dtype=float)
+    residuals = model.residuals(thetas, batch)
+    descents = [
+        _Descent(model, prior, list(positions), theta, residual)
+        for theta, positions, residual in zip(thetas, free, residuals, strict=True)
     ]
+    for _ in range(max_steps):
+        going = [one for one in descents if not one.done]
+        if not going:
+            break
+        _differentiate([one for one in going if one.derivatives is None], batch)
+        trials = np.array([one.trial() for one in going])
+        tried = model.residuals(trials, batch, np.array([one.cost for one in going]))
+        for one, trial, residual in zip(going, trials, tried, strict=True):
+            best = min(other.cost for other in descents) if rivals else np.inf
+            one.judge(trial, residual, tolerance, best)
+    # derivatives are those of the last step, unless that was not the last
+    _differentiate([one for one in descents if not one.fresh], batch)
+    return [
+        Fit(one.theta, tuple(one.free), one.residual, one.derivatives)
+        for one in descents
+        if one.derivatives is not None
+    ]
+
+
+@dataclass
+class _Descent:
+    """One problem on its way to its minimum.
+
+    Attributes
+    ----------
+    model, prior, free
+        Whose residuals they are, what is known of the parameters, and which are fitted.
+    theta, residual
+        Where it is.
+    derivatives
+        Of the residual in what is free; None where they are to be taken anew.
+    fresh
+        Whether they were taken here, and not corrected on the way.
+    damping, growth
+        Of a step, and by how much the former grows where one is rejected.
+    done
+        Whether it has ended.
+    """
+
+    model: AugmentedModel
+    prior: Prior
+    free: list[int]
+    theta: np.ndarray
+    residual: np.ndarray
+    derivatives: np.ndarray | None = None
+    fresh: bool = False
+    damping: float = 1e-2
+    growth: float = _GROWTH
+    done: bool = field(init=False)
+    cost: float = field(init=False)
+
+    def __post_init__(self):
+        self.cost = self._cost(self.theta, self.residual)
+        self.done = not np.isfinite(self.cost) or not self.free
+
+    def _cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
+        """Return the sum of squares, what is known of parameters included; else infinite."""
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
+            cost = np.sum(residual**2) + np.sum(self.prior.rows(theta, self.free)[0] ** 2)
+        return float(cost) if np.isfinite(cost) else np.inf
+
+    def trial(self) -> np.ndarray:
+        """Return the parameters after one more step."""
+        at, theta = self.free, self.theta.copy()
+        known, room = self.prior.rows(theta, at), room_of(self.model, theta, at)
+        step = gauss_newton_step(self.derivatives, self.residual, self.damping, known, room)
+        theta[at] = np.clip(theta[at] + step, self.model.low[at], self.model.high[at])
+        return theta
+
+    def _foretold(self, step: np.ndarray) -> float:
+        """Return by how much a step lowers the cost if derivatives stay what they are."""
+        assert self.derivatives is not None  # the step was found with them
+        known, design = self.prior.rows(self.theta, self.free)
+        change, of_known = np.tensordot(step, self.derivatives, axes=1), design @ step
+        gain = np.sum(change * (2.0 * self.residual + change))
+        return -float(gain + np.sum(of_known * (2.0 * known + of_known)))
+
+    def judge(self, theta: np.ndarray, residual: np.ndarray, tolerance: float, best: float):
+        """Take the step to a trial, or try a shorter one or other derivatives the next time.
+
+        Parameters
+        ----------
+        theta, residual
+            Of the trial.
+        tolerance
+            Share of the cost below which a step gains hardly anything.
+        best
+            Least cost of all problems; infinite where being behind it is no reason to end.
+        """
+        cost = self._cost(theta, residual)
+        if not cost < self.cost:
+            if self.fresh:
+                self.damping, self.growth = self.damping * self.growth, 2.0 * self.growth
+                self.done = self.damping > _LARGEST_DAMPING
+            else:
+                self.derivatives = None
+            return
+        gain = 1.0 - cost / self.cost
+        short = gain < tolerance
+        behind = self.cost > _FAR_BEHIND * best and gain < _HARDLY
+        # a step that damping cut short gains little anywhere
+        self.done = self.damping < _FREE and ((short and self.fresh) or behind)
+        step, change = theta[self.free] - self.theta[self.free], residual - self.residual
+        # at most all of it: a model that foretells nothing says nothing
+        share = min((self.cost - cost) / max(self._foretold(step), 1e-300), 1.0)
+        less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
+        self.damping, self.growth = max(self.damping * less, _LEAST_DAMPING), _GROWTH
+        self.theta, self.residual, self.cost = theta, residual, cost
+        if not self.done:
+            anew = short or share < _FORETOLD
+            self.derivatives = None if anew else _corrected(self.derivatives, step, change)
+            self.fresh = False
+
+
+def _differentiate(descents: Sequence[_Descent], batch: Batch):
+    """Take derivatives anew, of all problems in one call."""
+    if not descents:
+        return
+    theta, residual = ([getattr(d, name) for d in descents] for name in ("theta", "residual"))
+    free = [one.free for one in descents]
+    found = jacobians(descents[0].model, batch, theta, np.array(residual), free)
+    for one, derivatives in zip(descents, found, strict=True):
+        one.derivatives, one.fresh = derivatives, True
 
 
 def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
@@ -230,28 +293,25 @@ def widths_of(
     return np.where(theta[at] + width > model.high[at], -width, width)
 
 
+def room_of(
+    model: AugmentedModel, theta: Float[np.ndarray, " p"], positions: Sequence[int]
+) -> Float[np.ndarray, "2 positions"]:
+    """Return how far parameters may go, down (none of it positive) and up."""
+    at = list(positions)
+    return np.stack([model.low[at] - theta[at], model.high[at] - theta[at]])
+
+
 def _corrected(jacobian, step, change):
     """Return derivatives that explain the change that a step made."""
     missed = change - np.tensordot(step, jacobian, axes=1)
     return jacobian + np.multiply.outer(step / (step @ step), missed)
 
 
-def _foretold(jacobian, residual, step) -> float:
-    """Return by how much a step lowers the cost if derivatives stay what they are."""
-    if not len(step):
-        return 0.0
-    change = np.tensordot(step, jacobian, axes=1)
-    return float(-np.sum(change * (2.0 * residual + change)))
+def gauss_newton_step(jacobian, residual, damping, known=None, room=None):
+    """Return the damped step of the free parameters, with rows of what is known of them.
 
-
-def _costs(residual):
-    with np.errstate(over="ignore", invalid="ignore"):
-        cost = np.sum(residual**2, axis=(1, 2))
-    return np.where(np.isfinite(cost), cost, np.inf)
-
-
-def gauss_newton_step(jacobian, residual, damping, known=None):
-    """Return the damped step of the free parameters, with rows of what is known of them."""
+    Of those that lead no further down and up than `room` allows, if that is given; see `room_of`.
+    """
     if len(jacobian) == 0:
         return np.zeros(0)
     design = jacobian.reshape(len(jacobian), -1).T
@@ -266,76 +326,9 @@ def gauss_newton_step(jacobian, residual, damping, known=None):
     scaled = design / scale
     padded = np.concatenate([scaled, np.sqrt(damping) * np.eye(len(jacobian))])
     target = np.concatenate([-residual, np.zeros(len(jacobian))])
-    return np.linalg.lstsq(padded, target, rcond=None)[0] / scale
-
-
-def intervals(
-    model: AugmentedModel,
-    batch: Batch,
-    fit: Fit,
-    shifts: Float[np.ndarray, "k runs n"] | None = None,
-) -> dict[int, tuple[float, float]]:
-    """Return the 95 % interval of each fitted parameter, by position.
-
-    From the curvature at the fit and the noise that its residual shows; see
-    `discover.statistics.least_squares_covariance`.
-
-    Parameters
-    ----------
-    model, batch, fit
-        The model, the fitted runs and the fit.
-    shifts
-        What errors of the moduli change (`modulus_shifts`); None takes the moduli for exact.
-    """
-    if not fit.free:
-        return {}
-    covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
-    if shifts is not None and len(shifts):
-        off = response(fit.jacobian, shifts)
-        covariance = covariance + off @ off.T
-    half = quantile * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
-    bounds = {}
-    for position, h in zip(fit.free, half, strict=True):
-        value, low, high = fit.theta[position], model.low[position], model.high[position]
-        # a time must be positive, and what may be as short as that may be nothing
-        floor = 0.0 if 0.0 < low < 1e-6 * value else low
-        bounds[position] = (
-            float(floor if value - h < low else value - h),
-            float(min(value + h, high)),
-        )
-    return bounds
-
-
-def uncertainty(
-    batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
-) -> tuple[Float[np.ndarray, "free free"], float]:
-    """Return the covariance of fitted parameters, and how many deviations hold 95 %."""
-    covariance, noise = covariance_and_noise(batch, residual, jacobian)
-    independent = max(noise.effective_samples - len(jacobian), 1.0)
-    return covariance, float(student.ppf(0.975, independent))
-
-
-def covariance_and_noise(
-    batch: Batch, residual: Float[np.ndarray, "runs n"], jacobian: Float[np.ndarray, "free runs n"]
-) -> tuple[Float[np.ndarray, "free free"], NoiseModel]:
-    """Return the covariance of fitted parameters, and the noise that it rests on."""
-    design = jacobian.reshape(len(jacobian), -1).T
-    # a run that was left out of the fit says nothing of the noise
-    told = [(rows, size) for rows, size in zip(*sequences_of(batch), strict=True) if len(rows)]
-    sequences, sizes = zip(*told, strict=True)
-    covariance, _, noise = least_squares_covariance(
-        design, residual.ravel(), sequences, sizes=sizes
-    )
-    return covariance, noise
-
-
-def sequences_of(batch: Batch) -> tuple[list[np.ndarray], list[float]]:
-    """Return the rows of each run in a flattened residual, and the size of noise alike in all.
-
-    Every run has a weight of one in all, however many samples share it; so where records are
-    equally noisy, residuals of a long run are the smaller ones.
-    """
-    seen = np.asarray(batch.weight) > 0
-    rows = np.arange(seen.size).reshape(seen.shape)
-    sequences = [row[kept] for row, kept in zip(rows, seen, strict=True)]
-    return sequences, [1.0 / np.sqrt(max(len(own), 1)) for own in sequences]
+    step = np.linalg.lstsq(padded, target, rcond=None)[0]
+    if room is not None:
+        low, high = (scale * bound for bound in room)
+        if np.any((step < low) | (step > high)):
+            step = lsq_linear(padded, target, (low, high), method="bvls").x
+    return step / scale

@@ -97,8 +97,10 @@ def with_own_instants(
         for source in np.unique(sources):
             own = sources == source
             at = np.flatnonzero(free[own][0])
-            step = gauss_newton_step(columns[np.ix_(at, own)], left[own], _DAMPING)
-            trial[np.ix_(own, at)] = np.clip(share[np.ix_(own, at)] + step, 0.0, 1.0)
+            begun = share[np.ix_(own, at)]
+            room = (-begun[0], 1.0 - begun[0])
+            step = gauss_newton_step(columns[np.ix_(at, own)], left[own], _DAMPING, room=room)
+            trial[np.ix_(own, at)] = np.clip(begun + step, 0.0, 1.0)
         after = residual(trial)
         # a run's own record speaks of its own instants alone
         better = np.array(

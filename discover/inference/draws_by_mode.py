@@ -9,7 +9,8 @@ from scipy.stats import norm
 from scipy.stats.qmc import LatinHypercube
 
 from discover.forward import Batch
-from discover.forward.least_squares import Fit, uncertainty
+from discover.forward.fit_uncertainty import uncertainty
+from discover.forward.least_squares import Fit
 from discover.inference.degrees import Degree
 from discover.inference.problem import FitProblem
 from discover.inference.varying_constant import (

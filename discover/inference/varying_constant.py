@@ -9,7 +9,8 @@ from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, link_slope
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, uncertainty
+from discover.forward.fit_uncertainty import uncertainty
+from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 from discover.inference.alone import told_beyond_a_polynomial
 from discover.inference.degrees import FREE, Degree
 

@@ -9,7 +9,7 @@ from modes_in_start_up import noisy_start_ups
 
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.least_squares import intervals
+from discover.forward.fit_uncertainty import intervals
 from discover.inference import degrees as of_degrees
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.degrees import FREE, Degree, choose_degrees, one_degree_more

@@ -11,7 +11,8 @@ import discover as dc
 from discover.comparison.fitting import training
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch, intervals
+from discover.forward.fit_uncertainty import intervals
+from discover.forward.least_squares import fit_batch
 from discover.forward.modulus_errors import modulus_shifts
 from discover.identify.side_by_side.many_laws import Contender, draws
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes

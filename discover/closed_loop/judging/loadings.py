@@ -12,7 +12,8 @@ from jaxtyping import Float
 
 from discover.closed_loop.judging.judgement import Judgement
 from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
-from discover.forward.least_squares import Fit, uncertainty, widths_of
+from discover.forward.fit_uncertainty import uncertainty
+from discover.forward.least_squares import Fit, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics import HALF_BAND
 from discover.statistics.noise.independent_samples import independent_samples

@@ -7,7 +7,8 @@ from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import Fit, intervals
+from discover.forward.fit_uncertainty import intervals
+from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
 from discover.inference.by_mode import constants_by_mode
 from discover.inference.constants import ConstantByMode

@@ -18,7 +18,8 @@ from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, KinematicEffect, named_effects
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.forward.least_squares import Fit, fit_batch, jacobians, uncertainty
+from discover.forward.fit_uncertainty import uncertainty
+from discover.forward.least_squares import Fit, fit_batch, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.inference.evidence import WINDOW

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward.least_squares import Fit, gauss_newton_step
+from discover.forward.least_squares import Fit, gauss_newton_step, room_of
 from discover.inference.problem import FitProblem
 
 _MISSED = 10.0
@@ -50,9 +50,8 @@ def left_out_parts(
     for left_out in folds:
         # rows of zeros count for nothing
         kept = weighted & ~left_out
-        step = gauss_newton_step(
-            fit.jacobian * kept, fit.residual * kept, 1e-8, problem.prior.rows(fit.theta, at)
-        )
+        known, room = problem.prior.rows(fit.theta, at), room_of(model, fit.theta, at)
+        step = gauss_newton_step(fit.jacobian * kept, fit.residual * kept, 1e-8, known, room)
         theta = fit.theta.copy()
         theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
         trials.append(theta)

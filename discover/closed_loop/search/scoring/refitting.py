@@ -19,7 +19,8 @@ from discover.closed_loop.search.scoring.left_out import (
 )
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit, intervals
+from discover.forward.fit_uncertainty import intervals
+from discover.forward.least_squares import Fit
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.problem import FitProblem
 
