@@ -16,6 +16,7 @@ from discover.forward.batches import (
     loadings_of,
     make_batch,
     relative_noise,
+    share_of_factor,
 )
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 
@@ -35,4 +36,5 @@ __all__ = [
     "loadings_of",
     "make_batch",
     "relative_noise",
+    "share_of_factor",
 ]

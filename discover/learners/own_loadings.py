@@ -1,13 +1,9 @@
 """Predictions of runs that are loadings of their own, with the factors that their records suggest.
 
-Where a factor 1 + f, f ~ N(0, s²), stands on a record y of a prediction p, both in units of the
-noise, f is integrated out by
-
-    p' = p − (1 − 1/√(1 + s² p·p)) (p·(p − y) / p·p) p,
-
-whose distance from y is the least of |(1 + f) p − y|² + f²/s² over f, as in
-`discover.forward.batches.loadings`. Along the record in place of the prediction this would be
-linear in p, but then a law that predicts less would leave less of the noise.
+A prediction p of a record y is replaced by p', whose distance from y is what
+`discover.forward.batches.loadings` leaves of the residual e = p − y. Along the record in place of
+the prediction this would be linear in p, but then a law that predicts less would leave less of the
+noise.
 """
 
 from collections.abc import Sequence
@@ -17,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
-from discover.forward import relative_noise
+from discover.forward import relative_noise, share_of_factor
 from discover.programs import on_device
 
 
@@ -56,8 +52,6 @@ def with_likely_factors(
     signal
         As `signals_of` returns it, in these units.
     """
-    size = jnp.sum(predicted**2, axis=1)
-    sane = jnp.where(size > 0.0, size, 1.0)
-    share = jnp.sum(predicted * (predicted - recorded), axis=1) / sane
-    less = 1.0 - 1.0 / jnp.sqrt(1.0 + signal * size)
-    return predicted - (less * share)[:, None] * predicted
+    along = jnp.sum(predicted * (predicted - recorded), axis=1)
+    share = share_of_factor(along, jnp.sum(predicted**2, axis=1), signal)
+    return predicted - share[:, None] * predicted

@@ -1,7 +1,7 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
 from discover.forward.batches.imposed_stress import StressBatch
-from discover.forward.batches.loadings import Loadings, relative_noise
+from discover.forward.batches.loadings import Loadings, relative_noise, share_of_factor
 from discover.forward.batches.mixed import (
     Batch,
     MixedBatch,
@@ -36,4 +36,5 @@ __all__ = [
     "loadings_of",
     "make_batch",
     "relative_noise",
+    "share_of_factor",
 ]

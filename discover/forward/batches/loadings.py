@@ -72,8 +72,7 @@ class Loadings:
                 continue
             along, size = self._along(residual[:, own], predicted[:, own], row)
             with np.errstate(all="ignore"):  # a trial that ran away
-                less = 1.0 - 1.0 / np.sqrt(1.0 + self.deviation**2 * size)
-                share = np.where(size > 0.0, less * along / np.where(size > 0.0, size, 1.0), 0.0)
+                share = share_of_factor(along, size, self.deviation**2)
                 out[:, own] = residual[:, own] - share[:, None, None] * predicted[:, own]
         return out
 
@@ -96,6 +95,17 @@ class Loadings:
             along = np.sum(residual * predicted / noise**2, axis=(1, 2))
             size = np.sum((predicted / noise) ** 2, axis=(1, 2))
         return along, size
+
+
+def share_of_factor(along, size, signal):
+    """Return (1 − 1/√(1 + s² p·p)) p·e / p·p, by how many p the likely factor lessens e.
+
+    Parameters
+    ----------
+    along, size, signal
+        p·e, p·p and s², arrays of NumPy or JAX.
+    """
+    return (1.0 - (1.0 + signal * size) ** -0.5) * along / (size + (size == 0.0))
 
 
 def loadings(runs: Sequence[Run]) -> Loadings | None:

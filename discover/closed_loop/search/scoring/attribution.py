@@ -178,11 +178,11 @@ def _try_amplitudes(model, batch, fit, candidates, bases, at, yields):
         candidate.start = base.copy()
         if candidate.score <= 0:
             continue
-        for stretch in _STRETCHES:
+        tried = np.multiply(_STRETCHES, candidate.step)
+        # several of them may be cut off at the same bound
+        for amplitude in np.unique(np.clip(tried, model.low[position], model.high[position])):
             theta = base.copy()
-            theta[position] = np.clip(
-                stretch * candidate.step, model.low[position], model.high[position]
-            )
+            theta[position] = amplitude
             trials.append(theta)
             owner.append(i)
             if others:
