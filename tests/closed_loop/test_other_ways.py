@@ -92,7 +92,7 @@ def found(tmp_path_factory):
     )
     state = {
         name: getattr(search, name)
-        for name in ("fit", "active", "path", "left_out", "support", "aliases")
+        for name in ("fit", "active", "path", "left_out", "support", "aliases", "established")
     }
     return SimpleNamespace(search=search, state=state)
 
@@ -118,9 +118,10 @@ class TestGiesekusBehindASlowMotor:
     def test_a_far_likelier_explanation_is_gone_on_from(self, search):
         right = search.fitted(RIGHT, search.model.zero() + 0.1)
         chosen = Carried(WRONG, search.fit, 10.0)
-        assert not turn_to_likelier(search, [Carried(RIGHT, right, 8.0), chosen])
+        assert not turn_to_likelier(search, [Carried(RIGHT, right, 8.0), chosen], 3)
         assert tuple(search.active) == WRONG
-        assert turn_to_likelier(search, [Carried(RIGHT, right, 1.0), chosen])
+        assert not turn_to_likelier(search, [Carried(RIGHT, right, 1.0), chosen], 1)
+        assert turn_to_likelier(search, [Carried(RIGHT, right, 1.0), chosen], 3)
         assert tuple(search.active) == RIGHT
         assert min(search.support[name] for name in RIGHT) > 100.0
 
@@ -131,4 +132,22 @@ class TestGiesekusBehindASlowMotor:
             Carried(WRONG, search.fit, 10.0),
         ]
         # whatever its criterion, it predicts runs left out worse
-        assert not turn_to_likelier(search, carried)
+        assert not turn_to_likelier(search, carried, 3)
+
+    def test_nor_does_it_hide_the_next(self, search):
+        worse = search.fitted(("giesekus_mobility",), search.fit.theta)
+        right = search.fitted(RIGHT, search.model.zero() + 0.1)
+        chosen = Carried(WRONG, search.fit, 10.0)
+        first = Carried(("giesekus_mobility",), worse, 0.0)
+        assert turn_to_likelier(search, [first, Carried(RIGHT, right, 1.0), chosen], 3)
+        assert tuple(search.active) == RIGHT
+
+    def test_what_small_strains_established_is_kept_beside_a_likelier_law(self, search):
+        search.established = ("rate_rise_time",)
+        law = search.fitted(("giesekus_mobility",), search.fit.theta)
+        problem = search.problem
+        worth = problem.worth(search.fit, WRONG, problem.independent_samples(search.fit))
+        carried = [Carried(("giesekus_mobility",), law, worth - 9.0)]
+        # the law with the rise time is the right one, though without it hardly anything fits
+        assert turn_to_likelier(search, [*carried, Carried(WRONG, search.fit, worth)], 3)
+        assert sorted(search.active) == sorted(RIGHT)

@@ -63,7 +63,7 @@ def carry_and_turn(
     """
     carried = carry(search, max_effects, width, say)
     for _ in range(_TURNS):
-        if not turn_to_likelier(search, carried):
+        if not turn_to_likelier(search, carried, max_effects):
             break
         say(f"going on from a likelier explanation: {', '.join(search.active)}")
         search.run(max_effects, say)
@@ -108,29 +108,51 @@ def carry(
     return _fitted(search, _in_window(search, effective)[: 2 * width], effective, width)
 
 
-def turn_to_likelier(search: Search, carried: Sequence[Carried]) -> bool:
+def turn_to_likelier(search: Search, carried: Sequence[Carried], max_effects: int) -> bool:
     """Let a search go on from an explanation far likelier than its own; say if there is one.
 
     A path that began with the wrong effect may end where no single exchange leads to the right
     ones, and a neighbour of what it passed by may. It has to be likelier than what is chosen by
-    more than Occam's window, and to predict runs left out better, or to be a part of it.
+    more than Occam's window, with what runs at small strain established, and to predict runs left
+    out better, or to be a part of it.
     """
     own = tuple(sorted(search.active))
     chosen = next(one for one in carried if tuple(sorted(one.effects)) == own)
-    best, problem, model = carried[0], search.problem, search.model
-    if (
-        chosen.criterion - best.criterion <= 2.0 * np.log(WINDOW)
-        or not set(search.established) <= set(best.effects)
-        or at_an_end(model, best.fit.theta, best.effects)
-    ):
+    limit = chosen.criterion - 2.0 * np.log(WINDOW)
+    for one in carried:
+        if one.criterion >= limit:
+            break
+        other = _with_established(search, one)
+        if other.criterion >= limit or len(other.effects) > max_effects:
+            continue
+        if _is_sounder(search, other):
+            search.take(other.fit, other.effects)
+            search.weigh_each_effect()
+            search.rounds = 0
+            return True
+    return False
+
+
+def _with_established(search: Search, one: Carried) -> Carried:
+    """Return an explanation that has the effects that runs at small strain established."""
+    missing = [name for name in search.established if name not in one.effects]
+    if not missing:
+        return one
+    effects, theta = (*missing, *one.effects), one.fit.theta.copy()
+    at = [position for name in missing for position in search.model.positions(name)]
+    theta[at] = search.fit.theta[at]
+    fit, problem = search.fitted(effects, theta), search.problem
+    criterion = problem.worth(fit, effects, problem.independent_samples(search.fit))
+    return Carried(effects, fit, criterion if fit.usable else np.inf)
+
+
+def _is_sounder(search: Search, other: Carried) -> bool:
+    """Return whether an explanation can be, and predicts better or is a part of the chosen one."""
+    if at_an_end(search.model, other.fit.theta, other.effects):
         return False
-    part = set(best.effects) < set(own)
-    if not part and np.mean(left_out_errors(problem, best.fit)) >= search.left_out:
-        return False
-    search.take(best.fit, best.effects)
-    search.weigh_each_effect()
-    search.rounds = 0
-    return True
+    if set(other.effects) < set(search.active):
+        return True
+    return bool(np.mean(left_out_errors(search.problem, other.fit)) < search.left_out)
 
 
 def _note_shorter(search: Search) -> None:
