@@ -29,9 +29,7 @@ class Flow:
 
 def start_up(rate: float) -> Flow:
     """Return the constant shear rate in 1/s."""
-    return Flow(
-        lambda t: rate * np.ones_like(np.asarray(t, float)), lambda t: rate * np.asarray(t, float)
-    )
+    return Flow(lambda t: np.full(np.shape(t), float(rate)), lambda t: rate * np.asarray(t, float))
 
 
 def oscillation(amplitude: float, frequency: float, phase: float = 0.0) -> Flow:
@@ -51,7 +49,7 @@ def steps(times: Sequence[float], rates: Sequence[float]) -> Flow:
     before = np.concatenate([[0.0], np.cumsum(np.diff(starts) * values[:-1])])
 
     def place(t):
-        return np.clip(np.searchsorted(starts, t, side="right") - 1, 0, None)
+        return np.maximum(np.searchsorted(starts, t, side="right") - 1, 0)
 
     return Flow(
         lambda t: values[place(t)],

@@ -37,9 +37,25 @@ class Giesekus(StressLaw):
         )
 
 
+class GiesekusModes(Modes):
+    """Modes that each have a mobility of their own, stepped as one array."""
+
+    def __init__(self, *laws: Giesekus):
+        super().__init__(*laws)
+        columns = [(law.mobility, law.modulus, law.relaxation_time) for law in laws]
+        self._mobility, self._moduli, self._times = np.array(columns, float).T[..., None, None]
+
+    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
+        """Return dσ/dt of all modes, as each law by itself says it."""
+        stress = state.reshape(-1, 3, 3)
+        relaxing = stress + self._mobility / self._moduli * (stress @ stress)
+        production = self._moduli * rate_tensor(rate) + stretched(stress, rate)
+        return (production - relaxing / self._times).ravel()
+
+
 def multimode_giesekus(
     mobilities: Sequence[float], moduli: Sequence[float], relaxation_times: Sequence[float]
 ) -> Modes:
     """Return modes that each have a mobility of their own."""
     parts = zip(mobilities, moduli, relaxation_times, strict=True)
-    return Modes(*(Giesekus(*part) for part in parts))
+    return GiesekusModes(*(Giesekus(*part) for part in parts))

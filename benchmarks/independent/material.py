@@ -132,7 +132,7 @@ def differences(tensors: Sequence[np.ndarray]) -> Stresses:
 
 def velocity_gradient(rate: Rate) -> np.ndarray:
     """Return L, shape (3, 3); of a shear rate, L_12 = γ̇."""
-    if np.ndim(rate):
+    if not isinstance(rate, float) and np.ndim(rate):
         return np.asarray(rate)
     gradient = np.zeros((3, 3))
     gradient[0, 1] = rate
@@ -140,9 +140,13 @@ def velocity_gradient(rate: Rate) -> np.ndarray:
 
 
 def stretched(tensor: np.ndarray, rate: Rate) -> np.ndarray:
-    """Return L·T + T·Lᵀ of a symmetric T, shape (3, 3)."""
-    turned = velocity_gradient(rate) @ tensor
-    return turned + turned.T
+    """Return L·T + T·Lᵀ of a symmetric T, shape (3, 3), or of many, shape (..., 3, 3)."""
+    if isinstance(rate, float):  # asked some hundred thousand times: L has one entry
+        turned = np.zeros_like(tensor)
+        turned[..., 0, :] = rate * tensor[..., 1, :]
+    else:
+        turned = velocity_gradient(rate) @ tensor
+    return turned + turned.swapaxes(-1, -2)
 
 
 def rate_tensor(rate: Rate) -> np.ndarray:
@@ -182,7 +186,8 @@ class Modes(RateLaw):
     def __init__(self, *laws: RateLaw):
         self.laws = laws
         self.modulus = sum(law.modulus for law in laws)
-        self._cuts = np.cumsum([len(law.rest()) for law in laws])[:-1]
+        ends = np.cumsum([0, *(len(law.rest()) for law in laws)]).tolist()
+        self._places = [slice(*both) for both in pairwise(ends)]
 
     def rest(self) -> np.ndarray:
         """Return the states at rest, one after another."""
@@ -194,12 +199,12 @@ class Modes(RateLaw):
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the time derivatives, one after another."""
-        parts = np.split(state, self._cuts)
-        changes = [law.change(p, rate) for law, p in zip(self.laws, parts, strict=True)]
+        places = zip(self.laws, self._places, strict=True)
+        changes = [law.change(state[place], rate) for law, place in places]
         return np.concatenate(changes)
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         """Return the sum of the stresses."""
-        parts = np.split(state, self._cuts)
-        tensors = [law.stress(p, rate) for law, p in zip(self.laws, parts, strict=True)]
+        places = zip(self.laws, self._places, strict=True)
+        tensors = [law.stress(state[place], rate) for law, place in places]
         return np.sum(tensors, axis=0)

@@ -7,6 +7,7 @@ either sign. The values come from `TermLibrary.evaluate`, which spells nothing.
 
 from dataclasses import dataclass, replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -78,8 +79,20 @@ def _states():
 
 
 STATES = _states()
-_INNER_VALUES = jnp.asarray([INNER[name] for name in LIBRARY.inner_names])
-_VALUES = np.array([LIBRARY.evaluate(*map(jnp.asarray, s), _INNER_VALUES) for s in STATES])
+_INNER_VALUES = np.array([INNER[name] for name in LIBRARY.inner_names])
+
+
+def at_states(function):
+    """Return what a function of stress and rate of deformation says of all states.
+
+    As one program: step by step each operation would be compiled by itself, in every worker that
+    collects these tests.
+    """
+    stresses, rates = map(np.array, zip(*STATES, strict=True))
+    return jax.tree.map(np.asarray, jax.jit(jax.vmap(function))(stresses, rates))
+
+
+_VALUES = at_states(lambda stress, rate: LIBRARY.evaluate(stress, rate, jnp.array(_INNER_VALUES)))
 
 
 def sum_of(indices, coefficients):
@@ -107,23 +120,22 @@ def _library_laws():
 
 
 def _named_laws():
-    for name, parameters in LAWS.items():
-        law = make_law(name, parameters)
-        extra = [law.extra_term(*map(jnp.asarray, state)) for state in STATES]
-        yield name, Spelled(Equation(law_terms(law)), np.array(extra))
-    for effect in EFFECTS:
-        values = [0.17, 0.4][: len(effect.parameters)]
-        if effect.as_terms(values) is None:
-            continue
-        extra = [effect.extra_term(jnp.array(values), *map(jnp.asarray, s)) for s in STATES]
-        yield (
-            effect.name,
-            Spelled(Equation(effect_terms(effect, np.array(values))), np.array(extra)),
-        )
+    laws = {name: make_law(name, parameters) for name, parameters in LAWS.items()}
+    effects = [(effect, np.array([0.17, 0.4][: len(effect.parameters)])) for effect in EFFECTS]
+    effects = [(e, values) for e, values in effects if e.as_terms(values.tolist()) is not None]
+
+    def extra(stress, rate):
+        of_laws = {name: law.extra_term(stress, rate) for name, law in laws.items()}
+        return of_laws | {e.name: e.extra_term(jnp.array(v), stress, rate) for e, v in effects}
+
+    extras = at_states(extra)
+    equations = {name: Equation(law_terms(law)) for name, law in laws.items()}
+    equations |= {e.name: Equation(effect_terms(e, values)) for e, values in effects}
+    return {name: Spelled(equation, extras[name]) for name, equation in equations.items()}
 
 
 LIBRARY_LAWS = _library_laws()
-NAMED_LAWS = dict(_named_laws())
+NAMED_LAWS = _named_laws()
 
 
 BOTH_SIGNS = {
