@@ -13,7 +13,7 @@ _TENSORS = {
 }
 
 
-def latex_number(value: float, digits: int = 5) -> str:
+def latex_number(value: float, digits: int) -> str:
     """Return a number as LaTeX, powers of ten typeset."""
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
     return mantissa + (rf" \times 10^{{{int(exponent)}}}" if exponent else "")

@@ -8,7 +8,7 @@ from discover.progress import Progress
 
 
 def run_demo(
-    out: Path, seed: int | None = None, overwrite: bool = False, progress: Progress | None = None
+    out: Path, seed: int | None, overwrite: bool, progress: Progress | None
 ) -> dict[str, Path]:
     """Run the demonstration and return its pages by title.
 

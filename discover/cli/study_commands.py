@@ -2,12 +2,11 @@
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from discover.cli.console import progress_bar, say, say_error
-from discover.cli.folders import tell_of_folder
 from discover.cli.guard import guarded
 from discover.cli.options import (
     JsonOption,
@@ -17,6 +16,9 @@ from discover.cli.options import (
     SeedOption,
     StudyArgument,
 )
+
+if TYPE_CHECKING:  # --help needs no studies
+    from discover.study.schema import Study
 
 
 @guarded
@@ -73,7 +75,7 @@ def batch(
     folder = out or Path("results") / "batch"
     with progress_bar(quiet) as report:
         result = run_batch(
-            studies, folder, workers, scheduler, seed, overwrite, report, tell_of_folder
+            studies, folder, workers, scheduler, seed, overwrite, report, _tell_of_folder
         )
     if as_json:
         typer.echo(json.dumps(result.to_json(), indent=2))
@@ -112,7 +114,7 @@ def _run_task(
 
     folder = out or Path("results") / folder_names([study])[0]
     with progress_bar(quiet) as report:
-        result = task(study, folder, seed, over, report, tell_of_folder)
+        result = task(study, folder, seed, over, report, _tell_of_folder)
     if as_json:
         typer.echo(result.json_file.read_text("utf-8"))
         return
@@ -122,3 +124,29 @@ def _run_task(
         say(f"{folder} is complete; use --overwrite to start afresh.")
     say(result.text)
     say(f"Report: {result.report.resolve()}")
+
+
+def _tell_of_folder(study: "Study") -> None:
+    """Print a note if a study's data lie outside the folders where one would look.
+
+    A study file may come from somebody else; what it reads should surprise nobody.
+
+    Parameters
+    ----------
+    study
+        As read; if its folder does not exist, nothing is said: the command refuses it.
+    """
+    from discover.errors import InputError
+    from discover.study.read import folder_elsewhere
+
+    try:
+        folder = folder_elsewhere(study)
+    except InputError:
+        return
+    if folder is not None:
+        name = "the study" if study.path is None else study.path.name
+        say(
+            f"discover: note: {name} reads its data from {folder}, which is neither "
+            "beside it nor under DISCOVER_DATA or the working directory.",
+            err=True,
+        )

@@ -3,30 +3,19 @@
 from discover.closed_loop.each_run import run_loop_on_each
 from discover.closed_loop.loop import run_loop
 from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.closed_loop.results.free_curve import FreeForm
 from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
 from discover.closed_loop.results.next_test import NextTest, NextTests
-from discover.closed_loop.results.stages import (
-    Fold,
-    Stage,
-)
-from discover.closed_loop.search.scoring.attribution import Attribution
+from discover.closed_loop.results.stages import Stage
 from discover.forward import DeclaredModel
-from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.constants import StageParameter
 
 __all__ = [
-    "Attribution",
     "CandidateScore",
-    "ConstantByMode",
     "DeclaredModel",
     "ErrorPair",
-    "Explanation",
-    "Explanations",
-    "Fold",
     "FreeForm",
     "LoopResult",
-    "ModeConstant",
     "NextTest",
     "NextTests",
     "RunRecord",

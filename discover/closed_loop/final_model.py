@@ -34,7 +34,7 @@ def stage_of(
     bounds: tuple[Bounds, Bounds],
     error: ErrorPair,
     by_mode: ConstantByMode | None,
-    possible: Sequence[np.ndarray] = (),
+    possible: Sequence[np.ndarray],
 ) -> Stage:
     """Return one effect of the final model, as a stage of the way to it.
 

@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from discover.closed_loop.judging.before_after import cut_to_strain
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search.scoring.refitting import FEWEST_SAMPLES
@@ -14,6 +12,7 @@ from discover.dataset.records.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.forward.step_instants import with_rate_steps
+from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
 
 FEWEST_LINEAR_SAMPLES = 10
@@ -111,7 +110,7 @@ def all_at_a_rate_in_shear(runs: Sequence[Run]) -> bool:
 
 def _needed(run: Run, most: int) -> int:
     """Return how many samples of a run resolve its stress to `_RESOLVED`."""
-    size = float(np.sqrt(np.mean(run.recorded**2)))
+    size = rms(run.recorded)
     noise = fast_part(run.recorded) / size if size > 0.0 else 0.0
     return int(min(most, max(_FEWEST_KEPT, (noise / _RESOLVED) ** 2)))
 

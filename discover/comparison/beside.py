@@ -39,7 +39,7 @@ def look_beside(
     chosen: LearnerOutcome | None,
     frame: Frame,
     say: Callable[[str], None],
-    further: Mapping[str, Callable[[], Any]] = MappingProxyType({}),
+    further: Mapping[str, Callable[[], Any]],
 ) -> Beside:
     """Return rivals, structure and classical laws, which need nothing of one another.
 

@@ -19,6 +19,7 @@ from discover.dataset.run_table import kind_of_record
 from discover.learners.records import OBSERVED
 from discover.progress import Progress
 from discover.statistics.noise_weights import weights_by_noise
+from discover.statistics.projection import rms
 from discover.study.data import StudyData
 from discover.study.schema import Study
 
@@ -114,7 +115,7 @@ def _weights(seen: _Seen, runs: Sequence[Run], normal: bool) -> dict[str, list[f
             if record is None or (place > 0 and not (normal and np.any(record))):
                 continue
             even = flow.even(record)
-            size = float(np.sqrt(np.mean((even * record) ** 2))) or 1.0
+            size = rms(even * record) or 1.0
             left.append(even * (predicted[quantity] - record) / size)
             places.append((run.name, place))
             kinds.append(kind_of_record(run) + (f", {quantity}" if place else ""))

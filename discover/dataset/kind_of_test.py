@@ -82,7 +82,7 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
     return DeclaredTest(flow, control, start, step, time, rate_before or 0.0)
 
 
-def reason_to_set_aside(index: Table, row: int, rate_before: bool = False) -> str | None:
+def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
     """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
 
     Parameters

@@ -14,6 +14,7 @@ from discover.dataset.tables.columns import as_column
 from discover.errors import InputError
 from discover.statistics.noise.independent_samples import independent_samples
 from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability
+from discover.statistics.projection import rms
 from discover.statistics.residual import slow_part
 
 MOST_MODES = 30
@@ -244,7 +245,7 @@ def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndar
     scale = np.linalg.norm(design, axis=0)
     modulus, _ = nnls(design / scale, np.ones(len(design)), maxiter=100 * n + 100)
     modulus = modulus / scale
-    error = float(np.sqrt(np.mean((design @ modulus - 1.0) ** 2)))
+    error = rms(design @ modulus - 1.0)
     keep = modulus > 0
     return modulus[keep], times[keep], error
 

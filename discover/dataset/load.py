@@ -35,7 +35,7 @@ def folder_roots(base: str | Path | None = None) -> list[Path]:
     return [Path(root) for root in (base, os.environ.get(DATA_VARIABLE), ".") if root]
 
 
-def resolve_folder(folder: str | Path, base: str | Path | None = None) -> Path:
+def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     """Return the path of a data folder.
 
     Parameters

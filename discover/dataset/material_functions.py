@@ -30,7 +30,7 @@ RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa
 
 
 def read_material_functions(
-    root: Path, runs: Sequence[str] = (), frequency: float | None = None
+    root: Path, runs: Sequence[str], frequency: float | None = None
 ) -> tuple[dict[str, Run], dict[str, str]]:
     """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
 

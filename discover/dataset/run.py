@@ -16,6 +16,7 @@ from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
 from discover.protocols.rate_steps import RateStep
+from discover.statistics.projection import rms
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""
@@ -40,7 +41,7 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
     The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion to
     each value and of which each decade counts, the value itself.
     """
-    size = np.full(len(values), np.sqrt(np.mean(values**2)))
+    size = np.full(len(values), rms(values))
     if protocol.control in STATES:
         largest = float(np.max(np.abs(values), initial=0.0))
         size = np.maximum(np.abs(values), _LEAST_STEADY * largest)

@@ -21,12 +21,7 @@ from discover.effects.library_term import (
     simplest_terms,
 )
 from discover.effects.mode_dependence import BY_MODE, ModeDependence
-from discover.effects.registry import (
-    effects_table,
-    make_effect,
-    named_effects,
-    register_effect,
-)
+from discover.effects.registry import effects_table, make_effect, named_effects
 from discover.effects.written_state import WrittenState
 
 __all__ = [
@@ -50,7 +45,6 @@ __all__ = [
     "library_term",
     "make_effect",
     "named_effects",
-    "register_effect",
     "simplest_terms",
 ]
 

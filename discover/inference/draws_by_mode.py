@@ -47,7 +47,6 @@ def draw_constants(
     degrees: Mapping[str, Degree],
     freer: Sequence[FreerFit],
     n_draws: int,
-    seed: int = 0,
     beside: Float[np.ndarray, "free free"] | None = None,
 ) -> ConstantsDrawn | None:
     """Return constants by mode drawn about a fit, on the scale of their link.
@@ -65,8 +64,6 @@ def draw_constants(
         From `freer_fits`.
     n_draws
         About each fit.
-    seed
-        Of the draws.
     beside
         Covariance of what was fitted that is no noise; None for none. Freer fits are without it.
     """
@@ -75,7 +72,7 @@ def draw_constants(
         return None
     fits = [(fit, dict(degrees), beside)]
     fits += [(one.fit, {**degrees, one.name: one.degree}, None) for one in freer]
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     groups = [_about(problem.batch, *one, constants, n_draws, rng) for one in fits]
     drawn = [group for group in groups if group is not None]
     if len(drawn) < len(groups):

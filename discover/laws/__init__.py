@@ -6,7 +6,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.laws.named import NamedLaw
-from discover.laws.registry import LAWS, laws_table, make_law, register_law
+from discover.laws.registry import LAWS, laws_table, make_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.laws.textbook.fene_p import FenePeterlin
 from discover.laws.textbook.giesekus import Giesekus
@@ -32,7 +32,6 @@ __all__ = [
     "UpperConvectedMaxwell",
     "laws_table",
     "make_law",
-    "register_law",
 ]
 
 answer_calls(__name__, laws_table)

@@ -61,11 +61,6 @@ class AbstractConstitutiveLaw(eqx.Module):
         """
         return 0
 
-    @property
-    def scalars(self) -> int:
-        """How many variables stand behind the tensors."""
-        return self.variables - 4 * self.tensors
-
     def rest(self) -> Float[Array, " s"]:
         """Return the state at rest: the four components of σ, and the variables."""
         return jnp.zeros(4 + self.variables)

@@ -75,7 +75,7 @@ def forget_programs() -> None:
 class Compiled(Generic[P, R]):
     """A function with its programs, one for each kind of arguments. See `compiled`."""
 
-    def __init__(self, function: Callable[P, R], made_from: Any = None, runs_long: bool = False):
+    def __init__(self, function: Callable[P, R], made_from: Any, runs_long: bool):
         functools.update_wrapper(self, function)
         self._function: Any = function
         self._made_from = made_from

@@ -13,7 +13,7 @@ from discover.protocols.history import (
     after_step_strain,
     settled,
 )
-from discover.protocols.kinematics import KINDS, FlowKind, Kinematics, kinematics_of
+from discover.protocols.kinematics import kinematics_of
 from discover.protocols.paper import paper_test_protocols, paper_training_protocols
 from discover.protocols.protocol import (
     FlowProtocol,
@@ -29,10 +29,7 @@ from discover.protocols.protocol import (
 )
 
 __all__ = [
-    "KINDS",
-    "FlowKind",
     "FlowProtocol",
-    "Kinematics",
     "after_alternation",
     "after_steady_flow",
     "after_step_strain",

@@ -110,9 +110,7 @@ def knots_between(
     return found[order], np.concatenate(values)[order]
 
 
-def another_between_samples(
-    protocol: FlowProtocol, times: Samples | None = None
-) -> FlowProtocol | None:
+def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProtocol | None:
     """Return a protocol whose rate is another curve through the same samples.
 
     What that changes is what nobody knows of the rate: of fifth degree where a cubic spline was
@@ -124,7 +122,7 @@ def another_between_samples(
     protocol
         Any.
     times
-        Of the samples, in s; by default the table holds these and nothing else.
+        Of the samples, in s.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -141,7 +139,7 @@ def another_between_samples(
     )
 
 
-def unknown_between_samples(protocol: FlowProtocol, times: Samples | None = None) -> float:
+def unknown_between_samples(protocol: FlowProtocol, times: Samples) -> float:
     """Return by how much another curve through the samples differs, over the size of the rate.
 
     Root mean square of both; 0 where the rate was commanded. Arguments as in
@@ -172,11 +170,9 @@ def samples_of(
     return _samples(np.asarray(protocol.table_times), np.asarray(protocol.table_rates), times)
 
 
-def _samples(
-    knots: np.ndarray, rates: np.ndarray, times: Samples | None
-) -> tuple[np.ndarray, np.ndarray]:
+def _samples(knots: np.ndarray, rates: np.ndarray, times: Samples) -> tuple[np.ndarray, np.ndarray]:
     """Return the samples behind a table, if it is the curve through those at `times`."""
-    if times is None or len(times) >= len(knots) or len(times) < _FEWEST:
+    if len(times) >= len(knots) or len(times) < _FEWEST:
         return knots, rates
     at = np.clip(np.searchsorted(knots, times), 0, len(knots) - 1)
     read, known = knots[at], rates[at]

@@ -7,7 +7,6 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
 
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.errors import InputError
@@ -18,6 +17,7 @@ from discover.programs import compiled
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
 from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
 from discover.simulate.solve import ShearStress, simulate
+from discover.statistics.projection import rms
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,7 +104,7 @@ def synthetic_dataset(
         stress = simulate(fluid, flow, times)
         exact[name] = stress
         recorded = recorded_at(flow, stress.components)
-        scale = noise * float(np.sqrt(np.mean(recorded**2)))
+        scale = noise * rms(recorded)
         runs.append(
             Run(
                 name=name,
@@ -131,18 +131,13 @@ def _is_number(value: Any) -> bool:
     return number and bool(np.isfinite(value))
 
 
-def linear_sweep(fluid: Fluid, frequencies: Float[np.ndarray, " n"] | None = None) -> LinearSweep:
+def linear_sweep(fluid: Fluid) -> LinearSweep:
     """Return G′ and G″ of a fluid, from its law linearised at rest.
 
-    Parameters
-    ----------
-    frequencies
-        ω in rad/s, shape (n,); by default 25 over two decades to each side of the relaxation times.
+    At 25 frequencies, over two decades to each side of the relaxation times.
     """
     times = np.asarray(fluid.relaxation_time)
     omega = np.geomspace(0.01 / times.max(), 100.0 / times.min(), 25)
-    if frequencies is not None:
-        omega = frequencies
     of_modes = _at_rest(fluid.law, fluid.n_modes)
     decays, every_drive = (np.asarray(part) for part in of_modes)
     modulus = np.zeros(len(omega), dtype=complex)

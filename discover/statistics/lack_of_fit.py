@@ -13,6 +13,7 @@ from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
 from discover.statistics.noise.same_place import repeated
 from discover.statistics.noise.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
+from discover.statistics.projection import rms
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
 from discover.words import percent_of
 
@@ -253,7 +254,7 @@ _PATTERNED = {
 def _without_outliers(residuals, measured):
     """Return weighted residuals, weights and records, padded, and which samples are outliers."""
     kept, outliers = [], []
-    sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
+    sizes = [rms(record) or 1.0 for record in measured]
     again = repeated([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
     for row, record in zip(residuals, measured, strict=True):
         values, record = np.asarray(row, dtype=float), np.asarray(record, dtype=float)
@@ -266,7 +267,7 @@ def _without_outliers(residuals, measured):
     residual, weight, padded = np.zeros((3, len(kept), longest))
     for i, (row, record) in enumerate(kept):
         n = len(record)
-        size = float(np.sqrt(np.mean(record**2))) or 1.0
+        size = rms(record) or 1.0
         weight[i, :n] = 1.0 / (size * np.sqrt(n))
         residual[i, :n] = row * weight[i, :n]
         padded[i, :n] = record

@@ -10,6 +10,7 @@ from discover.statistics.noise.converter_steps import step_of_converter
 from discover.statistics.noise.held_values import read_times
 from discover.statistics.noise.running_mean import averaged_over
 from discover.statistics.noise.wandering import wandering
+from discover.statistics.projection import rms
 from discover.words import percent_of
 
 _WITHIN = 0.8
@@ -51,7 +52,7 @@ def likeness(
             f"each value of the records stands in {max(often)} samples, which looks like a lag",
             "record a sample for each value of the transducer, or keep the first of those alike",
         )
-    sizes = [float(np.sqrt(np.mean(np.square(record)))) or 1.0 for record in measured]
+    sizes = [rms(record) or 1.0 for record in measured]
     rows = [np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)]
     if width := averaged_over(rows):
         return Likeness(

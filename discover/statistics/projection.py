@@ -2,11 +2,12 @@
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 _ROUNDING = 1e-9  # of the largest singular value, columns made of length one
 
 
-def rms(values: np.ndarray) -> float:
+def rms(values: ArrayLike) -> float:
     """Return the root of the mean of the squares."""
     return float(np.sqrt(np.mean(np.square(values))))
 

@@ -35,11 +35,6 @@ class ResidualSummary:
     autocorrelation: Float[np.ndarray, " runs"]
     effective_samples: float
 
-    @property
-    def noise_floor(self) -> float:
-        """Mean over runs of the relative noise."""
-        return float(np.mean(self.noise))
-
 
 def summarise(
     residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
@@ -260,17 +255,6 @@ class Expectation:
             return self.noise
         return noise_floor(residual, weight, measured, further)
 
-    def size(
-        self,
-        residual: Float[np.ndarray, "runs n"],
-        weight: Float[np.ndarray, "runs n"],
-        measured: Float[np.ndarray, "runs n"] | None = None,
-        further: Sequence[float] = (),
-    ) -> float:
-        """Return the relative error that noise, repeats and linear error together explain."""
-        floor = max(self.floor(residual, weight, measured, further), self.repeat_error)
-        return float(np.hypot(floor, self.linear_error))
-
     def explains(
         self,
         residual: Float[np.ndarray, "runs n"],
@@ -289,7 +273,8 @@ class Expectation:
         rows = judging(weight)
         sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))
         error = float(np.mean(sizes))
-        if error > STRUCTURE * self.size(residual, weight, measured, further):
+        floor = max(self.floor(residual, weight, measured, further), self.repeat_error)
+        if error > STRUCTURE * float(np.hypot(floor, self.linear_error)):
             return False
         if is_noise(residual, weight, measured, further):
             return True

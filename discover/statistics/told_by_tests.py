@@ -68,7 +68,7 @@ def told_by_tests(
     sequences: Sequence[Int[np.ndarray, " _"]],
     kinds: Sequence[str],
     numbers: Sequence[Sized],
-    shared: Float[np.ndarray, "rows k"] | None = None,
+    shared: Float[np.ndarray, "rows k"] | None,
     sizes: Sequence[float] | None = None,
 ) -> tuple[Told, ...]:
     """Return what tests of each kind tell, at the fit to all; nothing where all are of one kind.

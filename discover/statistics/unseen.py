@@ -16,6 +16,7 @@ from scipy.stats import chi2
 
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.noise.whiteness import SIGNIFICANCE
+from discover.statistics.projection import rms
 from discover.statistics.residual import (
     FEWEST_FAST,
     STRUCTURE,
@@ -150,7 +151,7 @@ def _parts(unseen: Unseen) -> tuple[float, float]:
     """Return the relative size of what changes from sample to sample, and of the rest."""
     sizes = []
     for row, record in zip(unseen.residuals, unseen.records, strict=True):
-        scale = float(np.sqrt(np.mean(np.square(record)))) or 1.0
+        scale = rms(record) or 1.0
         sizes.append([fast_part(row) / scale, slow_part(row) / scale])
     fast, slow = np.sqrt(np.mean(np.square(sizes), axis=0))
     return float(fast), float(slow)
@@ -169,7 +170,7 @@ def _noise_root(row: np.ndarray, correlation: Float[np.ndarray, " _"]) -> np.nda
     known = np.zeros(max(len(row), 4))
     known[: len(correlation[: len(known)])] = correlation[: len(known)]
     share = max(1.0 - 1.5 * known[1] + 0.6 * known[2] - 0.1 * known[3], _SMALLEST_SHARE)
-    smallest = 1e-9 * float(np.sqrt(np.mean(row**2))) or 1.0
+    smallest = 1e-9 * rms(row) or 1.0
     size = max(fast_part(row) / np.sqrt(share), smallest)
     matrix = toeplitz(known[: len(row)]) + _SMALLEST_SHARE**2 * np.eye(len(row))
     return size * np.linalg.cholesky(matrix)

@@ -2,6 +2,5 @@
 
 from discover.study.read import fingerprint, parse_study, read_study
 from discover.study.run_folder import RunFolder
-from discover.study.schema import Study
 
-__all__ = ["RunFolder", "Study", "fingerprint", "parse_study", "read_study"]
+__all__ = ["RunFolder", "fingerprint", "parse_study", "read_study"]

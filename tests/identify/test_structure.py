@@ -44,7 +44,7 @@ def at(structure, fragment):
 @pytest.mark.slow
 def test_in_maxwell_n1_follows_from_the_assumed_derivative_and_not_from_data(structure):
     law = at(structure, "known part")
-    assert law.verdict("N1") == "undetermined"
+    assert law.line()["N1"] == "undetermined"
     assert "convected derivative" in law.text
     assert "not from the data" in law.text
     # σ11 alone: it enters no equation that σ12 feels
@@ -55,7 +55,7 @@ def test_in_maxwell_n1_follows_from_the_assumed_derivative_and_not_from_data(str
 @pytest.mark.slow
 def test_with_slip_n2_follows_from_neither_shear_stress_nor_n1(structure):
     law = at(structure, "slip")
-    assert law.verdict("N2") == "undetermined"
+    assert law.line()["N2"] == "undetermined"
     assert law.N2_with_N1 == "undetermined"
     assert "Measuring N1 as well would not change this" in law.text
     tangents = [set(d.coefficients) for d in law.exact]
@@ -84,8 +84,8 @@ def test_the_tangent_of_the_twins_has_the_slope_of_their_formula(runs):
 def test_quadratic_relaxation_determines_n1_but_not_n2(structure):
     # negative control for N1
     law = at(structure, "quadratic")
-    assert law.verdict("N1") == "determined"
-    assert law.verdict("N2") == "undetermined"
+    assert law.line()["N1"] == "determined"
+    assert law.line()["N2"] == "undetermined"
     assert all(d.changes["N1"] < 1e-8 for d in law.exact)
 
 

@@ -17,8 +17,8 @@ from discover.laws import (
     make_law,
 )
 from discover.laws.registry import starting_values
-from discover.protocols import oscillatory_shear, start_up
-from discover.simulate import SimulationError, simulate, simulate_homogeneous_flow
+from discover.protocols import in_flow, oscillatory_shear, start_up
+from discover.simulate import SimulationError, simulate
 
 NONLINEAR = [
     ("johnson_segalman", {"xi": 0.4}),
@@ -184,18 +184,17 @@ def test_solvent_adds_its_viscous_stress_only():
 
 def test_extension_of_maxwell_matches_the_analytic_solution():
     rate, times = 0.3, np.linspace(0, 4, 9)
-    stress = simulate_homogeneous_flow(
-        UpperConvectedMaxwell(), lambda t: tl.uniaxial_extension(jnp.array(rate)), times
-    )
+    fluid = Fluid.dimensionless(UpperConvectedMaxwell())
+    stress = simulate(fluid, in_flow(start_up(rate), "uniaxial"), times).components
     expected = 2 * rate / (1 - 2 * rate) * (1 - np.exp(-(1 - 2 * rate) * times))
-    np.testing.assert_allclose(stress[:, 0, 0], expected, atol=1e-7)
+    np.testing.assert_allclose(stress[:, 0], expected, atol=1e-7)
 
 
 def test_runaway_stress_is_an_error_that_says_so():
     with pytest.raises(SimulationError, match="runs away"):
-        simulate_homogeneous_flow(
-            make_law("giesekus", {"alpha": 0.0}),
-            lambda t: tl.uniaxial_extension(jnp.array(50.0)),
+        simulate(
+            Fluid.dimensionless(make_law("giesekus", {"alpha": 0.0})),
+            in_flow(start_up(50.0), "uniaxial"),
             np.linspace(0, 40, 5),
         )
 

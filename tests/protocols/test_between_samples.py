@@ -125,7 +125,7 @@ def test_another_curve_says_how_much_is_unknown():
     other = another_between_samples(begun, wave(7)[0])
     np.testing.assert_allclose(shear_rates(other, np.array([-0.5])), 2.0)
     # and a rate that was commanded leaves nothing open
-    assert another_between_samples(step_rates([0.0, 1.0], [1.0, 2.0])) is None
+    assert another_between_samples(step_rates([0.0, 1.0], [1.0, 2.0]), wave(7)[0]) is None
 
 
 def test_a_file_of_few_samples_a_cycle_is_read_so_and_stays_so_when_it_is_thinned():

@@ -210,6 +210,6 @@ def test_a_protocol_of_samples_that_impose_no_rate_is_not_smoothed():
     from discover.protocols import another_between_samples
 
     run = at_stress(TIMES, 5.0 * np.sin(TIMES))
-    assert another_between_samples(run.protocol) is None
+    assert another_between_samples(run.protocol, run.time) is None
     rates = replace(run, protocol=start_up(1.0)).protocol
     assert rates.control == "rate"

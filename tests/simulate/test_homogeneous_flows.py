@@ -130,7 +130,7 @@ def test_a_smooth_or_thinned_rate_stays_in_its_flow_and_after_what_came_before(k
     sampled = in_flow(measured_rate(times, rates), kind)
     begun = after_steady_flow(sampled, 2.0, 3.0)
     for protocol in (sampled, begun):
-        smooth = another_between_samples(protocol)
+        smooth = another_between_samples(protocol, times)
         assert smooth is not None
         assert smooth.flow == kind
         assert float(smooth.begins) == float(protocol.begins)

@@ -26,10 +26,10 @@ def explanations_of(
     errors: Sequence[ErrorPair],
     judgement: Judgement,
     effective_samples: float,
-    unlisted: float = np.inf,
-    limits_of: Callable[[Carried], Mapping[str, str]] = lambda one: {},
-    believed: Callable[[Carried], float] = lambda one: 1.0,
-    most: Sequence[float] = (),
+    unlisted: float,
+    limits_of: Callable[[Carried], Mapping[str, str]],
+    believed: Callable[[Carried], float],
+    most: Sequence[float],
 ) -> Explanations:
     """Return the probabilities of what was carried, twins merged, the likeliest first.
 
@@ -51,7 +51,7 @@ def explanations_of(
         Share of the probability that a set keeps, of twins the largest; the rest is that of none of
         them.
     most
-        How probable each set can be at most, if nothing else explains the records; by default 1.
+        How probable each set can be at most, if nothing else explains the records; empty for 1.
     """
     classes = _classes(carried)
     best = min(unlisted, *(one.criterion for one in carried))

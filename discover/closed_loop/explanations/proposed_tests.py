@@ -28,6 +28,7 @@ from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
 from discover.identify.design.next_experiment import MOST_EVIDENCE, squared_distance
+from discover.statistics.projection import rms
 from discover.statistics.residual import summarise
 
 MOST = 6
@@ -64,7 +65,7 @@ def next_tests(
     summary = summarise(weighed[0][0].fit.residual, np.asarray(batch.weight))
     # what they leave of the fitted runs is not independent from sample to sample
     fresh = min(summary.effective_samples / sum(len(run) for run in runs), 1.0)
-    left = float(np.sqrt(np.mean(weighed[0][0].fit.run_errors ** 2)))
+    left = rms(weighed[0][0].fit.run_errors)
     noise = max(judgement.left.noise, left)
     longest = float(np.max(np.asarray(model.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
@@ -173,7 +174,7 @@ def _expected_of(
     if not np.all(np.isfinite(curves)):
         return None
     is_flow_curve = test.run.protocol.control == "steady"
-    size = np.abs(curves[0]) if is_flow_curve else np.sqrt(np.mean(curves[0] ** 2))
+    size = np.abs(curves[0]) if is_flow_curve else rms(curves[0])
     scale = np.maximum(noise * size, np.finfo(float).tiny) / np.sqrt(fresh)
     factors = [_factor(of / scale) for of in predicted]
     count = len(curves)

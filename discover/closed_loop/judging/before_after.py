@@ -12,6 +12,7 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, as_loaded
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
+from discover.statistics.projection import rms
 
 
 def strain_of(run: Run) -> Float[np.ndarray, " n"]:
@@ -86,7 +87,7 @@ def record_runs(
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]
-        size = np.sqrt(np.mean(run.recorded**2))
+        size = rms(run.recorded)
         misfit = np.sqrt(np.mean((predicted - run.recorded) ** 2, axis=1))
         records.append(
             RunRecord(

@@ -10,6 +10,7 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit
 from discover.statistics.noise.converter_steps import step_of_converter
+from discover.statistics.projection import rms
 from discover.statistics.residual import judging
 
 COMPUTED = 1e-6
@@ -41,7 +42,7 @@ class NumericalResolution:
 
     def __init__(self, model: AugmentedModel, batch: Batch, runs: Sequence[Run]):
         self.model, self.batch, self.runs = model, batch, runs
-        sizes = [float(np.sqrt(np.mean(run.recorded**2))) or 1.0 for run in runs]
+        sizes = [rms(run.recorded) or 1.0 for run in runs]
         self.rounding = np.array(
             [rounding(run.recorded) / size for run, size in zip(runs, sizes, strict=True)]
         )
@@ -129,6 +130,6 @@ def rounding(values: Float[np.ndarray, " n"]) -> float:
         for digits in range(1, _MOST_DIGITS + 1):
             unit = 10.0 ** (exponents - digits + 1)
             if np.all(np.abs(values - unit * np.round(values / unit)) <= 1e-5 * unit):
-                found.append(float(np.sqrt(np.mean((0.5 * unit) ** 2))))
+                found.append(rms(0.5 * unit))
                 break
     return max(found)

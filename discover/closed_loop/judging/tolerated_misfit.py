@@ -14,6 +14,7 @@ from discover.protocols.kinematics import STATES
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left
 from discover.statistics.noise.whiteness import SIGNIFICANCE, separate_probability
+from discover.statistics.projection import rms
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, Expectation, slow_part, tells_noise
 from discover.words import percent_of
 
@@ -79,7 +80,7 @@ class ToleratedMisfit:
         """Return the same, but for a pattern in flow curves and sweeps, which no noise has."""
         kinds = [run.protocol.control in STATES for run in self.resolution.runs]
         separate = [
-            (row, float(np.sqrt(np.mean(record**2))) or 1.0)
+            (row, rms(record) or 1.0)
             for row, record, kind in zip(rows, records, kinds, strict=True)
             if kind and len(row) >= FEWEST_FAST
         ]

@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeWarning, curve_fit
 
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.statistics import HALF_BAND
+from discover.statistics.projection import rms
 
 Slot = Literal[
     "recorded_stress", "drift", "network", "rate", "position", "gap", "phase",
@@ -161,7 +162,7 @@ def nearest_form(
     size = float(np.max(np.abs(grid))) or 1.0
     scale = size if in_stress else float(np.max(np.abs(value - np.mean(value)))) or 1.0
     x, y, spread = grid / size, value / scale, np.maximum(deviation / scale, 1e-12)
-    own = float(np.sqrt(np.mean((y - np.mean(y)) ** 2)))
+    own = rms(y - np.mean(y))
     for name, (form, starts) in _FORMS.items():
         if (name == "tanh" and not in_stress) or (name == "periodic" and not in_time):
             continue
@@ -178,7 +179,7 @@ def nearest_form(
             except (RuntimeError, FloatingPointError):
                 continue
             off = y - found[0] - form(x, *found[1:])
-            near = np.sqrt(np.mean((off / spread) ** 2)) <= _WITHIN
-            if near or np.sqrt(np.mean(off**2)) <= _CLOSE * own:
+            near = rms(off / spread) <= _WITHIN
+            if near or rms(off) <= _CLOSE * own:
                 return name
     return None

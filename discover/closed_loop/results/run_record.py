@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
+from discover.statistics.projection import rms
 
 
 @dataclass(frozen=True)
@@ -85,4 +86,4 @@ class RunRecord:
     @property
     def relative_residual(self) -> Float[np.ndarray, "stages n"]:
         """The residual over the root-mean-square stress."""
-        return self.residual / (float(np.sqrt(np.mean(self.measured**2))) or 1.0)
+        return self.residual / (rms(self.measured) or 1.0)

@@ -26,6 +26,7 @@ from discover.inference.evidence import WINDOW
 from discover.inference.problem import FitProblem, effect_of
 from discover.protocols.protocol import recording
 from discover.statistics import LackOfFit, root_of
+from discover.statistics.projection import rms
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 
@@ -289,7 +290,7 @@ def _predicted(
             q: (mean[r, : len(runs[r])], deviation[r, : len(runs[r])]) for q, r in rows.items()
         }
         if np.all(np.isfinite([part for pair in of_flow.values() for part in pair])):
-            size = {q: np.sqrt(np.mean(of_flow[q][0] ** 2)) for q in QUANTITIES[:2]}
+            size = {q: rms(of_flow[q][0]) for q in QUANTITIES[:2]}
             found[key] = {
                 q: (m, np.hypot(d, _ARITHMETIC * size["N1" if q == "N2" else q]))
                 for q, (m, d) in of_flow.items()

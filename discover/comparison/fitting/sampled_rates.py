@@ -17,6 +17,7 @@ from discover.identify.side_by_side.many_laws import Contender, fluid_of, predic
 from discover.laws.multimode import Fluid
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import another_between_samples, unknown_between_samples
+from discover.statistics.projection import rms
 from tensor_library.law_terms import LawTerms
 
 LARGEST = 5e-3
@@ -130,11 +131,11 @@ def _off(prediction: Stresses, flow: Flow) -> np.ndarray:
 
 
 def _size(flow: Flow) -> float:
-    return float(np.sqrt(np.mean(np.asarray(flow.measured) ** 2)))
+    return rms(np.asarray(flow.measured))
 
 
 def _relative(difference: np.ndarray, flow: Flow) -> float:
-    return float(np.sqrt(np.mean(difference**2))) / _size(flow)
+    return rms(difference) / _size(flow)
 
 
 def _mean_relative(differences: Sequence[np.ndarray], flows: Sequence[Flow]) -> float:

@@ -2,7 +2,7 @@
 
 from discover.comparison.instrument.absorbed import absorbed
 from discover.comparison.instrument.classical_along import classical_along
-from discover.comparison.instrument.corrected import InRecord, corrected
+from discover.comparison.instrument.corrected import corrected
 from discover.comparison.instrument.fitted_along import FittedAlong, Learned
 from discover.comparison.instrument.fixed import fixed_with_the_law
 from discover.comparison.instrument.frame import Frame
@@ -10,7 +10,6 @@ from discover.comparison.instrument.frame import Frame
 __all__ = [
     "FittedAlong",
     "Frame",
-    "InRecord",
     "Learned",
     "absorbed",
     "classical_along",

@@ -26,7 +26,7 @@ def classical_along(
     along: FittedAlong,
     frames: Sequence[Frame],
     flows: Sequence[Flow],
-    independent: float | None = None,
+    independent: float | None,
 ) -> list[ClassicalFit]:
     """Return the classical laws, each with the constants that fit it best.
 

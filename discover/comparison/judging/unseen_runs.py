@@ -13,6 +13,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome, Limits
 from discover.identify.rivals.bands import PredictionBand
 from discover.statistics import HALF_BAND, LackOfFit, noise_model
 from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.projection import rms
 from discover.statistics.residual import Expectation
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 from discover.words import percent_of
@@ -80,7 +81,7 @@ def misses(limits: Limits, flow: Flow, noise: float) -> float:
     if flow.kind != "held_out" or flow.is_truth or record is None:
         return 0.0
     record = np.asarray(record)
-    allowed = IN_NOISE * noise * np.sqrt(np.mean(record**2))
+    allowed = IN_NOISE * noise * rms(record)
     share = float(np.mean(np.abs(record - np.clip(record, *limits["sigma12"])) > allowed))
     return share if share > _OUTSIDE else 0.0
 
@@ -147,13 +148,13 @@ def _refuted(
         for part in (residuals, records, columns)
     )
     pairs = zip(residuals, records, strict=True)
-    missed = float(np.mean([_size(row) / (_size(record) or 1.0) for row, record in pairs]))
+    missed = float(np.mean([rms(row) / (rms(record) or 1.0) for row, record in pairs]))
     if missed <= least_seen(outcome):
         return ""
     fitted = [row for flow in training if (row := _residual(outcome, flow)) is not None]
     known = [_record(flow) for flow in training]
     # stresses and strains beside one another: each run says how its own noise is correlated
-    alike = [row / (_size(row) or 1.0) for row in fitted]
+    alike = [row / (rms(row) or 1.0) for row in fitted]
     against = Unseen(residuals, records, columns, noise_model(alike).correlation)
     told = all(len(column) for column in columns)  # how uncertain the constants are
     if told and refutes(against, fitted, known, expectation):
@@ -210,7 +211,3 @@ def changes_along(
         return np.zeros((0, len(flow.times)))
     low, high = limits["sigma12"]
     return (high - low)[None] / (2.0 * HALF_BAND)
-
-
-def _size(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))

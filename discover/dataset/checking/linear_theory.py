@@ -15,6 +15,7 @@ from discover.dataset.load import SWEEP_FILE
 from discover.dataset.loading import LARGEST
 from discover.dataset.run import Run
 from discover.statistics import HALF_BAND
+from discover.statistics.projection import rms
 from discover.words import percent_of
 
 # Where every fluid is still linear, to a few per cent: damping functions are 0.98 and more there
@@ -195,13 +196,13 @@ def _gain(
     ratios = np.log(stress / linear)
     gain, half = float(np.median(ratios)), len(ratios) // 2
     drift = abs(float(np.median(ratios[half:]) - np.median(ratios[:half])))
-    left = float(np.sqrt(np.mean((stress - np.exp(gain) * linear) ** 2)))
-    size = float(np.sqrt(np.mean(stress**2)))
+    left = rms(stress - np.exp(gain) * linear)
+    size = rms(stress)
     if drift > _STEADY_RATIO or left > max(_STEADY_RATIO * size, 2.0 * stress_noise(run)):
         return None
     # lines between samples lose (ωh)²/12 of a wave; what they miss in the middle is (ωh)²/2
-    bends = float(np.sqrt(np.mean(np.diff(run.rate, 2) ** 2)))
-    coarse = bends / float(np.sqrt(np.mean(run.rate**2))) / 6.0
+    bends = rms(np.diff(run.rate, 2))
+    coarse = bends / rms(run.rate) / 6.0
     # a median's error is 1.25 times a mean's; the fewest samples hardly show how they scatter
     known = max(len(ratios) - _FEWEST_RATIOS, 1)
     of_median = 1.25 * float(np.std(ratios)) / np.sqrt(known)

@@ -28,7 +28,7 @@ _STEADY = 0.1  # most change of the stress in the last fifth
 
 
 def doubts_of_normal_stress(
-    run: Run, sweep: LinearSweep | None = None, spectrum: RelaxationSpectrum | None = None
+    run: Run, sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
 ) -> Iterator[Finding]:
     """Yield why the N1 of a start-up of shear cannot be right.
 

@@ -10,6 +10,7 @@ from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpect
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.protocols.kinematics import kinematics_of
+from discover.statistics.projection import rms
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25
@@ -143,8 +144,8 @@ def _steady_alternation(run: Run) -> bool:
     waves = np.hstack([np.cos(angles), np.sin(angles), np.ones((len(run), 1))])
     found, *_ = np.linalg.lstsq(waves[later], run.stress[later], rcond=None)
     left = run.stress - waves @ found
-    scatter = float(np.sqrt(np.mean(left[later] ** 2)))
-    early = float(np.sqrt(np.mean(left[time < 0.25 * period] ** 2)))
+    scatter = rms(left[later])
+    early = rms(left[time < 0.25 * period])
     rates, *_ = np.linalg.lstsq(waves, run.rate, rcond=None)
     n = len(_HARMONICS)
     viscosity = complex(found[0], -found[n]) / complex(rates[0], -rates[n])

@@ -208,11 +208,7 @@ def _start(made: Record) -> None:
 
 def _creep(readings: Readings, found: Recognised) -> Record:
     if not readings.has("stress", "strain"):
-        made = _table(readings, found, ("time", "compliance"))
-        _begin(made, readings)
-        positive = (made.table["time"] > 0.0) & (made.table["compliance"] > 0.0)
-        _keep(made, positive, "no compliance")
-        return made
+        return _function_of_time(readings, found, "compliance")
     made = _table(readings, found, ("time", "stress", "strain"))
     _begin(made, readings)
     made.conditions["control"] = "stress"
@@ -222,11 +218,7 @@ def _creep(readings: Readings, found: Recognised) -> Record:
 
 def _relaxation(readings: Readings, found: Recognised) -> Record:
     if not readings.has("stress", "strain"):
-        made = _table(readings, found, ("time", "relaxation_modulus"))
-        _begin(made, readings)
-        positive = (made.table["time"] > 0.0) & (made.table["relaxation_modulus"] > 0.0)
-        _keep(made, positive, "no modulus")
-        return made
+        return _function_of_time(readings, found, "relaxation_modulus")
     made = _table(readings, found, ("time", "stress", "strain"), ("N1", "N2"))
     _begin(made, readings)
     time, strain = made.table["time"], made.table.pop("strain")
@@ -239,6 +231,15 @@ def _relaxation(readings: Readings, found: Recognised) -> Record:
         made.conditions["step_time_s"] = repr(float(f"{took:.6g}"))
         made.notes.append(f"time counts from the end of the step, which took {took:.3g} s")
     _keep(made, made.table["time"] > 0.0, "the step itself")
+    return made
+
+
+def _function_of_time(readings: Readings, found: Recognised, what: str) -> Record:
+    """Return a compliance or a modulus as the instrument's software computed it."""
+    made = _table(readings, found, ("time", what))
+    _begin(made, readings)
+    positive = (made.table["time"] > 0.0) & (made.table[what] > 0.0)
+    _keep(made, positive, f"no {what.rpartition('_')[2]}")
     return made
 
 

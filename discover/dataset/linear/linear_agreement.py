@@ -7,6 +7,7 @@ import numpy as np
 from discover.dataset.linear.linear_spectra import predicted, spectrum_of
 from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests
 from discover.errors import InputError
+from discover.statistics.projection import rms
 
 AGREES = 0.1
 """Root-mean-square relative error up to which two linear tests agree: two loadings and two kinds of
@@ -79,7 +80,7 @@ def linear_agreements(tests: Tests) -> list[Agreement]:
                 continue
             argument = other.argument[inside]
             error = predicted(spectrum, test, argument) / other.values[:, inside] - 1.0
-            size, bias = float(np.sqrt(np.mean(error**2))), float(np.mean(error))
+            size, bias = rms(error), float(np.mean(error))
             seen = _times(other)[inside]
             ends = float(seen.min()), float(seen.max())
             found.append(Agreement(source, test, celsius, size, bias, ends))

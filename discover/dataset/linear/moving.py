@@ -33,9 +33,9 @@ class MovedTests:
 
 def move_tests(
     tests: Tests,
-    reference: float | None = None,
-    vertical: bool = False,
-    between: tuple[float, float] | None = None,
+    reference: float | None,
+    vertical: bool,
+    between: tuple[float, float] | None,
 ) -> MovedTests:
     """Return tests moved to one temperature, with what can be said of them.
 

@@ -8,6 +8,8 @@ from scipy.constants import R
 from scipy.optimize import curve_fit
 from scipy.stats import t as student
 
+from discover.statistics.projection import rms
+
 
 @dataclass(frozen=True)
 class ShiftLaw:
@@ -94,4 +96,4 @@ def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
         for key, value, half in zip(start, values, wide, strict=True)
     }
     known = {key: float(value) for key, value in zip(start, values, strict=True)}
-    return ShiftLaw(name, known, intervals, float(np.sqrt(np.mean(left**2))))
+    return ShiftLaw(name, known, intervals, rms(left))

@@ -6,6 +6,7 @@ import numpy as np
 
 from discover.dataset.run import Run
 from discover.errors import InputError
+from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
 
 _FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
@@ -38,7 +39,7 @@ def is_copy(one: Run, other: Run) -> bool:
     known, found = fewer.recorded[close], more.recorded[at[close]]
     if not np.any(known):
         return False
-    off = float(np.sqrt(np.mean((known - found) ** 2)))
+    off = rms(known - found)
     return off <= _ROUNDED * fast_part(known)
 
 

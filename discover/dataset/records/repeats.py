@@ -11,6 +11,7 @@ from discover.dataset.loading import LARGEST
 from discover.dataset.run import Run
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
+from discover.statistics.projection import rms
 
 _SAME = 0.02
 """Relative difference of rates, and of what runs.csv says of two runs, that is none."""
@@ -154,5 +155,5 @@ def _difference(one: Run, other: Run) -> float:
     if times is None or _share(one, other, times) < _SHARED:
         return float("inf")
     records = [PchipInterpolator(run.time, run.recorded)(times) for run in (one, other)]
-    size = float(np.sqrt(np.mean(np.square(records)))) or 1.0
+    size = rms(records) or 1.0
     return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size

@@ -95,7 +95,7 @@ def _bracketed(content: str) -> str:
 
 
 def term_mathml(
-    name: str, inner: Mapping[str, float] | None = None, coefficient: float | None = None
+    name: str, inner: Mapping[str, float] | None, coefficient: float | None = None
 ) -> str:
     """Return a term by its canonical spelling, without `math` element.
 

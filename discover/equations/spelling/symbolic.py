@@ -10,7 +10,7 @@ from tensor_library.symbolic import SympyNotation
 from tensor_library.terms import parse_term
 
 
-def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None = None) -> sympy.Expr:
+def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> sympy.Expr:
     """Return h as an expression over the non-commuting tensors of `tensor_library.symbolic`.
 
     Constants of a named law that differ from mode to mode stay letters, and so do its structure

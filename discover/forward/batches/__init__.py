@@ -1,7 +1,7 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
 from discover.forward.batches.imposed_stress import StressBatch
-from discover.forward.batches.loadings import Loadings, relative_noise, share_of_factor
+from discover.forward.batches.loadings import relative_noise, share_of_factor
 from discover.forward.batches.mixed import (
     Batch,
     MixedBatch,
@@ -20,7 +20,6 @@ from discover.forward.batches.transient import RunBatch
 
 __all__ = [
     "Batch",
-    "Loadings",
     "MixedBatch",
     "OscillationBatch",
     "Part",

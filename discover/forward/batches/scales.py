@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.dataset import Run
+from discover.statistics.projection import rms
 
 # Of a radian: the time in which a change of a periodic stress is seen, in its phase
 _SEEN = 0.1
@@ -30,7 +31,7 @@ def data_scales(runs: Sequence[Run]) -> dict[str, float]:
     radians = [1.0 / float(np.median(run.angular_frequency)) for run in sweeps]
     gaps += [_SEEN * radian for radian in radians]
     lengths, material_lengths = lengths + radians, material_lengths + radians
-    stresses = [float(np.sqrt(np.mean(run.stress**2))) for run in runs]
+    stresses = [rms(run.stress) for run in runs]
     rates = [float(np.max(np.abs(run.rate))) for run in runs]
     stress, gap = float(np.median(stresses)) or 1.0, float(np.median(gaps or [1.0]))
     rate, length = float(np.median(rates)) or 1.0, float(np.median(lengths)) or 1.0

@@ -38,8 +38,8 @@ def answer_to_stress(
     dynamics: Dynamics,
     times: Float[Array, " s"],
     imposed: Float[Array, " s"],
-    inertia: Float[Array, ""] | float = 0.0,
-    flow: Kinematics | None = None,
+    inertia: Float[Array, ""] | float,
+    flow: Kinematics | None,
     fixed: Dynamics | None = None,
 ) -> Answer:
     """Return the strain at step ends, and the modes and the rate there.

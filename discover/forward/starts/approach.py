@@ -61,7 +61,7 @@ def approach_step(
     way: Approach,
     index: Float[Array, ""],
     weissenberg_number: Float[Array, " k"],
-    scalars: int = 0,
+    scalars: int,
 ) -> Approach:
     """Return the way after one step.
 

@@ -192,7 +192,7 @@ def periodic_state(
     strain: Float[Array, ""],
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
-    together: str | None = None,
+    together: str | None,
 ) -> PeriodicState:
     """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
 

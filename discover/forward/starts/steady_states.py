@@ -58,7 +58,7 @@ def steady_states(
 
 
 def steady_state(
-    dynamics: Dynamics, fixed: Dynamics, rate: Float[Array, ""], flow: Kinematics | None = None
+    dynamics: Dynamics, fixed: Dynamics, rate: Float[Array, ""], flow: Kinematics | None
 ) -> Float[Array, "s k"]:
     """Return the dimensionless modes in one steady flow, as `steady_states` reaches it.
 

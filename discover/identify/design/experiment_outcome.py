@@ -13,6 +13,8 @@ from discover.identify.design.next_experiment import spread_of, squared_distance
 from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
 
+_DRAWS = 32
+
 REFUTED = 1e-3
 """Probability of so large a deviation, below which a law counts as refuted."""
 
@@ -52,8 +54,6 @@ def judge_laws(
     experiment: Experiment,
     measured: dict[str, Float[np.ndarray, " n"]],
     noise: dict[str, float],
-    n_draws: int = 32,
-    seed: int = 0,
 ) -> list[LawOutcome]:
     """Return how each law stands after the experiment: prediction against measurement.
 
@@ -70,10 +70,10 @@ def judge_laws(
     noise
         Standard deviation of each, in Pa.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     weights = []
     for law in laws:
-        group = draws(law, n_draws, rng)
+        group = draws(law, _DRAWS, rng)
         predicted = predict_laws(
             fluid_of(group, declared), [experiment.protocol], [experiment.times]
         )[:, 0]

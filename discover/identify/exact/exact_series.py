@@ -55,7 +55,7 @@ class _Series:
 def stress_series(
     coefficients: Mapping[str, Fraction | int],
     rate: Sequence[Fraction | int],
-    order: int = DEFAULT_ORDER,
+    order: int,
     linear_relaxation: bool = True,
     modular: bool = False,
 ) -> list[tuple[Any, Any, Any, Any]]:

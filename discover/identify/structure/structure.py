@@ -127,10 +127,6 @@ class LawStructure(NotebookView):
         """The verdicts, one sentence each."""
         return " ".join(q.text for q in self.quantities)
 
-    def verdict(self, quantity: str) -> Verdict:
-        """Return the verdict on N1 or N2."""
-        return next(q.verdict for q in self.quantities if q.quantity == quantity)
-
     def line(self) -> dict[str, Any]:
         """Return the law as one line of a table: combinations that no datum sees, and verdicts."""
         verdicts = {q.quantity: q.verdict for q in self.quantities}

@@ -122,7 +122,6 @@ def reweighted(
     law: TensorBasisNetwork,
     cloud: Cloud,
     strength: float | Float[Array, ""],
-    variation_share: float = 1.0,
 ) -> PriorWeights:
     """Return the weights of the next round, from the root mean squares of this one."""
     amount, variation = parts(law, cloud)
@@ -130,7 +129,7 @@ def reweighted(
     def reciprocal(rows):
         return strength / (jnp.sqrt(jnp.mean(rows**2, axis=0)) + _FLOOR)
 
-    return PriorWeights(reciprocal(amount), variation_share * reciprocal(variation))
+    return PriorWeights(reciprocal(amount), reciprocal(variation))
 
 
 def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:

@@ -17,6 +17,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.records import Records, laid_out
 from discover.programs import on_device
+from discover.statistics.projection import rms
 
 STRAIN_STEP = 0.2
 """Largest strain of a step of the integration."""
@@ -62,21 +63,17 @@ class TrainingProblem(eqx.Module):
             lambda protocol, grid: observed_on_grid(fluid, protocol, grid, adjoint)[:, 0]
         )
 
-    def mean_squared_errors(
-        self,
-        law: AbstractConstitutiveLaw,
-        adjoint: diffrax.AbstractAdjoint = _IN_REVERSE,
-    ) -> Float[Array, " runs"]:
+    def mean_squared_errors(self, law: AbstractConstitutiveLaw) -> Float[Array, " runs"]:
         """Return the mean squared error of each run, of stresses over the sum of the moduli.
 
-        The default adjoint, reverse mode through the steps with recursive checkpoints, was
+        Its derivative, in reverse mode through the steps with recursive checkpoints, was
         measured at half the cost of storing every step and at a ninth of the continuous adjoint
         (``benchmarks/adjoints.py``: 51, 94 and 481 ms for the paper's network).
         """
         weight, total = self.records.weight, jnp.sum(self.modulus)
         unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
         scale = jnp.where(weight > 0, weight * unit[:, None], 1.0)
-        errors = self.records.residual(self.predicted(law, adjoint)) / scale
+        errors = self.records.residual(self.predicted(law, _IN_REVERSE)) / scale
         return jnp.sum(errors**2, axis=1) / jnp.sum(weight > 0, axis=1)
 
 
@@ -126,7 +123,7 @@ def make_problem(
         flows,
         # what was recorded beside σ12 is not learned
         Records(records.recorded[..., 0], records.weight[..., 0], records.loading),
-        on_device(np.array([np.sqrt(np.mean(stress**2)) for stress in own])),
+        on_device(np.array([rms(stress) for stress in own])),
         on_device(modulus),
         on_device(relaxation_time),
         jnp.asarray(solvent_viscosity),

@@ -56,7 +56,7 @@ def train_default(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: DefaultRecipe | None = None,
+    recipe: DefaultRecipe | None,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> Trained:
@@ -129,7 +129,7 @@ def train_constants(
     key: PRNGKeyArray,
     linear_relaxation: bool,
     recipe: DefaultRecipe,
-    base_law: AbstractConstitutiveLaw | None = None,
+    base_law: AbstractConstitutiveLaw | None,
 ) -> Trained:
     """Return the law of few constants that explains some runs: the recipe's first stage alone."""
     session = Session(problem, recipe, None)
@@ -144,7 +144,7 @@ def train_along(
     found: TensorBasisNetwork,
     groups: Sequence[Sequence[int]],
     recipe: DefaultRecipe,
-    progress: Progress | None = None,
+    progress: Progress | None,
 ) -> Trained:
     """Return a law whose tensors are given, from initial weights of its own.
 

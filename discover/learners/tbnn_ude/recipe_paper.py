@@ -118,7 +118,7 @@ def train_paper(
     problem: TrainingProblem,
     key: PRNGKeyArray,
     linear_relaxation: bool,
-    recipe: PaperRecipe | None = None,
+    recipe: PaperRecipe | None,
     progress: Progress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> tuple[TensorBasisNetwork, Float[np.ndarray, " m"]]:

@@ -136,7 +136,7 @@ def explore(
     sizes: Callable[[Float[np.ndarray, " 5"]], Float[np.ndarray, " n"]],
     noise_floor: float,
     seed: int,
-    progress: Callable[[str], None] | None = None,
+    progress: Callable[[str], None] | None,
 ) -> Mixture:
     """Return the laws of a library that fit the data.
 
@@ -331,7 +331,7 @@ def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "row
     return modulus_columns(at, places, len(scale), optimum.coefficients * scale, inner)
 
 
-def _residuals(problem, optimum: Optimum, coefficients, moduli=None) -> Float[np.ndarray, "m rows"]:
+def _residuals(problem, optimum: Optimum, coefficients, moduli) -> Float[np.ndarray, "m rows"]:
     target = problem.records.weighted_record
     at = with_reference(problem, optimum.constants)
     places, inner = jnp.arange(coefficients.shape[1]), jnp.zeros((len(coefficients), 0))

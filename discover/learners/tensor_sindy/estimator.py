@@ -258,9 +258,7 @@ class TensorSINDy(RunPrediction):
             problem, self.optimizer, self.max_terms, self.misfit_floor, rough=rough
         )
         # a line for each beginning of the runs, and for each size
-        quiet, search.progress = search.progress, by_lines(self.progress, 3 + search.largest)
-        path = search.run()
-        search.progress = quiet  # a closure, which pickle would not take
+        path = search.run(by_lines(self.progress, 3 + search.largest))
         held_out, by_run = None, None
         if validates:
             folds = run_folds(n_groups, self.n_folds, self.random_state)[groups]

@@ -89,7 +89,7 @@ class ParameterUncertainty:
 
 
 def parameter_uncertainty(
-    problem: TrajectoryProblem, fit: Fit, misfit_floor: float = 0.0, slots: int = 1
+    problem: TrajectoryProblem, fit: Fit, misfit_floor: float, slots: int = 1
 ) -> ParameterUncertainty:
     """Return the uncertainty of a fit's coefficients and inner parameters.
 

@@ -11,6 +11,7 @@ from discover.learners.tensor_sindy.intervals import ParameterUncertainty, param
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.stability import Stability
+from discover.statistics.projection import rms
 from tensor_library.library import TermLibrary
 
 _CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
@@ -41,9 +42,7 @@ def path_table(
         row["size"] = len(fit.support)
         row["bic_at_exact_moduli"] = row["bic"]
         row["bic"] = float(criterion[i])
-        row["held_out"] = (
-            None if held_out is None else float(np.sqrt(np.mean(np.square(held_out[i]))))
-        )
+        row["held_out"] = None if held_out is None else rms(held_out[i])
         row["held_out_by_run"] = {} if by_run is None else dict(by_run[i])
         rows.append(row)
     return rows
@@ -81,7 +80,7 @@ def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:
     return rows
 
 
-def uncertainty_row(search: SupportSearch, fit: Fit, seed: int = 0) -> dict[str, Any]:
+def uncertainty_row(search: SupportSearch, fit: Fit, seed: int) -> dict[str, Any]:
     """Return the covariance of a law's parameters and, where it does not serve, their draws."""
     if not fit.support:
         return {"covariance": None, "draws": None}

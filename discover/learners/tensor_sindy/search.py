@@ -31,11 +31,6 @@ _FEWEST_SLOTS = 5
 _FEWEST_TAKEN, _CLOSE_BEHIND, _WITHIN, _MOST_NEAR = 3, 1.01, 1.5, 24
 
 
-def _silent(line: str) -> None:
-    # a name, so that a search can be pickled
-    del line
-
-
 class SupportSearch:
     """Every support that was refitted, and the moves between them.
 
@@ -54,8 +49,6 @@ class SupportSearch:
         Largest support.
     floor
         Relative misfit below which data are reproduced as well as the integration allows.
-    progress
-        Called with a line of text.
     rough
         The same on a rougher grid, on which supports are ranked; only the best are then fitted on
         `problem`. None to fit all of them there.
@@ -67,7 +60,6 @@ class SupportSearch:
         optimizer,
         max_terms: int,
         floor: float,
-        progress: Callable[[str], None] | None = None,
         rough: TrajectoryProblem | None = None,
     ):
         self.problem = problem
@@ -78,7 +70,6 @@ class SupportSearch:
         # never fewer, so that searches of small supports share a compilation
         self.slots = max(self.largest, _FEWEST_SLOTS)
         self.floor = floor
-        self.progress = progress or _silent
         self.fits: dict[tuple[int, ...], Fit] = {}
         self.history: list[tuple[tuple[int, ...], float]] = []
         self.scale: Float[np.ndarray, " n"] = np.ones(self.n_terms)
@@ -137,21 +128,23 @@ class SupportSearch:
         """Number of supports that were fitted, on either grid."""
         return len(self.fits if self.scout is None else {*self.fits, *self.scout.fits})
 
-    def run(self) -> list[Fit]:
-        """Return the path: the best fit of each size, from empty to as dense as is of use."""
-        if self.scout is None:
-            self._explore()
-        else:
-            self.scout.progress = self.progress
-            self.scout._explore()
-            self.scout.progress = _silent
+    def run(self, say: Callable[[str], None]) -> list[Fit]:
+        """Return the path: the best fit of each size, from empty to as dense as is of use.
+
+        Parameters
+        ----------
+        say
+            Called with a line of text now and then.
+        """
+        (self.scout or self)._explore(say)
+        if self.scout is not None:
             self._take_over(self.scout)
         return self.polish()
 
-    def _explore(self) -> None:
+    def _explore(self, say: Callable[[str], None]) -> None:
         """Fit supports of growing size until more terms are of no use."""
         empty = self._refit([()], {}, tolerance=POLISHING)[0]
-        seeds = self._grow_horizon(empty)
+        seeds = self._grow_horizon(empty, say)
         risen = 0
         for size in range(1, self.largest + 1):
             if size > 1:
@@ -171,7 +164,7 @@ class SupportSearch:
                 unseen = [s for s in removals(best.support) if s not in self.fits]
                 self._refit(unseen, {s: best for s in unseen})
             best, previous = self.of_size(size)[0], self.of_size(size - 1)[0]
-            self.progress(
+            say(
                 f"{size} terms: misfit {best.misfit:.3g}, "
                 + ", ".join(self.problem.library.names[i] for i in best.support)
             )
@@ -263,7 +256,9 @@ class SupportSearch:
             self._sparse[fit.support] = [s.support for s in solutions]
         return self._sparse[fit.support]
 
-    def _grow_horizon(self, empty: Fit) -> dict[int, dict[tuple[int, ...], Fit]]:
+    def _grow_horizon(
+        self, empty: Fit, say: Callable[[str], None]
+    ) -> dict[int, dict[tuple[int, ...], Fit]]:
         """Return supports found on the beginnings of the runs, with their fits, by size."""
         order = np.asarray(self.problem.order_of_time)
         seeds: dict[int, dict[tuple[int, ...], Fit]] = {}
@@ -284,7 +279,7 @@ class SupportSearch:
             sane = [f for f in fits if f.misfit < 100.0]
             if sane:
                 current = min(sane, key=self.criterion)
-            self.progress(f"first {horizon:.0%} of each run: misfit {current.misfit:.3g}")
+            say(f"first {horizon:.0%} of each run: misfit {current.misfit:.3g}")
         self._rescale(LinearModel.at(self.problem, current))
         return seeds
 

@@ -36,13 +36,10 @@ class Stability:
     interchangeable
         Share of the halves in which the term, or one of identical signature, was chosen: twins
         take each other's place at random.
-    n_halves
-        Number of halves looked at.
     """
 
     frequency: Float[np.ndarray, " n"]
     interchangeable: Float[np.ndarray, " n"]
-    n_halves: int
 
 
 def selection_stability(
@@ -51,9 +48,9 @@ def selection_stability(
     optimizer,
     max_terms: int,
     floor: float,
-    known: Sequence[tuple[int, ...]] = (),
-    n_pairs: int = 20,
-    seed: int | None = 0,
+    known: Sequence[tuple[int, ...]],
+    n_pairs: int,
+    seed: int | None,
     worth: float = 1.0,
 ) -> Stability:
     """Return how often each term is chosen from halves of the data, near a fitted law.
@@ -93,7 +90,7 @@ def selection_stability(
             chosen[2 * pair + side, list(support)] = True
     alike = _alike(design[usable])
     together = np.stack([np.any(chosen[:, group], axis=1) for group in alike], axis=1)
-    return Stability(chosen.mean(axis=0), together.mean(axis=0), 2 * n_pairs)
+    return Stability(chosen.mean(axis=0), together.mean(axis=0))
 
 
 def _half(problem: TrajectoryProblem, rng: np.random.Generator) -> Bool[np.ndarray, " rows"]:

@@ -23,7 +23,7 @@ Drawn = Picture | Missing
 
 
 def comparison_pictures(
-    comparison: Comparison, overlays: Sequence[Overlay] = ()
+    comparison: Comparison, overlays: Sequence[Overlay]
 ) -> tuple[list[Drawn], list[Drawn]]:
     """Return the pictures of what was found, and those of training."""
     sparse = comparison.outcomes.get("tensor_sindy")

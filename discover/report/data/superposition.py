@@ -135,8 +135,8 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
 def superposition_page(
     found: Superposition,
     name: str,
-    agreements: Sequence[Agreement] = (),
-    own: Mapping[str, Superposition] | None = None,
+    agreements: Sequence[Agreement],
+    own: Mapping[str, Superposition] | None,
 ) -> str:
     """Return the page."""
     pictures = attempt("The pictures", lambda: superposition_pictures(found))

@@ -25,6 +25,7 @@ from discover.report.wording import (
     percent,
     significant,
 )
+from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
 
 
@@ -88,7 +89,7 @@ def run_rows(result: LoopResult) -> list[dict[str, Any]]:
             "samples": record.time.size,
             "end": float(record.time[-1]) if record.is_transient else None,
             "rate": float(np.max(np.abs(record.rate))),
-            "stress": float(np.sqrt(np.mean(record.measured**2))),
+            "stress": rms(record.measured),
             "before": float(record.errors[0]),
             "after": float(record.errors[-1]),
         }
@@ -103,7 +104,7 @@ def noise_range(result: LoopResult) -> list[float] | None:
     the part of them that changes from sample to sample.
     """
     residuals = [r.relative_residual[-1] for r in result.records if not r.held_out]
-    for of_run in (lambda values: float(np.sqrt(np.mean(values**2))), fast_part):
+    for of_run in (rms, fast_part):
         noise = [of_run(values) for values in residuals]
         if noise and np.isclose(np.mean(noise), result.noise_floor, rtol=1e-3):
             return noise

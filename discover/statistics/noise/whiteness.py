@@ -15,6 +15,7 @@ from scipy.special import gammaincc, ndtr
 
 from discover.statistics.noise.same_place import same_place_probability
 from discover.statistics.noise.smooth_misfit import LARGEST_CORRELATION, smooth_misfit_probability
+from discover.statistics.projection import rms
 
 LAGS = 12
 """Neighbours up to which noise is tested for correlation."""
@@ -201,7 +202,7 @@ def cycle(record: Float[np.ndarray, " n"]) -> float | None:
 
 def _spread(values: Float[np.ndarray, " n"]) -> float:
     """Return a standard deviation that a loud stretch hardly moves."""
-    return 1.4826 * float(np.median(np.abs(values))) or float(np.sqrt(np.mean(values**2))) or 1.0
+    return 1.4826 * float(np.median(np.abs(values))) or rms(values) or 1.0
 
 
 def _local_spread(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:

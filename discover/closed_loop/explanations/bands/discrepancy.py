@@ -20,7 +20,7 @@ def discrepancy(
     fit: Fit,
     effects: Sequence[str],
     batches: Sequence[Batch],
-    own: Float[np.ndarray, "effects fitted m"] | None = None,
+    own: Float[np.ndarray, "effects fitted m"] | None,
 ) -> list[Float[np.ndarray, "_ _"]]:
     """Return the mean square of what small amounts of every other candidate would change.
 

@@ -16,6 +16,7 @@ from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
+from discover.statistics.projection import rms
 
 _TAILS = (0.025, 0.975)
 
@@ -29,7 +30,7 @@ def mixed_bands(
     noise: float,
     structured: bool,
     candidates: Sequence[str],
-    rates: Sequence[Float[np.ndarray, " _"]] = (),
+    rates: Sequence[Float[np.ndarray, " _"]],
 ) -> list[Float[np.ndarray, "2 runs n"]]:
     """Return where 95 % of the measurements should lie, were it one of the explanations.
 
@@ -72,7 +73,7 @@ def mixed_bands(
         lacking = discrepancy(model, fitted, one.fit, others, batches, own)
         root = root_of_covariance(fitted, one.fit)[0] if one.fit.free else None
         off = response(one.fit.jacobian, shifts) if one.fit.free and len(shifts) else None
-        left = max(noise, float(np.sqrt(np.mean(one.fit.run_errors**2)))) * tails
+        left = max(noise, rms(one.fit.run_errors)) * tails
         wider = widening(model, fitted, one.fit, own, left)
         faster = [np.ones(len(batch.weight)) for batch in batches]
         if structured and rates:

@@ -219,7 +219,7 @@ def _near(best: Choice, other: Choice) -> bool:
 
 
 def prune(
-    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str]
 ) -> tuple[Fit, list[str]]:
     """Drop effects that later ones have made redundant, one after another.
 
@@ -244,7 +244,7 @@ def prune(
 
 
 def drop_undecided(
-    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str] = ()
+    problem: FitProblem, fit: Fit, active: Sequence[str], established: Sequence[str]
 ) -> tuple[Fit, list[str]]:
     """Drop effects whose amplitude may be zero, one after another, the weakest first.
 

@@ -50,16 +50,10 @@ class FurtherMode:
         Its relaxation time in s.
     share
         Its modulus over that of the other.
-    probability
-        That noise, correlated alike in all runs, gets less by as much.
-    size
-        Root-mean-square of what it changes, over that of the records, mean over runs.
     """
 
     time: float
     share: float
-    probability: float
-    size: float
 
 
 def clear_further_mode(
@@ -98,7 +92,7 @@ def clear_further_mode(
     size = float(np.mean(changes))
     if probability > CLEAR or expectation.excuses(size):
         return None
-    return FurtherMode(float(np.exp(best[-1])), float(np.exp(best[-2])), probability, size)
+    return FurtherMode(float(np.exp(best[-1])), float(np.exp(best[-2])))
 
 
 def _slow(rows: Sequence[Float[np.ndarray, " _"]]) -> bool:

@@ -14,6 +14,7 @@ from discover.report.plots.style import (
     runs_through_decades,
 )
 from discover.report.wording import effect_title, percent
+from discover.statistics.projection import rms
 
 _MOST, _COLUMNS = 6, 3
 
@@ -34,7 +35,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
         for place, (panel, one) in enumerate(zip(panels, shown, strict=True)):
             for record in records:
                 assert record.by_explanation is not None
-                size = float(np.sqrt(np.mean(record.measured**2))) or 1.0
+                size = rms(record.measured) or 1.0
                 relative = 100.0 * (record.by_explanation[place] - record.measured) / size
                 panel.plot(
                     record.time, relative, lw=0.9, alpha=0.8,
