@@ -19,7 +19,7 @@ from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, start_up
-from discover.simulate import simulate
+from discover.simulate import simulate, simulate_homogeneous_flow
 
 LAWS_AND_CONSTANTS = [
     (rolie_poly, {"stretch_time_ratio": 0.1, "beta": 0.7}),
@@ -43,6 +43,18 @@ def test_a_law_is_its_authors_in_shear_and_in_extension(law, constants, kind, ra
     found = simulate(fluid, in_flow(start_up(rate), kind), times).components
     exact = stress(law, constants, rate * UNIT[kind], times)[:, [0, 1, 2, 0], [0, 1, 2, 1]]
     # rtol of both integrators, with room for a retraction ten times as fast as the flow
+    np.testing.assert_allclose(found, exact, atol=1e-5 * np.max(np.abs(exact)))
+
+
+def test_a_law_is_its_authors_in_a_flow_that_no_rheometer_makes():
+    # all nine components, with a rotation about no axis of the strain
+    gradient = np.array([[0.4, 1.0, -0.3], [0.2, -0.7, 0.5], [0.6, -0.4, 0.3]])
+    times = np.linspace(0.05, 3.0, 30)
+    law, constants = LAWS_AND_CONSTANTS[0]
+    made = make_law(law.__name__, constants)
+    found = simulate_homogeneous_flow(made, lambda t: jnp.asarray(gradient), times)
+    exact = stress(law, constants, gradient, times)
+    assert np.min(np.max(np.abs(exact), axis=0)) > 0.1
     np.testing.assert_allclose(found, exact, atol=1e-5 * np.max(np.abs(exact)))
 
 
