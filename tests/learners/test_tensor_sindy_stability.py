@@ -61,8 +61,8 @@ def path_of(*supports):
 def test_stability_chooses_the_largest_member_of_stable_terms():
     frequency = np.array([0.9, 0.7, 0.1])
     path = path_of((), (0,), (0, 1), (0, 1, 2))
-    assert choose_by_stability(path, Stability(frequency, frequency, 10)) == 2
-    assert choose_by_stability(path, Stability(0 * frequency, 0 * frequency, 10)) == 0
+    assert choose_by_stability(path, Stability(frequency, frequency)) == 2
+    assert choose_by_stability(path, Stability(0 * frequency, 0 * frequency)) == 0
 
 
 def test_disagreement_of_rules_is_said():
@@ -73,7 +73,7 @@ def test_disagreement_of_rules_is_said():
         path,
         np.array([3.0, 2.0, 1.0]),
         None,
-        Stability(frequency, frequency, 10),
+        Stability(frequency, frequency),
         (0,),
         1e-5,
     )
