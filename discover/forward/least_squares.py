@@ -330,5 +330,6 @@ def gauss_newton_step(jacobian, residual, damping, known=None, room=None):
     if room is not None:
         low, high = (scale * bound for bound in room)
         if np.any((step < low) | (step > high)):
+            high = np.maximum(high, np.nextafter(low, np.inf))  # a range may be one value
             step = lsq_linear(padded, target, (low, high), method="bvls").x
     return step / scale

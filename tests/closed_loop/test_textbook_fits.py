@@ -144,3 +144,9 @@ def test_within_bounds_it_ends_at_the_minimum_that_scipy_finds_there(function):
     assert np.any((fit.theta == low) | (fit.theta == high))  # or the bounds are none
     # a step that is only cut off takes 400 to 600 on six of the nine, and ends elsewhere on five
     assert sum(model.asked) < 100
+
+
+def test_a_range_of_one_value_holds_a_parameter_and_lets_the_others_go():
+    model = model_of(rosenbrock, 2, ((0.5, -2.0), (0.5, 2.0)))
+    fit = fit_batch(model, None, [np.array([0.5, -1.0])], [range(2)])[0]
+    np.testing.assert_allclose(fit.theta, [0.5, 0.25], rtol=1e-3)
