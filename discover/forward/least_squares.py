@@ -200,11 +200,16 @@ class _Descent:
 
     def trial(self) -> np.ndarray:
         """Return the parameters after one more step."""
-        at, theta = self.free, self.theta.copy()
-        known, room = self.prior.rows(theta, at), room_of(self.model, theta, at)
-        step = gauss_newton_step(self.derivatives, self.residual, self.damping, known, room)
-        theta[at] = np.clip(theta[at] + step, self.model.low[at], self.model.high[at])
-        return theta
+        assert self.derivatives is not None  # they are taken before
+        return stepped(
+            self.model,
+            self.theta,
+            self.free,
+            self.residual,
+            self.derivatives,
+            self.damping,
+            self.prior,
+        )
 
     def _foretold(self, step: np.ndarray) -> float:
         """Return by how much a step lowers the cost if derivatives stay what they are."""
@@ -299,6 +304,23 @@ def room_of(
     """Return how far parameters may go, down (none of it positive) and up."""
     at = list(positions)
     return np.stack([model.low[at] - theta[at], model.high[at] - theta[at]])
+
+
+def stepped(
+    model: AugmentedModel,
+    theta: Float[np.ndarray, " p"],
+    free: Sequence[int],
+    residual: Float[np.ndarray, "runs n"],
+    jacobian: Float[np.ndarray, "free runs n"],
+    damping: float,
+    prior: Prior,
+) -> Float[np.ndarray, " p"]:
+    """Return parameters after the best step that their ranges hold, of those that are free."""
+    at, moved = list(free), theta.copy()
+    known, room = prior.rows(theta, at), room_of(model, theta, at)
+    step = gauss_newton_step(jacobian, residual, damping, known, room)
+    moved[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
+    return moved
 
 
 def _corrected(jacobian, step, change):

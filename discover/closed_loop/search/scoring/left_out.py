@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward.least_squares import Fit, gauss_newton_step, room_of
+from discover.forward.least_squares import Fit, stepped
 from discover.inference.problem import FitProblem
 
 _MISSED = 10.0
@@ -45,16 +45,12 @@ def left_out_parts(
     """
     model, weighted = problem.model, problem.weight > 0
     folds = _folds(weighted, problem.alone)
-    at = list(fit.free)
     trials = []
     for left_out in folds:
         # rows of zeros count for nothing
         kept = weighted & ~left_out
-        known, room = problem.prior.rows(fit.theta, at), room_of(model, fit.theta, at)
-        step = gauss_newton_step(fit.jacobian * kept, fit.residual * kept, 1e-8, known, room)
-        theta = fit.theta.copy()
-        theta[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
-        trials.append(theta)
+        residual, jacobian = fit.residual * kept, fit.jacobian * kept
+        trials.append(stepped(model, fit.theta, fit.free, residual, jacobian, 1e-8, problem.prior))
     with np.errstate(over="ignore", invalid="ignore"):
         squares = [residual**2 for residual in model.residuals(trials, problem.batch)]
         # what is left has to fit better without the others than with them: a step that does not is
