@@ -16,7 +16,7 @@ from jaxtyping import Float
 from discover.dataset import Dataset, Run
 from discover.effects import named_effects
 from discover.errors import InputError
-from discover.forward import AugmentedModel, DeclaredModel, RunBatch, data_scales, make_batch
+from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.protocols import FlowProtocol, oscillatory_shear, start_up
 
 MODULUS, RELAXATION_TIME = 100.0, 1.0
@@ -98,15 +98,15 @@ class PlantedCase:
     noise: Noise = field(default_factory=Noise)
 
 
-Flaw = Callable[[RunBatch, Callable[[RunBatch], np.ndarray], float], np.ndarray]
+Flaw = Callable[[Batch, Callable[[Batch], np.ndarray], float], np.ndarray]
 """From runs, a prediction for runs, and a size: the flawed stresses."""
 
 
 def _sticking_rate(batch, predict, size):
     # the motor cannot exceed a rate; at size 0 the limit is at the fastest flow of all
-    limit = float(jnp.max(jnp.abs(batch.commanded_rate))) * (1.0 - min(size, 0.95))
-    clipped = jnp.clip(batch.commanded_rate, -limit, limit)
-    return predict(eqx.tree_at(lambda b: b.commanded_rate, batch, clipped))
+    limit = float(jnp.max(jnp.abs(batch.transients.commanded_rate))) * (1.0 - min(size, 0.95))
+    clipped = jnp.clip(batch.transients.commanded_rate, -limit, limit)
+    return predict(eqx.tree_at(lambda b: b.transients.commanded_rate, batch, clipped))
 
 
 def _clipped_transducer(batch, predict, size):
@@ -131,7 +131,9 @@ def _hum(batch, predict, size):
 def _shear_banding(batch, predict, size):
     # beyond a rate the stress falls by a share of what is beyond it: no smooth function of stress
     rate = np.take_along_axis(
-        np.asarray(batch.commanded_rate)[:, ::2], np.asarray(batch.sample_index), axis=1
+        np.asarray(batch.transients.commanded_rate)[:, ::2],
+        np.asarray(batch.transients.sample_index),
+        axis=1,
     )
     return predict(batch) * np.where(np.abs(rate) > 1.2, 1.0 - min(size, 0.95), 1.0)
 
@@ -163,9 +165,7 @@ class Planter:
         self.declared = DeclaredModel.named(base_law, BASE_LAWS[base_law], MODULUS, RELAXATION_TIME)
         flows = {**FIT_FLOWS, **HELD_OUT_FLOWS}
         self._runs = [_empty_run(name, flow) for name, flow in flows.items()]
-        batch = make_batch(self._runs, strain_step=_STRAIN_STEP)
-        assert isinstance(batch, RunBatch)  # all of them are transients
-        self._batch = batch
+        self._batch = make_batch(self._runs, strain_step=_STRAIN_STEP)
         self._fitted = np.arange(len(flows)) < len(FIT_FLOWS)
         self._effects = named_effects()
         unscaled = AugmentedModel(self.declared, list(self._effects.values()))
@@ -315,7 +315,9 @@ def _empty_run(name: str, flow: FlowProtocol) -> Run:
     return Run(name, times, flow, rate, np.ones(len(times)))
 
 
-def _sample_times(batch: RunBatch) -> np.ndarray:
+def _sample_times(batch: Batch) -> np.ndarray:
     return np.take_along_axis(
-        np.asarray(batch.times)[:, ::2], np.asarray(batch.sample_index), axis=1
+        np.asarray(batch.transients.times)[:, ::2],
+        np.asarray(batch.transients.sample_index),
+        axis=1,
     )

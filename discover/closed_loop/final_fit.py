@@ -28,7 +28,7 @@ from discover.closed_loop.searching import SearchResult
 from discover.dataset import Run
 from discover.dataset.records.coarse_rates import CoarseRates
 from discover.dataset.records.repeats import repeats_among
-from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
+from discover.forward import AugmentedModel, Batch, make_batch
 from discover.forward.fit_uncertainty import intervals
 from discover.forward.least_squares import Fit
 from discover.forward.modulus_errors import modulus_shifts
@@ -81,15 +81,15 @@ class FinalFit:
     @property
     def loading(self) -> float:
         """Standard deviation of the factors of loadings; zero where runs are none of their own."""
-        return deviation_of_loadings(self.batch)
+        return self.batch.records.deviation_of_loadings
 
     @cached_property
     def loadings(self) -> list[LoadingFound]:
         """The factors of the loadings of all runs; none where they are none of their own."""
         told, model = (self.batch, self.fit), self.model
-        found = factors_of_loadings(model, told, self.batch, held_out=False)
+        found = factors_of_loadings(model, told, self.batch, self.fitted)
         if self.held_batch is not None:
-            found += factors_of_loadings(model, told, self.held_batch, held_out=True)
+            found += factors_of_loadings(model, told, self.held_batch, self.held_out, held_out=True)
         return found
 
     @property

@@ -16,7 +16,7 @@ from discover.comparison.own_loadings import loadings_of
 from discover.dataset.records.repeats import repeats_among
 from discover.dataset.run import Run
 from discover.dataset.run_table import kind_of_record
-from discover.learners.records import OBSERVED
+from discover.forward import OBSERVED
 from discover.progress import Progress
 from discover.statistics.noise_weights import weights_by_noise
 from discover.statistics.projection import rms

@@ -6,35 +6,31 @@ declared law, then those of every candidate effect. At zero amplitude an effect 
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import (
+    OBSERVED,
     Batch,
-    RunBatch,
-    as_loaded,
-    as_predicted,
+    Records,
+    TransientFlows,
     data_scales,
-    deviation_of_loadings,
     even,
-    loadings_of,
     make_batch,
-    relative_noise,
-    share_of_factor,
+    make_records,
+    names_of_loadings,
 )
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 
 __all__ = [
     "MODULUS",
+    "OBSERVED",
     "RELAXATION_TIME",
     "AugmentedModel",
     "Batch",
     "DeclaredModel",
     "FreeParameter",
-    "RunBatch",
-    "as_loaded",
-    "as_predicted",
+    "Records",
+    "TransientFlows",
     "data_scales",
-    "deviation_of_loadings",
     "even",
-    "loadings_of",
     "make_batch",
-    "relative_noise",
-    "share_of_factor",
+    "make_records",
+    "names_of_loadings",
 ]

@@ -20,13 +20,13 @@ from jaxtyping import Float
 from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.batches import (
     Batch,
-    MixedBatch,
-    OscillationBatch,
-    Part,
+    Flows,
+    PeriodicFlows,
     Places,
-    RunBatch,
-    SteadyBatch,
-    StressBatch,
+    Records,
+    SteadyFlows,
+    StressFlows,
+    TransientFlows,
 )
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
@@ -37,8 +37,11 @@ from discover.programs import in_threads
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
 
+# Of the batches that were laid out for the program
+_KEPT = 8
+
 # A steady state is solved for, a transient followed, a periodic state followed again and again
-_BY_SPEED = (SteadyBatch, RunBatch, StressBatch, OscillationBatch)
+_BY_SPEED = (SteadyFlows, TransientFlows, StressFlows, PeriodicFlows)
 
 
 class AugmentedModel:
@@ -67,10 +70,10 @@ class AugmentedModel:
         fitted: Batch | None = None,
     ):
         self.declared = declared
-        parts = fitted.parts if isinstance(fitted, MixedBatch) else (fitted,)
-        self._room = next((part.room for part in parts if isinstance(part, RunBatch)), None)
+        transients = None if fitted is None else fitted.transients
+        self._room = None if transients is None else transients.room
         self._last_weights: tuple[Any, float, Any] | None = None
-        self._laid_out: list[tuple[RunBatch, list[RunBatch]]] = []
+        self._laid_out: list[tuple[TransientFlows, Records, list[_Piece]]] = []
         names = {effect.name for effect in effects}
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
@@ -224,43 +227,38 @@ class AugmentedModel:
         self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the predicted records of any number of parameter vectors."""
-        if not isinstance(batch, MixedBatch):
-            return self._of_part(thetas, batch)
         out = np.zeros((len(thetas), *batch.recorded.shape))
-        for rows, part in zip(batch.rows, batch.parts, strict=True):
-            found = self._of_rows(thetas, batch, part)
+        for i, rows in enumerate(batch.rows):
+            found = self._of_part(thetas, batch, i)
             out[:, rows, : found.shape[2]] = found
         return out
 
-    def _of_rows(
-        self, thetas, batch: Batch, part: Part | OscillationBatch
+    def _of_part(
+        self, thetas, batch: Batch, number: int, limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials rows n"]:
         """Return the records that a part of a batch holds, in the order of its rows."""
-        found = self._of_part(thetas, part)
-        if isinstance(batch, MixedBatch) and isinstance(part, OscillationBatch):
-            return _of_sweeps(found, batch.moduli)
-        return found
-
-    def _of_part(
-        self, thetas, part: Part | OscillationBatch, limits: Iterable[float] | None = None
-    ) -> Float[np.ndarray, "trials runs *columns"]:
-        if not isinstance(part, RunBatch) or self._room is None:
-            return self._of_piece(thetas, part, limits)
-        runs, samples = part.recorded.shape
-        found = [self._of_piece(thetas, piece, limits) for piece in self._in_room(part)]
+        part = batch.parts[number]
+        if isinstance(part, PeriodicFlows):
+            return _of_sweeps(self._of_piece(thetas, (part, None)), batch.moduli)
+        if not isinstance(part, TransientFlows):
+            return self._of_piece(thetas, (part, None))
+        pieces = self._pieces(part, batch, batch.rows[number])
+        found = [self._of_piece(thetas, piece, limits) for piece in pieces]
+        runs, samples = part.sample_index.shape
         return np.concatenate(found, axis=1)[:, :runs, :samples]
 
     def _of_piece(
-        self, thetas, part: Part | OscillationBatch, limits: Iterable[float] | None
+        self, thetas, piece: "_Piece", limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials runs *columns"]:
-        program = self._program
+        program, (part, judging) = self._program, piece
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial
             used = program.in_use(theta)
             weights = self._weights(theta, part)
             limit = np.float64(limit if program.is_judged_by_modes(theta) else np.inf)
-            return np.asarray(program.predict(self._numbers, used, theta, part, weights, limit))
+            found = program.predict(self._numbers, used, theta, part, judging, weights, limit)
+            return np.asarray(found)
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         trials = zip(thetas, repeat(np.inf, len(thetas)) if limits is None else limits, strict=True)
@@ -268,7 +266,7 @@ class AugmentedModel:
         program.met.add(shape)
         return np.stack(found)
 
-    def _weights(self, theta: np.ndarray, part: Part | OscillationBatch):
+    def _weights(self, theta: np.ndarray, part: Flows):
         """Return the weights of the steps, computed once for trials of the same times."""
         known = self._last_weights
         if known is None or known[0] is not part or known[1] != theta[1]:
@@ -276,15 +274,20 @@ class AugmentedModel:
             self._last_weights = known
         return known[2]
 
-    def _in_room(self, part: RunBatch) -> list[RunBatch]:
-        """Return runs in the room of the fitted ones, laid out once."""
-        assert self._room is not None
-        for known, laid_out in self._laid_out:
-            if known is part:
-                return laid_out
-        laid_out = part.laid_out(self._room)
-        self._laid_out.append((part, laid_out))
-        return laid_out
+    def _pieces(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> list["_Piece"]:
+        """Return runs, and what judges them, in the room of the fitted ones, laid out once."""
+        for known, records, pieces in self._laid_out:
+            if known is part and records is batch.records:
+                return pieces
+        inside = [part] if self._room is None else part.laid_out(self._room)
+        judging, pieces = batch.records.of_runs(rows, part.room.samples), []
+        for flows in inside:
+            size = flows.room
+            pieces.append((flows, judging.padded(size.runs, size.samples)))
+            judging = judging.of_runs(range(size.runs, len(judging)))
+        self._laid_out.append((part, batch.records, pieces))
+        del self._laid_out[:-_KEPT]
+        return pieces
 
     def residuals(
         self,
@@ -306,53 +309,32 @@ class AugmentedModel:
             quickly predicted, asked about the others, of which a periodic state takes a hundred
             times as long as a steady one.
         """
-        recorded, weight = np.asarray(batch.recorded), np.asarray(batch.weight)
-        if limits is not None and isinstance(batch, RunBatch):
-            off = (self._of_part(thetas, batch, limits) - recorded) * weight
-            with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
-                sums = np.sum(off**2, axis=(1, 2))
-            off[~(sums < limits)] = np.inf
-            return off
-        if limits is None or not isinstance(batch, MixedBatch):
-            predicted = self.predictions(thetas, batch)
-            off = (predicted - recorded) * weight
-            return _with_factors(off, predicted * weight, batch, range(len(weight)))
+        if limits is None:
+            return batch.records.residual(self.predictions(thetas, batch))
         vectors = np.asarray(thetas, dtype=float)
-        out = np.zeros((len(vectors), *recorded.shape))
+        out = np.zeros((len(vectors), *batch.recorded.shape))
         sums = np.zeros(len(vectors))
-        parts = zip(batch.rows, batch.parts, strict=True)
-        for rows, part in sorted(parts, key=lambda one: _BY_SPEED.index(type(one[1]))):
+        # a factor may lessen what a loading leaves on the way
+        ahead = np.inf if batch.records.loadings is not None else 1.0
+        for i in sorted(
+            range(len(batch.parts)), key=lambda i: _BY_SPEED.index(type(batch.parts[i]))
+        ):
             asked = np.flatnonzero(sums < limits)
             if not len(asked):
                 break
-            found = self._of_rows(vectors[asked], batch, part)
-            at = np.ix_(rows, range(found.shape[2]))
-            off = (found - recorded[at]) * weight[at]
-            off = _with_factors(off, found * weight[at], batch, rows)
-            out[np.ix_(asked.tolist(), rows, range(found.shape[2]))] = off
+            left = ahead * (limits[asked] - sums[asked])
+            found = self._of_part(vectors[asked], batch, i, left)
+            rows, n = batch.rows[i], found.shape[2]
+            off = batch.records.of_runs(rows, n).residual(found)
+            out[np.ix_(asked.tolist(), rows, range(n))] = off
             with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
                 sums[asked] += np.sum(off**2, axis=(1, 2))
         out[~(sums < limits)] = np.inf  # what is not a number among them
         return out
 
-    def factors(
-        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
-    ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
-        """Return factors of loadings less one, and their precisions; see `Loadings.factors`."""
-        assert isinstance(batch, MixedBatch)
-        assert batch.loadings is not None
-        predicted = self.predictions(thetas, batch)
-        recorded, weight = np.asarray(batch.recorded), np.asarray(batch.weight)
-        return batch.loadings.factors((predicted - recorded) * weight, predicted * weight)
 
-
-def _with_factors(
-    residual: np.ndarray, predicted: np.ndarray, batch: Batch, rows: Sequence[int]
-) -> np.ndarray:
-    """Return weighted residuals of rows of a batch, with the factors of its loadings if any."""
-    if not isinstance(batch, MixedBatch) or batch.loadings is None:
-        return residual
-    return batch.loadings.whitened(residual, predicted, rows)
+_Piece = tuple[Flows, Records | None]
+"""Flows that a program follows at once, and what judges them on the way."""
 
 
 def _of_sweeps(

@@ -18,11 +18,12 @@ from discover.effects import (
 )
 from discover.forward.added_terms import AddedTerms, InUse
 from discover.forward.batches import (
-    OscillationBatch,
-    Part,
-    RunBatch,
-    SteadyBatch,
-    StressBatch,
+    Flows,
+    PeriodicFlows,
+    Records,
+    SteadyFlows,
+    StressFlows,
+    TransientFlows,
 )
 from discover.forward.by_mode import DEGREE, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series, declared_weights
@@ -104,12 +105,12 @@ class Program:
     def _values(self, theta, effect):
         return theta[self.slices[effect.name]]
 
-    def weights(self, numbers: Numbers, theta: np.ndarray, runs: Part | OscillationBatch):
+    def weights(self, numbers: Numbers, theta: np.ndarray, runs: Flows):
         """Return the weights of all steps that trials of the same times share; None of few modes.
 
         None too where the law's own constants decide how a mode relaxes.
         """
-        if not isinstance(runs, RunBatch) or len(numbers.modulus) < _MANY_MODES:
+        if not isinstance(runs, TransientFlows) or len(numbers.modulus) < _MANY_MODES:
             return None
         if numbers.law.retracts:
             return None
@@ -124,29 +125,40 @@ class Program:
         return not any(theta[self.slices[effect.name].start] for effect in after)
 
     def _predict_all(
-        self, numbers, used, theta, runs: Part | OscillationBatch, weights=None, limit=np.inf
+        self, numbers, used, theta, runs: Flows, records: Records | None, weights, limit
     ):
-        if isinstance(runs, OscillationBatch):
+        if isinstance(runs, PeriodicFlows):
             return self._predict_moduli(numbers, used, theta, runs)
-        if isinstance(runs, RunBatch):
+        if isinstance(runs, TransientFlows):
             # of all runs, so that a step that is padding in each of them is not taken
             steps = jnp.max(runs.last_step)
+            assert records is not None  # of transients alone
             of_run = jax.vmap(
                 self._predict_transient,
-                in_axes=(None, None, None, 0, None, 0, None),
+                in_axes=(None, None, None, 0, 0, None, 0, None),
                 axis_name=RUNS,
             )
-            return of_run(numbers, used, theta, runs, steps, weights, limit)
+            return of_run(numbers, used, theta, runs, records, steps, weights, limit)
         return jax.vmap(self._predict_run, in_axes=(None, None, None, 0))(
             numbers, used, theta, runs
         )
 
-    def _predict_run(self, numbers, used, theta, run: SteadyBatch | StressBatch):
-        if isinstance(run, SteadyBatch):
+    def _predict_run(self, numbers, used, theta, run: SteadyFlows | StressFlows):
+        if isinstance(run, SteadyFlows):
             return self._predict_steady_states(numbers, used, theta, run)
         return self._predict_strain(numbers, used, theta, run)
 
-    def _predict_transient(self, numbers, used, theta, run: RunBatch, steps, weights, limit):
+    def _predict_transient(
+        self,
+        numbers,
+        used,
+        theta,
+        run: TransientFlows,
+        judging: Records,
+        steps,
+        weights,
+        limit,
+    ):
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -173,8 +185,8 @@ class Program:
         # as it is where `is_judged_by_modes`, which is where there is a limit
         beside = self._beside(numbers, theta, rate[::2], flow)
         nothing = jnp.zeros_like(times)
-        weight = nothing.at[run.sample_index].add(run.weight)
-        recorded = nothing.at[run.sample_index].add(run.recorded)
+        weight = nothing.at[run.sample_index].add(judging.weight)
+        recorded = nothing.at[run.sample_index].add(judging.recorded)
         judged = Judged(weight, recorded, beside, limit)
         stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
         stress = stress + self._beside(numbers, theta, felt, flow)
@@ -183,7 +195,7 @@ class Program:
             stress = self._as_recorded(theta, effect, record, flow)
         return stress[run.sample_index]
 
-    def _predict_steady_states(self, numbers, used, theta, run: SteadyBatch):
+    def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
         flow = run.kinematics
         places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
         rate = run.rate
@@ -202,7 +214,7 @@ class Program:
                 stress = self._as_recorded(theta, effect, record, flow)
         return stress
 
-    def _predict_moduli(self, numbers, used, theta, states: OscillationBatch):
+    def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
         places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
         commanded = states.frequency * states.strain
         rates = commanded
@@ -250,7 +262,7 @@ class Program:
         )
         return first_harmonic(0.5 * (there - back), phase) / strain
 
-    def _predict_strain(self, numbers, used, theta, run: StressBatch):
+    def _predict_strain(self, numbers, used, theta, run: StressFlows):
         flow = run.kinematics
         dynamics = self._dynamics(numbers, used, theta, flow)
         imposed, inertia = run.imposed, jnp.zeros(())

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import RunBatch, make_batch
+from discover.forward.batches import TransientFlows, make_batch
 from discover.forward.declared import DeclaredModel
 from discover.forward.least_squares import Fit, gauss_newton_step
 from discover.protocols.rate_steps import steps_between_samples
@@ -74,14 +74,15 @@ def with_own_instants(
         return list(runs)
     # a factor on the whole record dates no step
     batch = make_batch([replace(runs[i], loading=None) for i in rows])
-    assert isinstance(batch, RunBatch)  # only a given rate steps
-    assert batch.steps is not None
+    (flows,) = batch.parts
+    assert isinstance(flows, TransientFlows)  # only a given rate steps
+    assert flows.steps is not None
     sources = np.unique([runs[i].source for i in rows], return_inverse=True)[1]
-    free = np.asarray(batch.steps.place) < 0
-    share = np.array(batch.steps.share)
+    free = np.asarray(flows.steps.place) < 0
+    share = np.array(flows.steps.share)
 
     def residual(share: np.ndarray) -> np.ndarray:
-        moved = eqx.tree_at(lambda b: b.steps.share, batch, jnp.asarray(share))
+        moved = eqx.tree_at(lambda b: b.parts[0].steps.share, batch, jnp.asarray(share))
         return model.residuals([theta], moved)[0]
 
     left = residual(share)

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.forward import AugmentedModel, Batch, as_predicted, even, loadings_of
+from discover.forward import AugmentedModel, Batch, even
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts
 from discover.statistics.noise.outliers import stray
@@ -28,7 +28,7 @@ def fitted_readings(
     """
     changes = _of_moduli(model, batch, fit.theta)
     columns = fit.jacobian
-    if loadings_of(batch) is not None:
+    if batch.records.loadings is not None:
         columns = _with_factors(model, batch, fit.theta, fit.free)
     return _readings(batch, runs, fit.residual, columns, *changes)
 
@@ -38,7 +38,7 @@ def unseen_readings(
 ) -> list[Reading]:
     """Return runs that no fit saw for the same question, as these parameters predict them."""
     residual = model.residuals([theta], batch)
-    if loadings_of(batch) is None:
+    if batch.records.loadings is None:
         columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
     else:
         columns = _with_factors(model, batch, theta, fit.free)
@@ -76,14 +76,12 @@ def _with_factors(
     model: AugmentedModel, batch: Batch, theta: np.ndarray, free: Sequence[int]
 ) -> Float[np.ndarray, "columns runs n"]:
     """Return changes of the weighted predictions by constants, and by factors of the loadings."""
-    own, plain = loadings_of(batch), as_predicted(batch)
+    own, plain = batch.records.loadings, batch.without_factors()
     assert own is not None
     residual = model.residuals([theta], plain)
     columns = jacobians(model, plain, [theta], residual, [free])[0]
-    predicted = residual[0] + np.asarray(batch.recorded) * np.asarray(batch.weight)
-    factors = np.zeros((len(own.rows), *predicted.shape))
-    for i, rows in enumerate(own.rows):
-        factors[i, [*rows]] = predicted[[*rows]]
+    predicted = residual[0] + batch.recorded * batch.weight
+    factors = np.where(np.asarray(own.members)[..., None], predicted, 0.0)
     return np.concatenate([columns, factors])
 
 

@@ -12,7 +12,7 @@ from discover.closed_loop.judging import misread_runs
 from discover.dataset import Dataset, Run
 from discover.dataset.loading import Loading
 from discover.effects import make_effect
-from discover.forward import AugmentedModel, DeclaredModel, loadings_of, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, make_batch, names_of_loadings
 from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.report.loop.certainty import how_sure
@@ -180,9 +180,9 @@ def test_a_stress_that_was_imposed_has_no_loading(exact):
 def test_normal_stress_shares_the_loading_of_its_run(exact):
     data = data_of(exact, FACTORS, normal=True)
     runs = [run for own in data for run in (own, own.observing("N1"))]
-    batch = make_batch([replace(run, loading=Loading(0.03)) for run in runs])
-    own = loadings_of(batch)
-    assert own.names == tuple(FACTORS)
+    runs = [replace(run, loading=Loading(0.03)) for run in runs]
+    own = make_batch(runs).records.loadings
+    assert names_of_loadings(runs) == tuple(FACTORS)
     assert own.rows == ((0, 1), (2, 3), (4, 5), (6, 7))
 
 

@@ -61,7 +61,7 @@ def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
 
 
 def test_longer_runs_stay_as_they_are():
-    small, large = make_batch(FEW), make_batch(MANY)
+    small, large = (make_batch(runs).transients for runs in (FEW, MANY))
     assert large.laid_out(small.room) == [large]
     assert [batch.room for batch in small.laid_out(large.room)] == [large.room]
 

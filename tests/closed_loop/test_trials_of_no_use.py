@@ -9,7 +9,7 @@ from discover.closed_loop.search.scoring.attribution import attribute
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches import OscillationBatch
+from discover.forward.batches import PeriodicFlows
 from discover.forward.least_squares import fit_batch
 from discover.protocols import oscillations, start_up
 from discover.protocols.control import steady_rates
@@ -51,10 +51,10 @@ def followed(monkeypatch, model):
     """Return a list to which the number of vectors is added whenever a sweep is followed."""
     counts, of_part = [], model._of_part
 
-    def counting(thetas, part, *limits):
-        if isinstance(part, OscillationBatch):
+    def counting(thetas, batch, number, *limits):
+        if isinstance(batch.parts[number], PeriodicFlows):
             counts.append(len(thetas))
-        return of_part(thetas, part, *limits)
+        return of_part(thetas, batch, number, *limits)
 
     monkeypatch.setattr(model, "_of_part", counting)
     return counts
@@ -123,8 +123,8 @@ def test_a_transient_is_left_where_it_misses_too_much(start_ups):
     costs = np.sum(model.residuals([right, maxwell], batch) ** 2, axis=(1, 2))
     assert costs[0] < 1e-6 < 1.0 < costs[1]
     limits = np.array([0.1, 0.1])
-    found = model._of_part([right, maxwell], batch, limits)
-    whole = model._of_part([right, maxwell], batch)
+    found = model._of_part([right, maxwell], batch, 0, limits)
+    whole = model._of_part([right, maxwell], batch, 0)
     np.testing.assert_array_equal(found[0], whole[0])
     # up to where it had missed too much as it was, and nothing from there on
     given_up = found[1, 1] == 0.0
@@ -138,8 +138,8 @@ def test_a_transient_whose_record_is_altered_afterwards_is_followed_to_the_end(s
     model, batch = start_ups
     theta = model.zero()
     theta[model.positions("stress_gain")[0]] = 1e-6
-    found = model._of_part([theta], batch, np.array([0.1]))
-    np.testing.assert_array_equal(found, model._of_part([theta], batch))
+    found = model._of_part([theta], batch, 0, np.array([0.1]))
+    np.testing.assert_array_equal(found, model._of_part([theta], batch, 0))
 
 
 def test_fits_to_transients_are_those_of_trials_followed_to_the_end(start_ups, monkeypatch):

@@ -7,8 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.forward import Records
 from discover.identify.rivals.evidence import compare_residuals
-from discover.learners.records import Records
 from discover.learners.tensor_sindy.search import SupportSearch
 
 N = 400

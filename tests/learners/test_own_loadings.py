@@ -12,7 +12,8 @@ from scipy.optimize import minimize_scalar
 import discover as dc
 from discover.dataset import Run
 from discover.dataset.loading import Loading
-from discover.learners.own_loadings import signals_of, with_likely_factors
+from discover.forward import make_records
+from discover.forward.batches import Loadings
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.learners.trajectories.problem import make_problem
 from discover.learners.trajectories.sensitivities import linearise
@@ -43,29 +44,28 @@ def test_what_is_left_is_the_least_over_all_factors_that_the_prior_allows():
     predicted = 5.0 + lot.standard_normal(40)
     recorded = 1.06 * predicted + 0.2 * lot.standard_normal(40)
     noise, deviation = 0.2, 0.03
-    told = with_likely_factors(
-        jnp.asarray(predicted[None] / noise),
-        jnp.asarray(recorded[None] / noise),
-        jnp.asarray([deviation**2]),
-    )
+    one = Loadings(np.ones((1, 1), bool), np.asarray(deviation), np.asarray([noise]))
+    told = one.whitened((predicted - recorded)[None], predicted[None])
 
     def penalised(f):
         off = ((1.0 + f) * predicted - recorded) / noise
         return float(off @ off) + f**2 / deviation**2
 
     best = minimize_scalar(penalised, bracket=(-0.1, 0.1)).fun
-    left = float(np.sum((np.asarray(told)[0] - recorded / noise) ** 2))
+    left = float(np.sum(np.asarray(told) ** 2)) / noise**2
     assert left == pytest.approx(best, rel=1e-9)
     # without a factor far more is left
     assert np.sum(((predicted - recorded) / noise) ** 2) > 2.0 * left
 
 
 def test_runs_of_one_loading_have_no_factor():
-    assert signals_of(runs_of(FACTORS, loading=None), np.ones(4)) is None
+    assert make_records(runs_of(FACTORS, loading=None), len(TIMES), "run").loadings is None
     some = [replace(runs_of({0.5: 1.0})[0], loading=None), *runs_of({1.0: 1.0})]
-    first, second = np.asarray(signals_of(some, np.ones(2)))
-    assert first == 0.0
-    assert second > 0.0
+    records = make_records(some, len(TIMES), "run").of_one_kind()
+    left = records.residual(1.01 * records.recorded)
+    whole = records.without_factors().residual(1.01 * records.recorded)
+    assert left[0] == pytest.approx(whole[0], abs=1e-15)
+    assert np.sum(left[1] ** 2) < 0.5 * np.sum(whole[1] ** 2)
 
 
 def test_sensitivities_are_those_with_the_factors_let_go():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -78,8 +79,28 @@ def test_all_judge_the_same_records_by_the_same_weights_beside_a_solvent_too():
     of_loop = np.asarray(make_batch(runs).weight)[:, :20] / np.sqrt(len(runs))
     np.testing.assert_allclose(of_loop, weight, rtol=1e-14)
     np.testing.assert_array_equal(of_network.recorded, of_sparse.recorded[:, :20, 0])
-    own = [np.asarray(records.loading) for records in (of_network, of_sparse)]
-    np.testing.assert_allclose(*own, rtol=1e-14)
+
+
+def test_all_leave_the_same_of_the_same_predictions_where_runs_have_loadings_of_their_own():
+    up, _, normal, curve = of_every_kind(20)[:4]
+    own = Loading(0.05)
+    runs = [replace(up, loading=own), replace(normal, loading=own), curve]
+    of_sparse, of_network, _ = of_both_learners(runs)
+    n = of_network.weight.shape[1]
+    predicted = 1.04 * np.asarray(of_network.recorded)
+    left = np.asarray(of_network.residual(jnp.asarray(predicted)))
+    of_loop = make_batch(runs).records.residual(predicted[:, : max(map(len, runs))])
+    np.testing.assert_allclose(
+        of_loop / np.sqrt(len(runs)), left[:, : of_loop.shape[1]], rtol=1e-12
+    )
+    padded = np.zeros(of_sparse.recorded.shape)
+    padded[:, :n, 0] = predicted
+    np.testing.assert_allclose(of_sparse.residual(jnp.asarray(padded))[:, :n, 0], left, rtol=1e-12)
+    # negative control: without a loading of its own the first misses by far more, and the flow
+    # curve by as much
+    alone = np.asarray(of_network.without_factors().residual(jnp.asarray(predicted)))
+    assert np.sum(alone[0] ** 2) > 1.5 * np.sum(left[0] ** 2)
+    np.testing.assert_array_equal(alone[2], left[2])
 
 
 def test_a_network_counts_runs_alike_and_sparse_regression_values():

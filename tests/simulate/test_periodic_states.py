@@ -9,7 +9,7 @@ from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches import OscillationBatch
+from discover.forward.batches import PeriodicFlows
 from discover.protocols import oscillations, start_up
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3
@@ -135,7 +135,7 @@ def test_a_sweep_beside_a_transient_is_predicted_as_alone_and_both_moduli_at_onc
     model = AugmentedModel(GIESEKUS, [])
     storage, loss = sweep().records
     batch = make_batch([loss, start, storage])
-    assert [len(part.strain) for part in batch.parts if isinstance(part, OscillationBatch)] == [4]
+    assert [len(part.strain) for part in batch.parts if isinstance(part, PeriodicFlows)] == [4]
     together = model.predict(model.zero(), batch)
     plain = predicted(GIESEKUS, sweep())
     np.testing.assert_allclose(together[[2, 0], :4], [plain.real, plain.imag], rtol=1e-12)

@@ -123,7 +123,10 @@ def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
         critical, (build_up, slowness * build_up), 2.0 / 3.0, share, by_stress=False,
         in_modulus=False, modulus=100.0, relaxation_time=TIME, mobility=0.2,
     ).respond(RECORD, TIMES).sigma12  # fmt: skip
-    assert batch.times.shape[1] // 2 < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
+    assert (
+        batch.transients.times.shape[1] // 2
+        < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
+    )
     # of second order in time at the jump: tests/effects/test_structure.py
     np.testing.assert_allclose(
         model.predict(theta, batch)[0], exact, atol=2e-3 * np.max(np.abs(exact))

@@ -26,7 +26,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.dataset import Run
-from discover.forward import AugmentedModel, Batch, deviation_of_loadings, make_batch
+from discover.forward import AugmentedModel, Batch, make_batch
 from discover.identify.design.next_experiment import MOST_EVIDENCE, squared_distance
 from discover.statistics.projection import rms
 from discover.statistics.residual import summarise
@@ -69,7 +69,7 @@ def next_tests(
     noise = max(judgement.left.noise, left)
     longest = float(np.max(np.asarray(model.declared.relaxation_time)))
     tests = possible_tests(runs, longest)
-    loading = deviation_of_loadings(batch)
+    loading = batch.records.deviation_of_loadings
     predicted = _predicted(model, varied, make_batch([t.run for t in tests])) if tests else []
     found = [
         _expected_of(

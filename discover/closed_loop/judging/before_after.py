@@ -9,7 +9,7 @@ from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.errors import InputError
-from discover.forward import AugmentedModel, Batch, as_loaded
+from discover.forward import AugmentedModel, Batch
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
 from discover.statistics.projection import rms
@@ -83,7 +83,7 @@ def record_runs(
     """
     predictions = model.predictions(thetas, batch)
     if not held_out:
-        predictions = as_loaded(predictions, batch)
+        predictions = batch.records.as_loaded(predictions)
     records = []
     for i, run in enumerate(runs):
         predicted = predictions[:, i, : len(run)]

@@ -8,8 +8,6 @@ far worse than all together describe it.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from discover.closed_loop.judging.held_out import unseen_rows
@@ -103,8 +101,7 @@ def leave_out_in_turn(problem: FitProblem, fit: Fit, runs: Sequence[Run]) -> lis
     for rows in groups:
         weight = problem.weight.copy()
         weight[rows] = 0.0
-        batch = eqx.tree_at(lambda b: b.weight, problem.batch, jnp.asarray(weight))
-        rest = replace(problem, batch=batch)
+        rest = replace(problem, batch=problem.batch.weighing(weight))
         other = rest.fit(fit.theta, fit.free)
         error, agreement = _of_rows(problem, rest, other, rows) if other.usable else (np.inf, 0.0)
         # a residual is as much larger as its run weighs more

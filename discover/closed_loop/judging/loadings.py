@@ -11,7 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.judging.judgement import Judgement
-from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
+from discover.dataset import Run
+from discover.forward import AugmentedModel, Batch, names_of_loadings
 from discover.forward.fit_uncertainty import uncertainty
 from discover.forward.least_squares import Fit, widths_of
 from discover.forward.modulus_errors import modulus_shifts, response
@@ -21,7 +22,11 @@ from discover.statistics.reading.loadings import ADVICE, LoadingFound, as_too_fa
 
 
 def factors_of_loadings(
-    model: AugmentedModel, fitted: tuple[Batch, Fit], batch: Batch, held_out: bool
+    model: AugmentedModel,
+    fitted: tuple[Batch, Fit],
+    batch: Batch,
+    runs: Sequence[Run],
+    held_out: bool = False,
 ) -> list[LoadingFound]:
     """Return the factors of the loadings of some runs; none where they have none.
 
@@ -29,18 +34,18 @@ def factors_of_loadings(
     ----------
     model, fitted
         The model, and the fitted runs with the fit that predicts.
-    batch, held_out
-        Runs, and whether the fit did not see them.
+    batch, runs, held_out
+        The records, of each one run, and whether the fit did not see them.
     """
-    own, fit = loadings_of(batch), fitted[1]
-    if own is None or not fit.usable:
+    fit = fitted[1]
+    if batch.records.loadings is None or not fit.usable:
         return []
     trials, widths = [fit.theta], widths_of(model, fit.theta, fit.free)
     for position, width in zip(fit.free, widths, strict=True):
         moved = fit.theta.copy()
         moved[position] += width
         trials.append(moved)
-    factors, precision = model.factors(trials, batch)
+    factors, precision = batch.records.factors(model.predictions(trials, batch))
     if not np.all(np.isfinite(factors)):
         return []
     best, size = factors[0], precision[0]
@@ -52,7 +57,7 @@ def factors_of_loadings(
         covariance, quantile = uncertainty(fitted[0], fit.residual, fit.jacobian)
         by_constants = np.einsum("ik,ij,jk->k", slopes, covariance, slopes)
         by_constants += _by_moduli(model, fitted, batch, slopes)
-    loading = own.deviation**2
+    loading = batch.records.deviation_of_loadings**2
     shrunk = loading / (loading + by_noise)
     half = quantile * np.sqrt(shrunk * by_noise + shrunk**2 * np.maximum(by_constants, 0.0))
     # what constants leave open of a run that they were fitted to is in them already
@@ -60,7 +65,7 @@ def factors_of_loadings(
     return [
         LoadingFound(name, held_out, 1.0 + f, (1.0 + f - h, 1.0 + f + h), abs(raw) / deviation)
         for name, f, h, raw, deviation in zip(
-            own.names,
+            names_of_loadings(runs),
             (shrunk * best).tolist(),
             half.tolist(),
             best.tolist(),
@@ -101,7 +106,7 @@ def _excess(
     model: AugmentedModel, theta: np.ndarray, batch: Batch
 ) -> Float[np.ndarray, " loadings"]:
     """Return the variance of the mean of what is left of each loading, over what was assumed."""
-    own = loadings_of(batch)
+    own = batch.records.loadings
     assert own is not None
     residual = model.residuals([theta], batch)[0]
     found = []
@@ -123,12 +128,12 @@ def _by_moduli(
     slopes: Float[np.ndarray, "free loadings"],
 ) -> Float[np.ndarray, " loadings"]:
     """Return the variance of factors by errors of moduli, as a sweep leaves them."""
-    fit, own = fitted[1], loadings_of(batch)
+    fit, own = fitted[1], batch.records.loadings
     shifts = modulus_shifts(model, fit.theta, fitted[0])
     assert own is not None
     if not len(shifts):
-        return np.zeros(len(own.rows))
+        return np.zeros(len(own.members))
     predicted = model.predictions([fit.theta], batch) * np.asarray(batch.weight)
-    raw = modulus_shifts(model, fit.theta, as_predicted(batch))
+    raw = modulus_shifts(model, fit.theta, batch.without_factors())
     direct = own.factors(raw, np.broadcast_to(predicted, raw.shape))[0]
     return np.sum((direct - response(fit.jacobian, shifts).T @ slopes) ** 2, axis=0)

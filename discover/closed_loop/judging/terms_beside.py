@@ -14,7 +14,7 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Run
 from discover.effects import AbstractEffect, simplest_terms
-from discover.forward import AugmentedModel, Batch, as_predicted
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import jacobians
 from discover.statistics.projection import rms, without
 from discover.statistics.reading.any_correlation import probability_over_correlations
@@ -98,7 +98,7 @@ def _of_terms(
     values[asked.instants] = theta[model.instants]
     for effect in effects:
         values[asked.positions(effect.name)] = theta[model.positions(effect.name)]
-    plain, weight = as_predicted(batch), np.asarray(batch.weight)
+    plain, weight = batch.without_factors(), np.asarray(batch.weight)
     positions = [asked.positions(term.name)[0] for term in terms]
     changes = jacobians(asked, plain, [values], asked.residuals([values], plain), [positions])[0]
     rows = []

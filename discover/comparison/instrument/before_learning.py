@@ -5,8 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 from discover.comparison.instrument.free_constants import FreeConstants
@@ -127,7 +125,7 @@ class BeforeLearning:
         if np.count_nonzero(kept.any(axis=1)) < 2:
             return None
         # weights alone differ, so that the compiled program serves
-        batch = eqx.tree_at(lambda b: b.weight, self.batch, jnp.asarray(weight * kept))
+        batch = self.batch.weighing(weight * kept)
         fit = fit_batch(self._model, batch, [self.alone.theta], [self._constants.free])[0]
         return fit.theta if fit.usable else None
 

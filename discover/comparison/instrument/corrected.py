@@ -17,7 +17,7 @@ from jaxtyping import Float
 from discover.comparison.instrument.absorbed import ONLY_LOOP
 from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Record, SignalEffect
 from discover.errors import InputError
-from discover.forward import RunBatch, make_batch
+from discover.forward import TransientFlows, make_batch
 from discover.protocols.protocol import FlowProtocol
 from discover.study.data import StudyData
 
@@ -94,11 +94,11 @@ def corrected(
             "use discover close-loop."
         )
     # an instrument is the same, whatever the loading
-    batch = make_batch([replace(run, loading=None) for run in runs])
-    assert isinstance(batch, RunBatch)  # at a rate alone
+    (flows,) = make_batch([replace(run, loading=None) for run in runs]).parts
+    assert isinstance(flows, TransientFlows)  # at a rate alone
     values = [jnp.asarray(known.values, dtype=float) for known in effects]
     felt, gain, offset, missed = (
-        np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, batch)
+        np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, flows)
     )
     for known, row in zip(effects, missed, strict=True):
         if np.max(row) > _POINTWISE:
@@ -113,7 +113,7 @@ def corrected(
             found[run.name] = run
             continue
         n = len(run)
-        at = np.asarray(batch.sample_index)[i, :n]
+        at = np.asarray(flows.sample_index)[i, :n]
         one = InRecord(gain[i, at], offset[i, at])
         if np.any(one.gain <= 0.0):
             raise InputError(
@@ -124,12 +124,12 @@ def corrected(
         if run.quantity == "sigma12":  # what distorts the torque leaves the normal force alone
             made[run.name] = one
         if moves:
-            times = np.asarray(batch.times)[i]
+            times = np.asarray(flows.times)[i]
             last = 2 * int(at[-1]) + 1
             protocol = _felt_protocol(
                 run.protocol,
                 times[:last],
-                np.asarray(batch.commanded_rate)[i][:last],
+                np.asarray(flows.commanded_rate)[i][:last],
                 felt[i][:last],
             )
             rate = felt[i][::2][at]
@@ -142,13 +142,13 @@ def corrected(
 
 @lru_cache(maxsize=16)
 def _instrument(effects: tuple[AbstractEffect, ...]) -> Any:
-    """Return the compiled function of the values of effects and of a batch of runs.
+    """Return the compiled function of the values of effects and of the flows of runs.
 
     It returns the felt rate on the half-step grid, gain and offset at step ends, and how far each
     effect is from acting on each stress by itself.
     """
 
-    def of_run(values, run: RunBatch):
+    def of_run(values, run: TransientFlows):
         clock = run.times / run.clock_factor
         rate = run.commanded_rate
         pairs = list(zip(effects, values, strict=True))

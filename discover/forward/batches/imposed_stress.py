@@ -7,14 +7,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
-from discover.forward.batches.samples import measured
 from discover.forward.grids.stress_grid import stress_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
 
 
-class StressBatch(eqx.Module):
+class StressFlows(eqx.Module):
     """Runs at a given stress on padded grids, with a leading axis of runs.
 
     Attributes
@@ -23,17 +22,13 @@ class StressBatch(eqx.Module):
         Step ends, shape (runs, s), in s.
     imposed
         Recorded stress there, in Pa.
-    recorded
-        Strain at the samples, shape (runs, n).
-    sample_index, weight, clock_factor, kinematics
-        As in `RunBatch`.
+    sample_index, clock_factor, kinematics
+        As in `TransientFlows`.
     """
 
     times: Float[Array, "runs s"]
     imposed: Float[Array, "runs s"]
     sample_index: Array
-    weight: Float[Array, "runs n"]
-    recorded: Float[Array, "runs n"]
     clock_factor: Float[Array, " runs"]
     kinematics: Kinematics | None = None
 
@@ -44,8 +39,8 @@ class StressBatch(eqx.Module):
         return float(np.max(ends))
 
 
-def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
-    """Return runs at a given stress as a batch."""
+def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressFlows:
+    """Return the flows of runs at a given stress."""
     grids = [stress_grid(run.protocol, run.time, strain_step) for run in runs]
     n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
     rows = []
@@ -54,10 +49,9 @@ def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressBatch:
         last = grid[-1] - grid[-2]
         padded = np.concatenate([grid, grid[-1] + last * np.arange(1, n_steps - len(grid) + 1)])
         imposed = shear_rates(run.protocol, padded)
-        weight, recorded = measured(run, n_samples)
         index = np.pad(index, (0, n_samples - len(run)), mode="edge")
-        rows.append((padded, imposed, index, weight, recorded, run.clock_factor))
+        rows.append((padded, imposed, index, run.clock_factor))
     columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
-    return StressBatch(
+    return StressFlows(
         *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
     )

@@ -9,13 +9,16 @@ not be fitted beside the constants: with the part of e along p made smaller,
 the squares of e' add up to the least of |(1 + f) p − y|² + f²/s² over f   [Seber & Wild 1989,
 Nonlinear Regression, ch. 5, for such a prior; Golub & Pereyra 1973, SIAM J. Numer. Anal. 10, 413,
 for what is linear in some parameters], and derivatives of e' are those of the others with f free.
+Along the record in place of the prediction this would be linear in p, but then a law that predicts
+less would leave less of the noise.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import TypeVar
 
+import equinox as eqx
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Bool, Float
 
 from discover.dataset import Run
 from discover.dataset.loading import Loading
@@ -30,51 +33,57 @@ sample to sample of few samples may be the flow, and a noise that is told too sm
 freer, and intervals wider."""
 
 
-@dataclass(frozen=True)
-class Loadings:
-    """Which rows of a batch share a loading, and how much their factors may differ.
+Values = TypeVar("Values", Array, np.ndarray)
+"""Arrays of JAX, where programs hold the records, or else of NumPy."""
+
+
+class Loadings(eqx.Module):
+    """Which rows of records share a loading, and how much their factors may differ.
 
     Attributes
     ----------
-    names, rows
-        Of each loading, and the rows of its records.
+    members
+        Whether a row is a record of a loading, shape (loadings, rows).
     deviation
         Standard deviation of the factors.
     noise
-        Standard deviation of the weighted residuals of each row that is noise.
+        Standard deviation of the weighted residuals of each row that is noise, shape (rows,).
     """
 
-    names: tuple[str, ...]
-    rows: tuple[tuple[int, ...], ...]
-    deviation: float
-    noise: tuple[float, ...]
+    members: Bool[Array | np.ndarray, "loadings rows"]
+    deviation: Float[Array | np.ndarray, ""]
+    noise: Float[Array | np.ndarray, " rows"]
+
+    @property
+    def rows(self) -> tuple[tuple[int, ...], ...]:
+        """The rows of each loading's records."""
+        return tuple(tuple(np.flatnonzero(own).tolist()) for own in np.asarray(self.members))
+
+    def of_rows(self, rows: Sequence[int]) -> "Loadings":
+        """Return the loadings of some rows; those of one loading are all there, or none."""
+        at = list(rows)
+        return Loadings(self.members[:, at], self.deviation, self.noise[at])
 
     def whitened(
         self,
-        residual: Float[np.ndarray, "trials rows n"],
-        predicted: Float[np.ndarray, "trials rows n"],
-        rows: Sequence[int],
-    ) -> Float[np.ndarray, "trials rows n"]:
+        residual: Float[Values, "*trials rows n"],
+        predicted: Float[Values, "*trials rows n"],
+    ) -> Float[Values, "*trials rows n"]:
         """Return weighted residuals with factors of their own, which the prior holds back.
 
         Parameters
         ----------
         residual, predicted
-            Predictions minus records, and predictions, both weighted.
-        rows
-            Rows of the batch that they are; those of one loading are all there, or none.
+            Predictions minus records, and predictions, both weighted; arrays of NumPy or JAX.
         """
-        out = np.array(residual)
-        at = {row: i for i, row in enumerate(rows)}
-        for row in self.rows:
-            own = [at[one] for one in row if one in at]
-            if not own:
-                continue
-            along, size = self._along(residual[:, own], predicted[:, own], row)
-            with np.errstate(all="ignore"):  # a trial that ran away
-                share = share_of_factor(along, size, self.deviation**2)
-                out[:, own] = residual[:, own] - share[:, None, None] * predicted[:, own]
-        return out
+        along, size = self._along(residual, predicted)
+        with np.errstate(all="ignore"):  # a trial that ran away
+            signal = self.deviation**2
+            # what the likely factor takes, and no more where nothing is predicted
+            share = (1.0 - (1.0 + signal * size) ** -0.5) * along / (size + (size == 0.0))
+            # a loading whose runs ran away leaves the others as they are
+            own = _where(self.members, share[..., :, None]).sum(-2)
+            return residual - own[..., None] * predicted
 
     def factors(
         self,
@@ -83,55 +92,57 @@ class Loadings:
     ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
         """Return the factors less one that fit best without the prior, and their precisions.
 
-        The precision is one over the variance by noise. Parameters as in `whitened`, of all rows.
+        The precision is one over the variance by noise. Parameters as in `whitened`.
         """
-        found = [self._along(residual[:, [*r]], predicted[:, [*r]], r) for r in self.rows]
-        along, size = (np.stack(column, axis=1) for column in zip(*found, strict=True))
+        along, size = self._along(residual, predicted)
         return -along / np.where(size > 0.0, size, 1.0), size
 
-    def _along(self, residual, predicted, rows: Sequence[int]):
-        noise = np.array([self.noise[row] for row in rows])[:, None]
+    def _along(self, residual, predicted):
+        """Return p·e and p·p of each loading, in units of the noise."""
         with np.errstate(all="ignore"):
-            along = np.sum(residual * predicted / noise**2, axis=(1, 2))
-            size = np.sum((predicted / noise) ** 2, axis=(1, 2))
-        return along, size
+            noise = self.noise[:, None]
+            along = (residual * predicted / noise**2).sum(-1)
+            size = ((predicted / noise) ** 2).sum(-1)
+            both = (_where(self.members, of[..., None, :]).sum(-1) for of in (along, size))
+            return tuple(both)
 
 
-def share_of_factor(along, size, signal):
-    """Return (1 − 1/√(1 + s² p·p)) p·e / p·p, by how many p the likely factor lessens e.
-
-    Parameters
-    ----------
-    along, size, signal
-        p·e, p·p and s², arrays of NumPy or JAX.
-    """
-    return (1.0 - (1.0 + signal * size) ** -0.5) * along / (size + (size == 0.0))
+def _where(chosen, values):
+    """Return values where they are chosen and zero elsewhere, of NumPy or JAX."""
+    return values.__array_namespace__().where(chosen, values, 0.0)
 
 
-def loadings(runs: Sequence[Run]) -> Loadings | None:
+def loadings(runs: Sequence[Run], unit: Float[np.ndarray, " runs"]) -> Loadings | None:
     """Return the loadings of runs; None where they are none of their own.
 
     What else was recorded of a run, and both moduli of a sweep, share its loading.
+
+    Parameters
+    ----------
+    runs
+        Of each record one.
+    unit
+        The norm of the weighted residuals of one that misses by all of its size, over the root of
+        the number of its samples, shape (runs,).
     """
-    told = [run.loading for run in runs]
-    deviations = {one.deviation for one in told if one is not None}
+    deviations = {run.loading.deviation for run in runs if run.loading is not None}
     if not deviations:
         return None
-    rows: dict[str, list[int]] = {}
-    for i, run in enumerate(runs):
-        if run.loading is not None:
-            rows.setdefault(run.source, []).append(i)
     (deviation,) = deviations
+    sources = np.array([run.source if run.loading is not None else "" for run in runs])
+    own = np.array(names_of_loadings(runs))
+    noise = [1.0 if (one := run.loading) is None else relative_noise(run, one) for run in runs]
+    told = np.array([run.loading is not None for run in runs])
     return Loadings(
-        tuple(rows), tuple(map(tuple, rows.values())), deviation, tuple(map(_noise_of, runs))
+        (sources == own[:, None]) & told,
+        np.asarray(deviation),
+        np.where(told, noise * unit, 1.0),
     )
 
 
-def _noise_of(run: Run) -> float:
-    """Return the standard deviation of a run's weighted residuals that is noise."""
-    if run.loading is None:
-        return 1.0
-    return relative_noise(run, run.loading) * run.weight / float(np.sqrt(len(run)))
+def names_of_loadings(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Return the name of each loading of some runs, in the order of `Loadings`."""
+    return tuple(dict.fromkeys(run.source for run in runs if run.loading is not None))
 
 
 def relative_noise(run: Run, loading: Loading) -> float:

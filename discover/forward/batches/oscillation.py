@@ -18,7 +18,7 @@ Places = tuple[int, tuple[int, ...]]
 """Of a run that is a modulus whether it is G′ (0) or G″ (1), and which states its samples are."""
 
 
-class OscillationBatch(eqx.Module):
+class PeriodicFlows(eqx.Module):
     """Periodic states, each of which is solved for by itself; both moduli of each are computed.
 
     Attributes
@@ -41,7 +41,7 @@ class OscillationBatch(eqx.Module):
 
 def oscillations(
     runs: Sequence[Run], strain_step: float
-) -> tuple[OscillationBatch, tuple[Places, ...]]:
+) -> tuple[PeriodicFlows, tuple[Places, ...]]:
     """Return the states of sweeps, and of each run which of them are its own."""
     # G′ and G″ of one sweep are computed together
     of_runs = [
@@ -56,4 +56,4 @@ def oscillations(
     )
     strain, frequency = states.T
     steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), strain_step) for one in strain]
-    return OscillationBatch(*map(on_device, (strain, frequency, np.array(steps)))), places
+    return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places

@@ -7,28 +7,22 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset import Run
-from discover.forward.batches.samples import measured
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
 
 
-class SteadyBatch(eqx.Module):
+class SteadyFlows(eqx.Module):
     """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate.
 
     Attributes
     ----------
     rate
         In 1/s, shape (runs, n).
-    weight
-        As in `RunBatch`: the squared residuals of a flow curve sum to the mean squared relative
-        deviation.
-    recorded, kinematics
-        As in `RunBatch`.
+    kinematics
+        As in `TransientFlows`.
     """
 
     rate: Float[Array, "runs n"]
-    weight: Float[Array, "runs n"]
-    recorded: Float[Array, "runs n"]
     kinematics: Kinematics | None = None
 
     @property
@@ -37,13 +31,10 @@ class SteadyBatch(eqx.Module):
         return 0.0
 
 
-def steady_states(runs: Sequence[Run]) -> SteadyBatch:
-    """Return flow curves as a batch."""
+def steady_states(runs: Sequence[Run]) -> SteadyFlows:
+    """Return the flows of flow curves."""
     n = max(len(run) for run in runs)
     # a padded sample is one more of the last
     rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
-    weights, recorded = zip(*(measured(run, n) for run in runs), strict=True)
-    columns = (on_device(np.stack(column)) for column in (rates, weights, recorded))
-    return SteadyBatch(
-        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
-    )
+    kinematics = stack_kinematics([run.protocol.kinematics for run in runs])
+    return SteadyFlows(on_device(np.stack(rates)), kinematics)

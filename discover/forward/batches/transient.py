@@ -12,7 +12,6 @@ from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
 from discover.forward.batches.rate_steps import RateSteps, rate_steps
-from discover.forward.batches.samples import measured
 from discover.forward.grids.grid import make_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import Kinematics, stack_kinematics
@@ -26,8 +25,8 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 _LONG, _GROWTH = 2000, 0.05
 
 
-class RunBatch(eqx.Module):
-    """Transients at a given rate on padded grids, with a leading axis of runs.
+class TransientFlows(eqx.Module):
+    """Flows at a given rate in time on padded grids, with a leading axis of runs.
 
     Attributes
     ----------
@@ -38,11 +37,6 @@ class RunBatch(eqx.Module):
         Rate there, in 1/s.
     sample_index
         Position of the samples among step ends, shape (runs, n).
-    weight
-        Of each sample, as `measured` returns it, zero at padding: the squared residuals of a run
-        that weighs as much as others sum to its squared relative error.
-    recorded
-        What was measured in Pa, shape (runs, n).
     clock_factor
         Shape (runs,).
     strain_before
@@ -63,8 +57,6 @@ class RunBatch(eqx.Module):
     times: Float[Array, "runs m"]
     commanded_rate: Float[Array, "runs m"]
     sample_index: Array
-    weight: Float[Array, "runs n"]
-    recorded: Float[Array, "runs n"]
     clock_factor: Float[Array, " runs"]
     strain_before: Float[Array, " runs"]
     cycle: Int[Array, "runs 2"]
@@ -88,7 +80,7 @@ class RunBatch(eqx.Module):
         steps = 0 if self.steps is None else self.steps.start.shape[1]
         return Room(runs, half_steps, self.sample_index.shape[1], steps)
 
-    def laid_out(self, room: "Room") -> list["RunBatch"]:
+    def laid_out(self, room: "Room") -> list["TransientFlows"]:
         """Return these runs padded to a room, in as many batches as they need.
 
         A run more is the last once more, and what is beyond a run's end is at rest. Runs too long
@@ -100,10 +92,10 @@ class RunBatch(eqx.Module):
         starts = range(0, own.runs, room.runs)
         return [self._at(slice(start, start + room.runs))._padded(room) for start in starts]
 
-    def _at(self, rows: slice) -> "RunBatch":
+    def _at(self, rows: slice) -> "TransientFlows":
         return jax.tree.map(lambda values: values[rows], self)
 
-    def _padded(self, room: "Room") -> "RunBatch":
+    def _padded(self, room: "Room") -> "TransientFlows":
         times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
         spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
         later = times[:, -1:] + spacing * np.arange(1, room.half_steps - times.shape[1] + 1)
@@ -114,18 +106,13 @@ class RunBatch(eqx.Module):
             times=on_device(np.concatenate([times, later], axis=1)),
             commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), room.half_steps),
             sample_index=_longer(self.sample_index, room.samples, "edge"),
-            weight=_longer(self.weight, room.samples),
-            recorded=_longer(self.recorded, room.samples),
             steps=self.steps and self.steps.padded(room.rate_steps),
         )
-        padded = jax.tree.map(lambda values: _more_runs(values, room.runs), longer)
-        # a run that is there once more is judged once
-        weight = padded.weight.at[len(rate) :].set(0.0)
-        return replace(padded, weight=weight)
+        return jax.tree.map(lambda values: _more_runs(values, room.runs), longer)
 
 
 class Room(NamedTuple):
-    """Sizes of the arrays of a batch: runs, half steps, samples and steps of the rate of each."""
+    """Sizes of the arrays of flows: runs, half steps, samples and steps of the rate of each."""
 
     runs: int
     half_steps: int
@@ -144,8 +131,8 @@ def _more_runs(values: ArrayLike, runs: int) -> Array:
     return on_device(np.pad(values, more, "edge"))
 
 
-def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
-    """Return runs at a given rate as a batch."""
+def transients(runs: Sequence[Run], strain_step: float) -> TransientFlows:
+    """Return the flows of runs at a given rate."""
     grids = []
     for run in runs:
         # a window may have cut the first samples off, but not what the instrument did by then
@@ -176,14 +163,11 @@ def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
         # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
         # that the slope of the rate at the last sample is the flow's own
         rate[half > grid[-1] + 1.01 * spacing] = 0.0
-        weight, recorded = measured(run, n_samples)
         rows.append(
             (
                 half,
                 rate,
                 np.pad(index, (0, n_samples - len(run)), mode="edge"),
-                weight,
-                recorded,
                 run.clock_factor,
                 run.strain_before,
                 np.asarray(cycle),
@@ -191,7 +175,7 @@ def transients(runs: Sequence[Run], strain_step: float) -> RunBatch:
             )
         )
     columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
-    return RunBatch(
+    return TransientFlows(
         *columns,
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
         steps=rate_steps(runs),

@@ -18,6 +18,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.run import Run
+from discover.forward import Records
 from discover.identify.exact.directions import Direction, weak_directions
 from discover.identify.exact.exact_series import compare_series
 from discover.identify.exact.relations import TermRelation, spell_briefly, term_relations
@@ -28,7 +29,6 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
-from discover.learners.records import Records
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.learners.trajectories.sensitivities import linearise
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of

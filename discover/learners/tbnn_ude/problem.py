@@ -10,12 +10,13 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.dataset.run import Run
+from discover.forward import Records
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
-from discover.learners.records import Records, laid_out
+from discover.learners.laid_out_runs import laid_out
 from discover.programs import on_device
 from discover.statistics.projection import rms
 
@@ -117,12 +118,12 @@ def make_problem(
     """
     law = UpperConvectedMaxwell(known_relaxation) if base is None else base
     known = Fluid(law, modulus, relaxation_time)
-    flows, records = laid_out(runs, known, runs_alike=True, strain_step=strain_step, **limits)
+    flows, records = laid_out(runs, known, mean="runs", strain_step=strain_step, **limits)
     own = [run.recorded if run.quantity in ("N1", "N2") else run.stress for run in runs]
     return TrainingProblem(
         flows,
         # what was recorded beside σ12 is not learned
-        Records(records.recorded[..., 0], records.weight[..., 0], records.loading),
+        records.of_one_kind(),
         on_device(np.array([rms(stress) for stress in own])),
         on_device(modulus),
         on_device(relaxation_time),

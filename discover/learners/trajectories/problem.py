@@ -9,11 +9,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.errors import InputError
+from discover.forward import Records
 from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
-from discover.learners.records import Records, laid_out
+from discover.learners.laid_out_runs import laid_out
 from discover.learners.runs import as_runs
 from discover.programs import on_device
 from discover.statistics import root_of

@@ -12,7 +12,7 @@ from discover.closed_loop.explanations.bands.growth import growth
 from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.held_out import root_of_covariance
-from discover.forward import AugmentedModel, Batch, as_predicted, loadings_of
+from discover.forward import AugmentedModel, Batch
 from discover.forward.least_squares import Fit, jacobians
 from discover.forward.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
@@ -62,7 +62,7 @@ def mixed_bands(
     at = carried[0].fit.theta
     # a run that no fit saw is predicted without the factor of its loading, which may be anything
     loaded = [_deviations(batch) if batch is not fitted else 0.0 for batch in batches]
-    batches = [batch if batch is fitted else as_predicted(batch) for batch in batches]
+    batches = [batch if batch is fitted else batch.without_factors() for batch in batches]
     shifts = modulus_shifts(model, at, fitted)
     moved = [shifts if b is fitted else modulus_shifts(model, at, b) for b in batches]
     tails = student.ppf(_TAILS[1], len(fitted.weight)) / ndtri(_TAILS[1]) if structured else 1.0
@@ -91,12 +91,10 @@ def mixed_bands(
 
 def _deviations(batch: Batch) -> Float[np.ndarray, "runs 1"]:
     """Return by how much the factor of each run may differ from one; zero where it has none."""
-    own = loadings_of(batch)
-    found = np.zeros((len(batch.weight), 1))
-    if own is not None:
-        for rows in own.rows:
-            found[[*rows]] = own.deviation
-    return found
+    own = batch.records.loadings
+    if own is None:
+        return np.zeros((len(batch.weight), 1))
+    return np.any(own.members, axis=0)[:, None] * batch.records.deviation_of_loadings
 
 
 def _distribution(

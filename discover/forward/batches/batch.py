@@ -1,0 +1,97 @@
+"""Runs laid out for prediction: the flows of each control, and what was recorded in all of them."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import equinox as eqx
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+from discover.forward.batches.imposed_stress import StressFlows, at_given_stress
+from discover.forward.batches.oscillation import PeriodicFlows, Places, oscillations
+from discover.forward.batches.records import Records, make_records
+from discover.forward.batches.steady import SteadyFlows, steady_states
+from discover.forward.batches.transient import TransientFlows, transients
+
+Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
+"""Flows of one control, which share one program; of all but oscillations one row for each run."""
+
+
+class Batch(eqx.Module):
+    """Runs of one control or several, each of which has a program of its own.
+
+    Attributes
+    ----------
+    parts, rows
+        The flows of each control, and which runs they are.
+    moduli
+        Of each run that is a modulus, which one, and where its states stand in their part.
+    records
+        Of all runs in their order, of one kind, in arrays of NumPy.
+    """
+
+    parts: tuple[Flows, ...]
+    rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    moduli: tuple[Places, ...] = eqx.field(static=True)
+    records: Records
+
+    @property
+    def weight(self) -> Float[np.ndarray, "runs n"]:
+        """Weights of what was recorded, zero at padding."""
+        return np.asarray(self.records.weight)
+
+    @property
+    def recorded(self) -> Float[np.ndarray, "runs n"]:
+        """What was recorded, in Pa or as a strain."""
+        return np.asarray(self.records.recorded)
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        return max(part.longest for part in self.parts)
+
+    @property
+    def transients(self) -> TransientFlows | None:
+        """The flows at a given rate in time; None where there are none."""
+        return next((part for part in self.parts if isinstance(part, TransientFlows)), None)
+
+    def weighing(self, weight: Float[np.ndarray, "runs n"]) -> "Batch":
+        """Return the same runs with other weights; they share the program."""
+        return replace(self, records=replace(self.records, weight=weight))
+
+    def without_factors(self) -> "Batch":
+        """Return a batch whose residuals are those of predictions, without factors of loadings."""
+        return replace(self, records=self.records.without_factors())
+
+
+def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
+    """Return runs as a batch.
+
+    Parameters
+    ----------
+    runs
+        Of each record one.
+    strain_step
+        Largest strain of a step.
+    """
+    controls = dict.fromkeys(run.protocol.control for run in runs)
+    rows = tuple(
+        tuple(i for i, run in enumerate(runs) if run.protocol.control == control)
+        for control in controls
+    )
+    moduli: tuple[Places, ...] = ()
+    parts: list[Flows] = []
+    for control, at in zip(controls, rows, strict=True):
+        own = [runs[i] for i in at]
+        if control == "oscillation":
+            part, moduli = oscillations(own, strain_step)
+        elif control == "steady":
+            part = steady_states(own)
+        elif control == "stress":
+            part = at_given_stress(own, strain_step)
+        else:
+            part = transients(own, strain_step)
+        parts.append(part)
+    records = make_records(runs, max(map(len, runs)), "run").of_one_kind()
+    return Batch(tuple(parts), rows, moduli, records)

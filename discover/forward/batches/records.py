@@ -1,0 +1,229 @@
+"""What was recorded in runs and what every value weighs: the misfit that all fits minimise.
+
+A residual is what is predicted minus what was recorded, times its weight. A weight is the run's own
+(`Run.weight`, or one of `Run.normal_weights`), over the size of the value (`Run.sizes`: the
+root-mean-square of a transient, in a flow curve or a sweep each value itself), over the root of the
+number of values that the mean is over. So where runs weigh alike the squares of the residuals add
+up to the mean squared relative misfit of each run, of all runs, or of all values; see `Mean`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Literal
+
+import equinox as eqx
+import jax
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from discover.dataset.run import Run
+from discover.forward.batches.loadings import Loadings, Values, loadings
+from discover.programs import on_device
+
+OBSERVED = ("recorded", "first_normal_stress_difference", "second_normal_stress_difference")
+"""What may be observed, in the order of the last axis: what is recorded, N1, N2."""
+
+Mean = Literal["run", "runs", "values"]
+"""What the squares of the residuals add up to: the sum over the runs of the mean of each, the mean
+of that over the runs, or the mean over all values."""
+
+
+class Records(eqx.Module):
+    """What was recorded in runs, and what every value weighs; arrays of NumPy or JAX.
+
+    Attributes
+    ----------
+    recorded
+        In Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is recorded,
+        N1 and N2, or (runs, n) of the first alone.
+    weight
+        Of each value, as above; zero where nothing was recorded or it is not looked at.
+    loadings
+        Which runs are loadings of their own; None where none is.
+    """
+
+    recorded: Float[Array | np.ndarray, "runs n *kinds"]
+    weight: Float[Array | np.ndarray, "runs n *kinds"]
+    loadings: Loadings | None = None
+
+    def only(self, keep: Bool[Array | np.ndarray, "*seen"]) -> "Records":
+        """Return the records of which only some runs or samples are looked at.
+
+        Parameters
+        ----------
+        keep
+            Which, shape (runs,) or (runs, n).
+        """
+        keep = keep.reshape(*keep.shape, *(1,) * (self.weight.ndim - keep.ndim))
+        return replace(self, weight=_looked_at(keep, self.weight))
+
+    def __len__(self) -> int:
+        return len(self.weight)
+
+    def of_runs(self, rows: Sequence[int], n: int | None = None) -> "Records":
+        """Return the records of some runs, and of these the first samples, in arrays of NumPy."""
+        at = list(rows)
+        own = None if self.loadings is None else self.loadings.of_rows(at)
+        return Records(self.recorded[at, :n], self.weight[at, :n], own)
+
+    def padded(self, runs: int, n: int) -> "Records":
+        """Return the records of the first runs, in arrays of JAX with zeros up to a size."""
+        some = (self.recorded[:runs], self.weight[:runs])
+        more = [(0, runs - len(some[0])), (0, n - some[0].shape[1])]
+        recorded, weight = (on_device(np.pad(values, more)) for values in some)
+        return Records(recorded, weight)
+
+    def of_one_kind(self) -> "Records":
+        """Return the records of the first kind alone, without an axis of kinds."""
+        return replace(self, recorded=self.recorded[..., 0], weight=self.weight[..., 0])
+
+    def without_factors(self) -> "Records":
+        """Return the records as if all runs were of one loading."""
+        return replace(self, loadings=None)
+
+    def residual(
+        self, predicted: Float[Values, "*trials_and_records"]
+    ) -> Float[Values, "*trials_and_records"]:
+        """Return predictions minus records, weighted; zero where none is looked at.
+
+        Of runs that are loadings of their own what the factors of these leave.
+        """
+        seen = self.weight > 0
+        off = _looked_at(seen, self.weight * (predicted - self.recorded))
+        if self.loadings is None:
+            return off
+        # one loading has one factor, on all that was recorded of it
+        rows = (*predicted.shape[: predicted.ndim - self.weight.ndim], len(self.weight), -1)
+        weighted = _looked_at(seen, self.weight * predicted)
+        left = self.loadings.whitened(off.reshape(rows), weighted.reshape(rows))
+        return left.reshape(off.shape)
+
+    def weighted(self, predicted: Float[Array, "runs n *kinds"]) -> Float[Array, "runs n *kinds"]:
+        """Return weighted predictions, in units of the records; zero where none is looked at.
+
+        Of runs that are loadings of their own with the factors that their records suggest.
+        """
+        return self.residual(predicted) + self.weight * self.recorded
+
+    def linearised(
+        self,
+        predicted: Float[Array, "runs n *kinds"],
+        columns: Float[Array, "runs n *kinds p"],
+    ) -> tuple[Float[Array, "runs n *kinds"], Float[Array, "runs n *kinds p"]]:
+        """Return the residual and its derivatives, of predictions and theirs."""
+        if self.loadings is None:
+            weight = self.weight[..., None]
+            change = _looked_at(weight > 0, weight * columns)
+            return self.residual(predicted), change
+        residual, change = jax.linearize(self.residual, predicted)
+        return residual, jax.vmap(change, in_axes=-1, out_axes=-1)(columns)
+
+    def factors(
+        self, predicted: Float[np.ndarray, "trials runs n"]
+    ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
+        """Return factors of loadings less one, and their precisions; see `Loadings.factors`."""
+        assert self.loadings is not None
+        weight, recorded = np.asarray(self.weight), np.asarray(self.recorded)
+        return self.loadings.factors(weight * (predicted - recorded), weight * predicted)
+
+    def as_loaded(
+        self, predicted: Float[np.ndarray, "trials runs n"]
+    ) -> Float[np.ndarray, "trials runs n"]:
+        """Return predictions with the likeliest factors of their loadings, if there are any."""
+        if self.loadings is None:
+            return predicted
+        factors, precision = self.factors(predicted)
+        prior = self.loadings.deviation**2
+        factors = factors * prior * precision / (1.0 + prior * precision)
+        of_run = np.where(self.loadings.members, factors[..., None], 0.0).sum(-2)
+        return predicted * (1.0 + of_run)[..., None]
+
+    @property
+    def deviation_of_loadings(self) -> float:
+        """Standard deviation of the factors of loadings; zero where there are none."""
+        return 0.0 if self.loadings is None else float(self.loadings.deviation)
+
+    @property
+    def seen(self) -> Bool[np.ndarray, "runs n *kinds"]:
+        """Whether a value was recorded and is looked at."""
+        return np.asarray(self.weight) > 0
+
+    @property
+    def weighted_record(self) -> Float[np.ndarray, " rows"]:
+        """What was recorded, times its weight, in one vector."""
+        return np.asarray(self.weight * self.recorded).reshape(-1)
+
+    @property
+    def n_observations(self) -> int:
+        """Number of values recorded."""
+        return int(np.sum(self.seen))
+
+    @property
+    def run_of_row(self) -> Int[np.ndarray, " rows"]:
+        """Run to which each row of the flattened records belongs."""
+        runs = len(self.recorded)
+        return np.repeat(np.arange(runs), self.recorded.size // runs)
+
+    def sequences(self) -> list[np.ndarray]:
+        """Return the rows of each run and kind, in the order of time, of records of three kinds."""
+        seen = self.seen
+        runs, _, kinds = seen.shape
+        rows = np.arange(seen.size).reshape(seen.shape)
+        sequences = [rows[i, seen[i, :, k], k] for i in range(runs) for k in range(kinds)]
+        return [sequence for sequence in sequences if sequence.size]
+
+
+def make_records(runs: Sequence[Run], n: int, mean: Mean, kinds: int = 1) -> Records:
+    """Return what was recorded in runs, of three kinds, in arrays of NumPy.
+
+    Parameters
+    ----------
+    runs
+        Any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
+        stress difference.
+    n
+        Samples of each, with padding.
+    mean
+        What the squares of the residuals add up to.
+    kinds
+        How many of `OBSERVED`, where measured, are looked at.
+    """
+    recorded = np.zeros((len(runs), n, len(OBSERVED)))
+    weight, size = np.zeros_like(recorded), np.ones_like(recorded)
+    for i, run in enumerate(runs):
+        share = (run.weight, *run.normal_weights)
+        for kind, name in enumerate(OBSERVED[:kinds]):
+            values = getattr(run, name)
+            if values is None or (kind and not np.any(values)):
+                continue
+            recorded[i, : len(run), kind] = values
+            size[i, : len(run), kind] = run.sizes(values)
+            weight[i, : len(run), kind] = share[kind]
+    values_of = np.sum(weight > 0, axis=(1, 2))
+    over = {
+        "run": values_of,
+        "runs": values_of * len(runs),
+        "values": np.full(len(runs), np.sum(values_of)),
+    }
+    root = np.sqrt(np.maximum(over[mean], 1))
+    units = np.array([run.weight for run in runs]) / root
+    return Records(recorded, weight / (size * root[:, None, None]), loadings(runs, units))
+
+
+def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+    """Return by what values of one run are divided so that their noise has one size.
+
+    Ones but for a flow curve or a sweep, whose noise is in proportion to it.
+
+    Parameters
+    ----------
+    weight
+        Of its samples, without padding.
+    """
+    least = float(np.min(weight))
+    return least / weight if np.ptp(weight) > 1e-9 * least else np.ones_like(weight)
+
+
+def _looked_at(seen: Any, values: Any) -> Any:
+    """Return values where they are looked at and zero elsewhere, of NumPy or JAX."""
+    return values.__array_namespace__().where(seen, values, 0.0)
