@@ -28,7 +28,7 @@ def main() -> None:
     import jax.numpy as jnp
     import optimistix
 
-    from discover.forward.least_squares import fit_batch
+    from discover.inference.least_squares import fit_batch
 
     model, batch = with_all_candidates()
     starts, free = [], []

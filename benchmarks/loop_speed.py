@@ -84,7 +84,7 @@ def main() -> None:
     from discover.effects import make_effect
     from discover.forward.augmented_model import AugmentedModel
     from discover.forward.batches import data_scales, make_batch
-    from discover.forward.least_squares import fit_batch
+    from discover.inference.least_squares import fit_batch
     from discover.laws import Fluid, make_law
     from discover.simulate import simulate
 

@@ -8,7 +8,7 @@ from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunR
 from discover.closed_loop.results.next_test import NextTest, NextTests
 from discover.closed_loop.results.stages import Stage
 from discover.forward import DeclaredModel
-from discover.inference.constants import StageParameter
+from discover.inference.by_mode.constants import StageParameter
 
 __all__ = [
     "CandidateScore",

@@ -17,9 +17,9 @@ from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.effects import AbstractEffect, LibraryTerm, ModeEffect
 from discover.forward import AugmentedModel
 from discover.forward.declared import may_differ_by_mode
-from discover.forward.least_squares import Fit
-from discover.inference.degrees import Degree
+from discover.inference.by_mode.degrees import Degree
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem, effect_of
 
 _STEPS = (-1.0, 1.0)

@@ -29,16 +29,16 @@ from discover.dataset import Run
 from discover.dataset.records.coarse_rates import CoarseRates
 from discover.dataset.records.repeats import repeats_among
 from discover.forward import AugmentedModel, Batch, make_batch
-from discover.forward.fit_uncertainty import intervals
-from discover.forward.least_squares import Fit
-from discover.forward.modulus_errors import modulus_shifts
-from discover.forward.step_instants import with_own_instants
-from discover.inference.by_mode import constants_by_mode
-from discover.inference.constants import ConstantByMode
+from discover.inference.by_mode.as_fitted import constants_by_mode
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.varying_constant import freer_fits
+from discover.inference.fit_uncertainty import intervals
+from discover.inference.least_squares import Fit
+from discover.inference.modulus_errors import modulus_shifts
 from discover.inference.profile import profiled
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.inference.small_faults import with_small_faults
-from discover.inference.varying_constant import freer_fits
+from discover.inference.step_instants import with_own_instants
 from discover.statistics.reading.loadings import LoadingFound
 from discover.statistics.reading.misread import Misread, not_ruled_out
 from discover.statistics.reading.reading_faults import Reading

@@ -18,8 +18,8 @@ from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import AugmentedLaw, Equation, NamedPart, StatePart, law_parts
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch, DeclaredModel
-from discover.forward.least_squares import Fit
-from discover.inference.constants import ConstantByMode, StageParameter, ToldTogether
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter, ToldTogether
+from discover.inference.least_squares import Fit
 from discover.inference.told_together import product_or_ratio
 from discover.laws import LAWS, Fluid
 from discover.laws.each_mode import with_modes

@@ -20,9 +20,9 @@ from discover.closed_loop.runs import all_at_a_rate_in_shear
 from discover.closed_loop.search import Search
 from discover.dataset import Run
 from discover.forward import Batch
-from discover.forward.fit_uncertainty import covariance_and_noise
-from discover.forward.least_squares import gauss_newton_step, jacobians, room_of
 from discover.inference.evidence import INDISTINGUISHABLE, WINDOW, criterion
+from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.least_squares import gauss_newton_step, jacobians, room_of
 from discover.statistics.residual import judged_cost, summarise
 
 KNOTS = (6, 14)

@@ -32,9 +32,9 @@ from discover.effects.free_function import (
     spline_basis,
 )
 from discover.forward import AugmentedModel, Batch, data_scales
-from discover.forward.fit_uncertainty import covariance_and_noise
-from discover.forward.least_squares import Fit, fit_batch
 from discover.inference.evidence import INDISTINGUISHABLE, criterion
+from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.least_squares import Fit, fit_batch
 from discover.statistics.residual import judged_cost, summarise
 
 _VALUES = 2 * (INTERVALS + 1)

@@ -21,10 +21,10 @@ from discover.forward import (
     data_scales,
     make_batch,
 )
-from discover.forward.least_squares import Fit, fit_batch
-from discover.forward.step_instants import with_own_instants
 from discover.inference.evidence import BARE_MENTION, criterion
+from discover.inference.least_squares import Fit, fit_batch
 from discover.inference.problem import effect_of
+from discover.inference.step_instants import with_own_instants
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise

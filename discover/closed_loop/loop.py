@@ -51,9 +51,9 @@ from discover.dataset.records.own_loadings import with_loadings
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.forward.scattered_rates import smoothed, unfelt_scatter
-from discover.forward.step_instants import instants_found, with_places
-from discover.inference.degrees import lowest_not_refuted
+from discover.inference.by_mode.degrees import lowest_not_refuted
+from discover.inference.scattered_rates import smoothed, unfelt_scatter
+from discover.inference.step_instants import instants_found, with_places
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics.residual import summarise
 

@@ -11,15 +11,15 @@ from dataclasses import replace
 from discover.closed_loop.search import Search
 from discover.effects import AbstractEffect, make_effect
 from discover.forward import AugmentedModel
-from discover.forward.fit_uncertainty import intervals
-from discover.forward.least_squares import Fit, Prior
-from discover.forward.modulus_errors import modulus_shifts
-from discover.inference.by_mode import constants_by_mode
-from discover.inference.constants import ConstantByMode, ModeConstant
-from discover.inference.degrees import Degree, choose_degrees
-from discover.inference.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
+from discover.inference.by_mode.as_fitted import constants_by_mode
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
+from discover.inference.by_mode.degrees import Degree, choose_degrees
+from discover.inference.by_mode.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
+from discover.inference.by_mode.varying_constant import freer_fits
+from discover.inference.fit_uncertainty import intervals
+from discover.inference.least_squares import Fit, Prior
+from discover.inference.modulus_errors import modulus_shifts
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.varying_constant import freer_fits
 
 
 def modes_apart(

@@ -11,7 +11,7 @@ from discover.dataset.records.spikes import without_spikes
 from discover.dataset.records.thinning import thin_run
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.forward.step_instants import with_rate_steps
+from discover.inference.step_instants import with_rate_steps
 from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
 

@@ -24,8 +24,8 @@ from discover.dataset import Run
 from discover.effects import BY_MODE, AbstractEffect, make_effect
 from discover.forward import AugmentedModel, Batch, DeclaredModel, data_scales, make_batch
 from discover.forward.declared import may_differ_by_mode
-from discover.inference.constants import ConstantByMode
-from discover.inference.degrees import one_degree_more
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.degrees import one_degree_more
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.problem import effect_of
 from discover.statistics.residual import Expectation

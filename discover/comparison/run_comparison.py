@@ -25,7 +25,7 @@ from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.dataset import Dataset
 from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
-from discover.forward.scattered_rates import smoothed, unfelt_scatter
+from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.multimode import Fluid
 from discover.learners.results.result import LearnerResult
 from discover.linear_algebra_threads import in_one_thread

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.residual import judged_cost
 
 INDISTINGUISHABLE = 6.0

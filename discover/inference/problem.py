@@ -9,8 +9,8 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
 from discover.inference.evidence import criterion, evidence
+from discover.inference.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation, judged_cost, summarise

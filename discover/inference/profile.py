@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import Fit
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 Bounds = Mapping[int, tuple[float, float]]

@@ -11,8 +11,8 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, even
-from discover.forward.least_squares import Fit, jacobians
-from discover.forward.modulus_errors import modulus_shifts
+from discover.inference.least_squares import Fit, jacobians
+from discover.inference.modulus_errors import modulus_shifts
 from discover.statistics.noise.outliers import stray
 from discover.statistics.reading.reading_faults import Reading
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.reading.small_faults import Allowance
 
 

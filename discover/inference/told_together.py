@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward import Batch
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import Fit
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import Fit
 
 _FAR = np.log(10.0)
 """How far both go, in logarithms, for what they have in common to be worth a word."""

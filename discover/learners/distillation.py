@@ -9,12 +9,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
+from discover.inference.least_squares.tangents import RUNAWAY, by_differentiation, descend
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
@@ -29,6 +29,7 @@ from discover.protocols.paper import (
 from discover.protocols.protocol import FlowProtocol, in_flow, stack_protocols, start_up
 from discover.simulate.solve import SimulationError, simulate
 
+_TOLERANCE, _MOST_STEPS = 1e-10, 200
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
 
 # slower than any Maxwell mode with the teacher's times can bear for ever
@@ -128,22 +129,19 @@ class _Lesson(eqx.Module):
         stress = jax.vmap(solve)(self.protocols, self.grids)[..., 3] / jnp.sum(self.modulus)
         difference = (stress - self.target) / jnp.sqrt(1.0 * self.target.shape[1])
         # a trial that runs away is an increase, which the solver rejects
-        difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, 1e3)
+        difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, RUNAWAY)
         return difference, jnp.sqrt(kappa) * jnp.sqrt(jnp.abs(parameters))
 
 
 @compiled
 def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
-    solution = optx.least_squares(
-        lambda f, args: args[0].residual(f, args[1]),
-        optx.LevenbergMarquardt(rtol=1e-10, atol=1e-12),
-        free,
-        args=(lesson, kappa),
-        options={"jac": "fwd"},
-        max_steps=200,
-        throw=False,
-    )
-    return solution.value, lesson.residual(solution.value, kappa)[0]
+    def residual(moved, args):
+        lesson, kappa = args
+        difference, penalty = lesson.residual(moved, kappa)
+        return jnp.concatenate([difference.reshape(-1), penalty])
+
+    found, _ = descend(by_differentiation(residual), free, (lesson, kappa), _TOLERANCE, _MOST_STEPS)
+    return found, lesson.residual(found, kappa)[0]
 
 
 @in_one_thread

@@ -24,7 +24,7 @@ from discover.equations import (
 from discover.equations import Tested as Where
 from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.read import read_result_laws
-from discover.inference.constants import ConstantByMode, ModeConstant
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from tensor_library import LawTerm
 

@@ -7,7 +7,7 @@ from discover.closed_loop import DeclaredModel, run_loop
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.scoring.refitting import Choice, aliases_of
 from discover.dataset import Dataset, Run
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols import start_up
 
 NO_FIT = Fit(np.zeros(1), (), np.zeros((1, 1)), np.zeros((0, 1, 1)))

@@ -7,7 +7,7 @@ from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.inference.problem import FitProblem
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up

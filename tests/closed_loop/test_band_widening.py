@@ -9,7 +9,7 @@ from discover.closed_loop.explanations.bands.widening import widening
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.protocols import start_up
 
 MODULUS, TIME, SAMPLES, NOISE = 100.0, 1.0, 100, 0.01

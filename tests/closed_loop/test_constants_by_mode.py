@@ -17,9 +17,9 @@ from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, FreeParameter, make_batch
 from discover.forward.by_mode import DEGREE
-from discover.forward.least_squares import Fit
-from discover.inference.by_mode import _at_upper_end
-from discover.inference.varying_constant import VaryingConstant
+from discover.inference.by_mode.as_fitted import _at_upper_end
+from discover.inference.by_mode.varying_constant import VaryingConstant
+from discover.inference.least_squares import Fit
 from discover.protocols import in_flow, start_up
 from discover.report.plots.by_mode import by_mode_picture
 

@@ -9,13 +9,13 @@ from modes_in_start_up import noisy_start_ups
 
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.fit_uncertainty import intervals
 from discover.inference import degrees as of_degrees
-from discover.inference.by_mode import constants_by_mode
-from discover.inference.degrees import FREE, Degree, choose_degrees, one_degree_more
-from discover.inference.draws_by_mode import draw_constants
+from discover.inference.by_mode.as_fitted import constants_by_mode
+from discover.inference.by_mode.degrees import FREE, Degree, choose_degrees, one_degree_more
+from discover.inference.by_mode.draws import draw_constants
+from discover.inference.by_mode.varying_constant import freer_fits
+from discover.inference.fit_uncertainty import intervals
 from discover.inference.problem import FitProblem
-from discover.inference.varying_constant import freer_fits
 
 pytestmark = pytest.mark.usefixtures("optimised")
 

@@ -15,7 +15,7 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.effects.base import EffectParameter, SignalEffect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.inference.problem import FitProblem
 from discover.laws import Fluid, Giesekus
 from discover.protocols import oscillatory_shear, shear_rates, start_up

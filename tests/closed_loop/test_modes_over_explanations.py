@@ -11,8 +11,8 @@ from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.dataset import Dataset, Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel
-from discover.forward.least_squares import Fit
-from discover.inference.constants import ConstantByMode, ModeConstant
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
+from discover.inference.least_squares import Fit
 
 MODULI, TIMES, EPSILONS, SLIP = (200.0, 100.0), (0.3, 3.0), (0.1, 0.3), 0.15
 SAMPLES = np.geomspace(0.02, 15.0, 50)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from discover.inference.constants import ConstantByMode, ModeConstant
-from discover.inference.degrees import lowest_not_refuted
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
+from discover.inference.by_mode.degrees import lowest_not_refuted
 from discover.report.plots.by_mode import by_mode_sentence
 
 

@@ -17,7 +17,7 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.search.moves.exchanging import exchange_for_alias
 from discover.closed_loop.search.moves.one_law import put_one_law_in_place
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.step_instants import with_places
+from discover.inference.step_instants import with_places
 from discover.statistics.residual import Expectation
 
 

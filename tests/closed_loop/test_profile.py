@@ -16,8 +16,8 @@ import discover as dc
 from discover.closed_loop import DeclaredModel
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.fit_uncertainty import intervals
-from discover.inference.constants import StageParameter
+from discover.inference.by_mode.constants import StageParameter
+from discover.inference.fit_uncertainty import intervals
 from discover.inference.problem import FitProblem
 from discover.inference.profile import profiled
 from discover.report.loop.verdict import loop_verdict

@@ -8,7 +8,7 @@ from independent.flow import Flow
 from discover.dataset import Run
 from discover.effects import simplest_terms
 from discover.forward import DeclaredModel, scattered_rates
-from discover.forward.scattered_rates import smoothed, unfelt_scatter
+from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.registry import make_law
 from discover.protocols import sampled_rate
 from discover.protocols import start_up as commanded

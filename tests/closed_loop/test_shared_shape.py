@@ -8,7 +8,7 @@ from discover.closed_loop import DeclaredModel
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
-from discover.forward.step_instants import with_places, with_rate_steps
+from discover.inference.step_instants import with_places, with_rate_steps
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate

@@ -8,7 +8,7 @@ from discover.closed_loop import DeclaredModel
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.protocols import oscillatory_shear, shear_rates, start_up
 
 MODULUS, TIME = 100.0, 1.0

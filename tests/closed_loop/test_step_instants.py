@@ -16,7 +16,7 @@ from independent.instruments import Instrument
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.batches.rate_steps import RateSteps
-from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
+from discover.inference.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.report.loop.verdict import loop_verdict
 
 pytestmark = pytest.mark.usefixtures("effects_alone")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 
 _TIMES = 0.1 * np.arange(1, 11)
 _Y = np.array(

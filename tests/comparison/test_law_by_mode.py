@@ -30,8 +30,8 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Dataset, Run
 from discover.dataset.loading import Loading
 from discover.effects import make_effect
-from discover.inference.constants import ConstantByMode
-from discover.inference.draws_by_mode import ConstantsDrawn
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.draws import ConstantsDrawn
 from discover.laws import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm

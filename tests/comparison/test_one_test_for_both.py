@@ -14,7 +14,7 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols import start_up
 from discover.protocols.control import steady_rates
 from discover.statistics.residual import Expectation

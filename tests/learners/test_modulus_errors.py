@@ -11,10 +11,10 @@ import discover as dc
 from discover.comparison.fitting import training
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.fit_uncertainty import intervals
-from discover.forward.least_squares import fit_batch
-from discover.forward.modulus_errors import modulus_shifts
 from discover.identify.side_by_side.many_laws import Contender, draws
+from discover.inference.fit_uncertainty import intervals
+from discover.inference.least_squares import fit_batch
+from discover.inference.modulus_errors import modulus_shifts
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.refit import refit

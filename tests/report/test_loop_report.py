@@ -13,7 +13,7 @@ from discover.closed_loop.results.explanation import Explanation, Explanations
 from discover.closed_loop.results.loop_result import ErrorPair, LoopResult, RunRecord
 from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
-from discover.inference.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.report.loop import report
 from discover.report.loop.report import write_loop
 from discover.report.loop.tables import explanations, noise_range

@@ -14,8 +14,8 @@ from discover.closed_loop.search import Search
 from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.closed_loop.search.scoring.physical_range import at_an_end
 from discover.closed_loop.search.seen_sets import SeenSet
-from discover.forward.least_squares import Fit
 from discover.inference.evidence import WINDOW
+from discover.inference.least_squares import Fit
 
 BEAM_WIDTH = 8
 """Explanations that are carried side by side, by default."""

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 DAMPING = "strain_damping"

@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.search import Search
-from discover.forward.least_squares import Fit, Prior
 from discover.inference.evidence import INDISTINGUISHABLE, WINDOW
+from discover.inference.least_squares import Fit, Prior
 from discover.statistics.reading.small_faults import WIDTHS
 from discover.words import percent_of
 

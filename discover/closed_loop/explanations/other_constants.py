@@ -20,8 +20,8 @@ from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.search import Search
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.inference.least_squares import Fit
 from discover.words import listed, percent_of
 
 FACTOR = "relaxation_time_factor"

@@ -15,7 +15,7 @@ from typing import Literal
 from discover.dataset import Run
 from discover.dataset.records.repeats import count_flows
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols.kinematics import STATES
 
 Untested = Literal["flows", "states"]

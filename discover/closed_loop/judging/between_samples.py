@@ -12,7 +12,7 @@ from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Run
 from discover.dataset.records.coarse_rates import CoarseRates, samples_a_cycle, worth_a_look
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols import unknown_between_samples
 from discover.statistics.residual import judging
 

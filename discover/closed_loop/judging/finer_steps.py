@@ -10,7 +10,7 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect, SeriesElement
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, make_batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols import another_between_samples
 
 _STRAIN_STEP = 0.05

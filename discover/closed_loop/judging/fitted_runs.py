@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import STRUCTURE
 

@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel, Batch, even
-from discover.forward.fit_uncertainty import covariance_and_noise
-from discover.forward.least_squares import Fit, jacobians
+from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.least_squares import Fit, jacobians
 from discover.statistics import root_of
 from discover.statistics.unseen import Unseen
 

@@ -11,7 +11,7 @@ from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.judging.unseen_runs import what_unseen_runs_say
 from discover.closed_loop.results.run_record import RunRecord
 from discover.closed_loop.results.stages import Verdict
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.lack_of_fit import LackOfFit
 from discover.statistics.residual import FEWEST_FAST
 

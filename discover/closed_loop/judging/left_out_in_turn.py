@@ -14,7 +14,7 @@ from discover.closed_loop.judging.held_out import unseen_rows
 from discover.closed_loop.judging.judgement import Judgement
 from discover.dataset import Run
 from discover.dataset.records.repeats import repeated_tests
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 from discover.protocols.kinematics import STATES
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE

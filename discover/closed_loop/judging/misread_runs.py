@@ -13,7 +13,7 @@ import numpy as np
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.reading.misread import (
     POSSIBLE,
     Misread,

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from discover.closed_loop.judging.finer_steps import change_on_finer_steps
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.noise.converter_steps import step_of_converter
 from discover.statistics.projection import rms
 from discover.statistics.residual import judging

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics import holds_signal
 from discover.statistics.noise.dead_records import CHANCE
 from discover.statistics.residual import judged_cost, judging, summarise

@@ -15,7 +15,7 @@ from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Run
 from discover.effects import AbstractEffect, simplest_terms
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import jacobians
+from discover.inference.least_squares import jacobians
 from discover.statistics.projection import rms, without
 from discover.statistics.reading.any_correlation import probability_over_correlations
 from discover.statistics.reading.loadings import ADVICE

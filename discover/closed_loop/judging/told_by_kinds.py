@@ -8,8 +8,8 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import kind_of_record
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
-from discover.forward.fit_uncertainty import sequences_of
-from discover.forward.least_squares import Fit, jacobians
+from discover.inference.fit_uncertainty import sequences_of
+from discover.inference.least_squares import Fit, jacobians
 from discover.statistics import Sized, Told, told_by_tests
 
 

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
 from discover.forward import even
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.protocols.kinematics import STATES
 from discover.protocols.sampling import sampling_interval
 from discover.statistics.lack_of_fit import PATTERN, LackOfFit, what_is_left

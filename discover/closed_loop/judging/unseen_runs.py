@@ -9,7 +9,7 @@ from discover.closed_loop.judging.fitted_runs import FittedRuns
 from discover.closed_loop.judging.held_out import HeldOut
 from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.closed_loop.results.run_record import RunRecord
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.residual import FEWEST_FAST, STRUCTURE, summarise, tells_noise
 from discover.statistics.unseen import CARRIED, Unseen, refutes
 

@@ -36,7 +36,7 @@ from discover.equations import (
 from discover.equations.box import box_of, flow_numbers
 from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
-from discover.inference.constants import ConstantByMode, StageParameter
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.notebook_view import NotebookView, table_of

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from discover.closed_loop.results.error_pair import ErrorPair
-from discover.inference.constants import ConstantByMode, StageParameter, ToldTogether
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter, ToldTogether
 
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 

@@ -17,9 +17,9 @@ from discover.dataset.run_table import kind_of_record
 from discover.effects import AbstractEffect, ModeDependence
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior
-from discover.inference.degrees import choose_degrees, has_added_mode, positions_of
+from discover.inference.by_mode.degrees import choose_degrees, has_added_mode, positions_of
 from discover.inference.evidence import BARE_MENTION
+from discover.inference.least_squares import NO_PRIOR, Fit, Prior
 from discover.inference.problem import FitProblem
 
 _POLISHES = 5

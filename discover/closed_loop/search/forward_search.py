@@ -21,8 +21,8 @@ from discover.closed_loop.search.scoring.refitting import Choice, choose, prune
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import make_batch
-from discover.forward.fit_uncertainty import intervals
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.fit_uncertainty import intervals
 from discover.statistics import HALF_BAND
 from discover.statistics.residual import STRUCTURE
 

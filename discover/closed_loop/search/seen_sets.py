@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 from discover.statistics.residual import judged_cost
 
 

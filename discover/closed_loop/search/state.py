@@ -5,8 +5,8 @@ import numpy as np
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.closed_loop.search.seen_sets import SeenSets
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
-from discover.inference.degrees import Degree
+from discover.inference.by_mode.degrees import Degree
+from discover.inference.least_squares import Fit
 
 
 class SearchState:

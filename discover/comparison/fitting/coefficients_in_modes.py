@@ -14,7 +14,7 @@ from discover.comparison.fitting.other_law_of_a_mode import OtherLaws, other_law
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.constants import ConstantByMode
+from discover.inference.by_mode.constants import ConstantByMode
 from discover.inference.readings import fitted_readings
 from discover.learners import RecoveredTerm
 from discover.study.declared_model import DeclaredModel

@@ -7,16 +7,16 @@ from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, make_effect
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.fit_uncertainty import intervals
-from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.by_mode import constants_by_mode
-from discover.inference.constants import ConstantByMode
-from discover.inference.degrees import Degree, choose_degrees
-from discover.inference.draws_by_mode import draw_constants
+from discover.inference.by_mode.as_fitted import constants_by_mode
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.degrees import Degree, choose_degrees
+from discover.inference.by_mode.draws import draw_constants
+from discover.inference.by_mode.varying_constant import freer_fits
+from discover.inference.fit_uncertainty import intervals
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.small_faults import with_small_faults
-from discover.inference.varying_constant import freer_fits
 from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.reading.small_faults import small_faults
 from discover.study.declared_model import DeclaredModel

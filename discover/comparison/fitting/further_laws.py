@@ -14,7 +14,7 @@ from discover.comparison.outcomes.flows import (
 )
 from discover.dataset import Run
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_values
 from discover.learners.tensor_sindy.selection import extended_bic

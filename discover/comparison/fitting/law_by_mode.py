@@ -16,11 +16,11 @@ from discover.comparison.fitting.fits_by_mode import (
 from discover.comparison.outcomes.flows import QUANTITIES, Flow
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
-from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.constants import ConstantByMode
-from discover.inference.degrees import Degree, choose_degrees, one_degree_more
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.degrees import Degree, choose_degrees, one_degree_more
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 from discover.inference.readings import beside_one_another, fitted_readings, unseen_readings
 from discover.learners.tensor_sindy.rough_problem import enough_to_rank

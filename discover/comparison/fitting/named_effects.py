@@ -18,12 +18,12 @@ from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow
 from discover.dataset import Run
 from discover.effects import AbstractEffect, ConstitutiveEffect, KinematicEffect, named_effects
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import Fit, fit_batch, jacobians
-from discover.forward.modulus_errors import modulus_shifts, response
-from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.inference.evidence import WINDOW
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import Fit, fit_batch, jacobians
+from discover.inference.modulus_errors import modulus_shifts, response
 from discover.inference.problem import FitProblem, effect_of
+from discover.inference.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.protocols.protocol import recording
 from discover.statistics import LackOfFit, root_of
 from discover.statistics.projection import rms

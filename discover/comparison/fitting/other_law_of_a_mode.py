@@ -12,13 +12,13 @@ from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.degrees import Degree
-from discover.inference.draws_by_mode import ConstantsDrawn
-from discover.inference.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
+from discover.inference.by_mode.degrees import Degree
+from discover.inference.by_mode.draws import ConstantsDrawn
+from discover.inference.by_mode.other_law_of_a_mode import ONE_CONSTANT, laws_as_good
+from discover.inference.by_mode.varying_constant import varying_constants
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem, effect_of
-from discover.inference.varying_constant import varying_constants
 from discover.study.declared_model import DeclaredModel
 
 

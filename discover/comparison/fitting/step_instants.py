@@ -10,8 +10,8 @@ from discover.comparison.fitting.prepared import with_each_run
 from discover.dataset import Run
 from discover.effects import library_term
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
-from discover.forward.step_instants import with_own_instants, with_places, with_rate_steps
+from discover.inference.least_squares import fit_batch
+from discover.inference.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.statistics.residual import summarise
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model

@@ -11,7 +11,7 @@ from discover.effects import ConstitutiveEffect
 from discover.equations import AugmentedLaw
 from discover.identify.rivals.bands import PredictionBand, bands_of_predictions
 from discover.identify.side_by_side.many_laws import predict_laws
-from discover.inference.draws_by_mode import ConstantsDrawn
+from discover.inference.by_mode.draws import ConstantsDrawn
 from discover.laws.multimode import Fluid
 from discover.programs import in_threads, on_device
 

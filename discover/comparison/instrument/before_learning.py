@@ -11,7 +11,7 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.forward.least_squares import Fit, fit_batch
+from discover.inference.least_squares import Fit, fit_batch
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.shorter_holds import with_shorter_holds
 from discover.protocols import strains

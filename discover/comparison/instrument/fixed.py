@@ -7,7 +7,7 @@ from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.laws.registry import make_law
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 

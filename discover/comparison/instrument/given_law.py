@@ -12,9 +12,9 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch, data_scales
-from discover.forward.fit_uncertainty import intervals, sequences_of
-from discover.forward.least_squares import Fit, fit_batch
-from discover.forward.modulus_errors import modulus_shifts, response
+from discover.inference.fit_uncertainty import intervals, sequences_of
+from discover.inference.least_squares import Fit, fit_batch
+from discover.inference.modulus_errors import modulus_shifts, response
 from discover.laws.expansion import law_of_terms
 from discover.learners.results.result import LearnerResult
 from discover.statistics import least_squares_covariance, root_of

@@ -9,7 +9,7 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import jacobians
+from discover.inference.least_squares import jacobians
 
 _TWIN = 0.02
 """Share of a term's signature beyond those of the constants, below which the two are the same."""

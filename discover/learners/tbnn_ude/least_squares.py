@@ -6,11 +6,15 @@ from functools import partial
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax
 import numpy as np
-import optimistix
 from jaxtyping import Array, Float
 
+from discover.inference.least_squares.tangents import (
+    Linearised,
+    best_norm,
+    first_state,
+    next_state,
+)
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem
@@ -23,14 +27,6 @@ from discover.learners.tbnn_ude.variational import (
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.programs import compiled
 
-# Normal equations halve the digits, which is harmless here: the damping keeps them well
-# conditioned, and they cost a sixth of an orthogonal factorisation.
-_SOLVER = optimistix.LevenbergMarquardt(
-    rtol=1e-9, atol=1e-11, linear_solver=lineax.Normal(lineax.Cholesky())
-)
-# The solver's first damping is one. Residuals of relative size, by parameters in their own units,
-# have a curvature far below that: unscaled, every descent would begin as a slow gradient descent.
-_AMPLIFICATION = 30.0
 _PATIENCE = 4
 _LEAST_PROGRESS = 1e-3
 _MOST_REJECTED = 8
@@ -61,30 +57,6 @@ class Objective(eqx.Module):
     prior: PriorWeights
 
 
-class Linearised(eqx.Module):
-    """An objective and its derivative at one set of weights.
-
-    Attributes
-    ----------
-    weights
-        Where it was linearised.
-    rows
-        Data and prior as one vector of residuals, amplified.
-    matrix
-        Their derivative by every weight.
-    """
-
-    weights: Float[Array, " p"]
-    rows: Float[Array, " rows"]
-    matrix: Float[Array, "rows p"]
-
-    def __call__(
-        self, weights: Float[Array, " p"], _args=None
-    ) -> tuple[Float[Array, " rows"], None]:
-        """Return the residuals of the linear model: all of them, as optimistix takes them."""
-        return self.rows + self.matrix @ (weights - self.weights), None
-
-
 def linearise(
     weights: Float[Array, " p"], objective: Objective, integrate: Integrate = states_and_jacobian
 ) -> Linearised:
@@ -106,7 +78,7 @@ def _with_prior(weights, objective, along, jacobian):
 
     rows = jnp.concatenate([misses.ravel(), prior(weights)])
     matrix = jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
-    return Linearised(weights, _AMPLIFICATION * rows, _AMPLIFICATION * matrix)
+    return Linearised.of(weights, rows, matrix)
 
 
 class Stopping:
@@ -148,30 +120,6 @@ class Stopping:
         if self.pace is None or self.steps < _FAIR_STEPS:
             return False
         return not misfit < _FAR_BEHIND * self.pace[min(self.steps, len(self.pace)) - 1]
-
-
-@eqx.filter_jit
-def first_state(linearised: Linearised):
-    """Return the solver's state before the first step."""
-    rows, aux = eqx.filter_eval_shape(linearised, linearised.weights)
-    return _SOLVER.init(linearised, linearised.weights, None, {}, rows, aux, frozenset())
-
-
-@eqx.filter_jit
-def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
-    """Return the best weights and the solver's state after one more step.
-
-    Parameters
-    ----------
-    weights
-        The best weights so far.
-    linearised
-        The objective where the solver tries next, `state.y_eval`.
-    state
-        The solver's state.
-    """
-    weights, state, _ = _SOLVER.step(linearised, weights, None, {}, state, frozenset())
-    return weights, state
 
 
 def law_misfit(law: TensorBasisNetwork, problem: TrainingProblem) -> Float[Array, "runs n"]:
@@ -218,7 +166,7 @@ def minimise(
         if step:
             linearised = linearise(state.y_eval, objective, side_by_side)
         weights, state = next_state(weights, linearised, state)
-        misfit = norm_of_cost(float(state.f_info.as_min()))
+        misfit = best_norm(state)
         if np.isfinite(misfit):
             best = weights
         if callback is not None:
@@ -226,8 +174,3 @@ def minimise(
         if stopping.done(misfit):
             break
     return best
-
-
-def norm_of_cost(cost: float) -> float:
-    """Return the norm of residuals from half the sum of squares of the amplified ones."""
-    return float(np.sqrt(max(2.0 * cost, 0.0))) / _AMPLIFICATION

@@ -11,10 +11,9 @@ from typing import Any
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Float
 
-from discover.learners.trajectories.damped_steps import levenberg_marquardt
+from discover.inference.least_squares.tangents import bounded, descend
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled
@@ -22,10 +21,6 @@ from discover.programs import compiled
 _MOST_STEPS = 12
 _TOLERANCE = 1e-2
 """Of a mode, in widths of the prior: draws scatter by far more."""
-
-# As in the sparse learner's refits: the solver's first damping, one, is small beside the curvature.
-_AMPLIFICATION = 10.0
-_RUNAWAY = 1e3
 
 
 class _Layout(eqx.Module):
@@ -36,51 +31,22 @@ class _Layout(eqx.Module):
     precision: Array  # √n/σ
 
 
-def _rows(unit, layout: _Layout):
+def _linearise(unit, layout: _Layout):
+    """Return residuals of data and prior with their derivatives, and those of the data alone."""
     problem = layout.problem
     everything = jnp.arange(unit.shape[0])
     predicted, sensitivity = observe(problem, everything, layout.scale * unit, jnp.zeros(0))
     residual, columns = problem.records.linearised(predicted, sensitivity)
-    columns = columns * layout.scale
-    sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
-    # a constant residual of runaway size is an increase, which the solver rejects
-    residual = jnp.where(sane, residual, _RUNAWAY / jnp.sqrt(1.0 * residual.size)).reshape(-1)
-    columns = jnp.where(sane, columns, 0.0).reshape(residual.size, -1)
-    return residual, columns
-
-
-def _objective(residual, unit, layout):
-    return _AMPLIFICATION * jnp.concatenate([layout.precision * residual, unit])
-
-
-@eqx.filter_custom_jvp
-def _residual(unit, layout):
-    residual, columns = _rows(unit, layout)
-    return _objective(residual, unit, layout), (residual, columns)
-
-
-@_residual.def_jvp
-def _residual_jvp(primals, tangents):
-    unit, layout = primals
-    residual, columns = _rows(unit, layout)
-    change = _objective(columns @ tangents[0], tangents[0], layout)
-    # what is handed on beside the residual is never differentiated
-    still = (jnp.zeros_like(residual), jnp.zeros_like(columns))
-    return (_objective(residual, unit, layout), (residual, columns)), (change, still)
+    residual, columns, _ = bounded(residual, columns * layout.scale)
+    residual, columns = residual.reshape(-1), columns.reshape(residual.size, -1)
+    rows = jnp.concatenate([layout.precision * residual, unit])
+    slopes = jnp.concatenate([layout.precision * columns, jnp.eye(unit.size)])
+    return rows, slopes, (residual, columns)
 
 
 @compiled
 def _descend(layout: _Layout, start: Float[Array, " n"]):
-    solution = optx.least_squares(
-        _residual,
-        levenberg_marquardt(_TOLERANCE),
-        start,
-        args=layout,
-        has_aux=True,
-        max_steps=_MOST_STEPS,
-        throw=False,
-    )
-    return solution.value, solution.aux
+    return descend(_linearise, start, layout, _TOLERANCE, _MOST_STEPS)
 
 
 def mode(

@@ -7,10 +7,9 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jaxtyping import Array, Bool, Float
 
-from discover.learners.trajectories.damped_steps import levenberg_marquardt
+from discover.inference.least_squares.tangents import RUNAWAY, bounded, descend
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import observe
 from discover.programs import compiled, in_threads, on_device
@@ -23,11 +22,6 @@ SCREENING = 1e-3
 """Relative tolerance that ranks candidates."""
 POLISHING = 1e-9
 """Relative tolerance of reported coefficients."""
-
-# The residual is scaled so that the solver's first damping, one, is small beside the curvature of
-# a scaled parameter, which is of order one.
-_AMPLIFICATION = 10.0
-_RUNAWAY = 1e3  # relative misfit given to a trial that has no finite trajectory: always rejected
 
 
 @dataclass(frozen=True)
@@ -98,35 +92,20 @@ def free_from_inner(problem: TrajectoryProblem, inner: Float[np.ndarray, " m"]) 
     return np.log(fraction / (1.0 - fraction))
 
 
-def _residual_and_jacobian(parameters, problem: TrajectoryProblem, layout: _Layout):
+def _linearise(parameters, args: tuple[TrajectoryProblem, _Layout]):
+    """Return residual and derivatives of scaled parameters, and the prediction of all records."""
+    problem, layout = args
     q = layout.active.shape[0]
     scaled, free = parameters[:q], parameters[q:]
     inner, slope = jax.jvp(lambda u: inner_from_free(problem, u), (free,), (jnp.ones_like(free),))
     scale = jnp.where(layout.occupied, layout.scale, 0.0)
     predicted, sensitivity = observe(problem, layout.active, scale * scaled, inner)
     columns = sensitivity * jnp.concatenate([scale, slope])
-    residual, columns = problem.records.only(layout.keep).linearised(predicted, columns)
-    residual, columns = _AMPLIFICATION * residual, _AMPLIFICATION * columns
-    sane = jnp.all(jnp.isfinite(residual)) & jnp.all(jnp.isfinite(columns))
-    # A constant residual of runaway size is an increase, which the solver rejects.
-    size = _AMPLIFICATION * _RUNAWAY / jnp.sqrt(1.0 * residual.size)
-    everywhere = jnp.where(sane, problem.records.weighted(predicted), size)
-    residual = jnp.where(sane, residual, size)
-    columns = jnp.where(sane, columns, 0.0)
+    residual, columns, sane = bounded(
+        *problem.records.only(layout.keep).linearised(predicted, columns)
+    )
+    everywhere = jnp.where(sane, problem.records.weighted(predicted), residual)
     return residual.reshape(-1), columns.reshape(residual.size, -1), everywhere.reshape(-1)
-
-
-@eqx.filter_custom_jvp
-def _residual(parameters, problem, layout):
-    residual, _, everywhere = _residual_and_jacobian(parameters, problem, layout)
-    return residual, everywhere
-
-
-@_residual.def_jvp
-def _residual_jvp(primals, tangents):
-    residual, jacobian, everywhere = _residual_and_jacobian(*primals)
-    # the prediction is handed on beside the residual and never differentiated
-    return (residual, everywhere), (jacobian @ tangents[0], jnp.zeros_like(everywhere))
 
 
 @compiled
@@ -136,17 +115,7 @@ def _descend(
     start: Float[Array, " parameters"],
     tolerance: Float[Array, ""],
 ):
-    solution = optx.least_squares(
-        lambda parameters, args: _residual(parameters, *args),
-        # a traced tolerance, so that screening and polishing share one program
-        levenberg_marquardt(tolerance),
-        start,
-        args=(problem, layout),
-        has_aux=True,
-        max_steps=_MAX_STEPS,
-        throw=False,
-    )
-    return solution.value, solution.aux
+    return descend(_linearise, start, (problem, layout), tolerance, _MAX_STEPS)
 
 
 def _lay_out(problem: TrajectoryProblem, support, begin, scale, slots: int, keep):
@@ -169,7 +138,7 @@ def sum_of_squares(apart: Float[np.ndarray, " rows"]) -> float:
 
     A law may end finite and yet too large to be squared.
     """
-    return float(np.sum(np.clip(apart, -_RUNAWAY, _RUNAWAY) ** 2))
+    return float(np.sum(np.clip(apart, -RUNAWAY, RUNAWAY) ** 2))
 
 
 def refit(

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.inference.other_law_of_a_mode import other_laws_said
+from discover.inference.by_mode.other_law_of_a_mode import other_laws_said
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.loop.asked import (
     EXPLAINED,

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from discover.closed_loop.results.law_fit import LawFit
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.stages import Stage
-from discover.inference.constants import ConstantByMode, StageParameter
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.report.free_form_words import free_form_sentence
 from discover.report.loop.asked import coarse_rates, doubted, several, untested_by

@@ -12,7 +12,7 @@ from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
 from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
-from discover.inference.constants import ConstantByMode
+from discover.inference.by_mode.constants import ConstantByMode
 from discover.report.loop.found import KINDS, named
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from discover.inference.constants import ConstantByMode
-from discover.inference.other_law_of_a_mode import other_laws_said
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.other_law_of_a_mode import other_laws_said
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.optimize import fminbound
 
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit, jacobians
 from discover.statistics import independent_samples
 
 _DECADES = 6.0

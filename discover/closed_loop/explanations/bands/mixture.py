@@ -13,8 +13,8 @@ from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit, jacobians
-from discover.forward.modulus_errors import modulus_shifts, response
+from discover.inference.least_squares import Fit, jacobians
+from discover.inference.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
 from discover.statistics.projection import rms
 

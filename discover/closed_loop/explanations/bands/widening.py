@@ -7,8 +7,8 @@ from scipy.special import ndtri
 from discover.closed_loop.explanations.bands.discrepancy import changed
 from discover.closed_loop.search.scoring.left_out import left_out_parts
 from discover.forward import AugmentedModel, Batch
-from discover.forward.fit_uncertainty import covariance_and_noise
-from discover.forward.least_squares import Fit
+from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 _HELD = 0.95  # share of the samples that a band should hold

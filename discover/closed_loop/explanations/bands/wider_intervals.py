@@ -14,10 +14,10 @@ from discover.closed_loop.explanations.other_constants import OtherConstants
 from discover.closed_loop.explanations.proposed_tests import contenders
 from discover.closed_loop.results.explanation import Explanations
 from discover.forward import AugmentedModel
-from discover.forward.least_squares import Fit
-from discover.inference.constants import ConstantByMode
-from discover.inference.degrees import Degree
-from discover.inference.varying_constant import varying_constants
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.degrees import Degree
+from discover.inference.by_mode.varying_constant import varying_constants
+from discover.inference.least_squares import Fit
 
 Bounds = Mapping[int, tuple[float, float]]
 

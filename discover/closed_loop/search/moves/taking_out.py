@@ -9,8 +9,8 @@ from discover.closed_loop.search.scoring.mode_dependence import names_not_needed
 from discover.closed_loop.search.scoring.physical_range import at_an_end, undetermined
 from discover.closed_loop.search.scoring.refitting import drop_undecided
 from discover.closed_loop.search.seen_sets import SeenSet
-from discover.forward.fit_uncertainty import intervals
 from discover.inference.evidence import WINDOW
+from discover.inference.fit_uncertainty import intervals
 
 
 def drop_what_modes_explain(search: CurrentModel, say: Callable[[str], None]) -> None:

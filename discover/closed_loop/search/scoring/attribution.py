@@ -8,7 +8,7 @@ import numpy as np
 from discover.closed_loop.results.candidate_score import CandidateScore
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
-from discover.forward.least_squares import Fit
+from discover.inference.least_squares import Fit
 
 ALIAS_COSINE = 0.99
 """Signatures that agree to this cosine are the same to first order."""

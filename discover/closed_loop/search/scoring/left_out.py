@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
-from discover.forward.least_squares import Fit, stepped
+from discover.inference.least_squares import Fit, stepped
 from discover.inference.problem import FitProblem
 
 _MISSED = 10.0

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from discover.effects import ModeDependence
-from discover.forward.least_squares import Fit
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 _STARTS = (-0.5, 0.5)

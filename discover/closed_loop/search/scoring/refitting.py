@@ -19,9 +19,9 @@ from discover.closed_loop.search.scoring.left_out import (
 )
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel
-from discover.forward.fit_uncertainty import intervals
-from discover.forward.least_squares import Fit
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
+from discover.inference.fit_uncertainty import intervals
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 IMPROVEMENT = 0.98

@@ -17,7 +17,7 @@ from discover.comparison.judging.other_causes.misread_runs import as_misread
 from discover.comparison.judging.unseen_runs import hold_against_unseen, misses
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.inference.degrees import lowest_not_refuted
+from discover.inference.by_mode.degrees import lowest_not_refuted
 from discover.statistics.residual import Expectation
 
 _LAW = "constants_by_mode"

@@ -12,8 +12,8 @@ from discover.comparison.judging.statements import Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.inference.constants import ConstantByMode
-from discover.inference.other_law_of_a_mode import other_laws_said
+from discover.inference.by_mode.constants import ConstantByMode
+from discover.inference.by_mode.other_law_of_a_mode import other_laws_said
 from discover.words import listed, percent_of, plainly
 
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
-from scipy.optimize import lsq_linear
 
-from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import Batch
+from discover.forward import AugmentedModel, Batch
+from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior
+from discover.inference.least_squares.steps import stepped
 
 _LARGEST_DAMPING, _LEAST_DAMPING = 1e7, 1e-8
 _FAR_BEHIND, _HARDLY = 2.0, 0.05
@@ -19,76 +19,6 @@ _GROWTH = 5.0  # of the damping where a step is rejected, twice that at the next
 
 _FORETOLD = 0.25
 """Of the gain that derivatives foretell, below which they are taken anew."""
-
-
-@dataclass(frozen=True)
-class Prior:
-    """What other data say of some parameters, as rows of the least-squares problem.
-
-    Attributes
-    ----------
-    positions
-        Of the parameters.
-    mean
-        Their values.
-    weight
-        Residual per unit of deviation, in the units of the weighted residuals.
-    """
-
-    positions: tuple[int, ...] = ()
-    mean: tuple[float, ...] = ()
-    weight: tuple[float, ...] = ()
-
-    def rows(
-        self, theta: np.ndarray, free: Sequence[int]
-    ) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows free"]]:
-        """Return residuals and their derivatives in the free parameters."""
-        known = [i for i, position in enumerate(self.positions) if position in free]
-        residual = np.array(
-            [self.weight[i] * (theta[self.positions[i]] - self.mean[i]) for i in known]
-        )
-        design = np.zeros((len(known), len(free)))
-        for row, i in enumerate(known):
-            design[row, list(free).index(self.positions[i])] = self.weight[i]
-        return residual, design
-
-
-NO_PRIOR = Prior()
-
-
-@dataclass
-class Fit:
-    """A fitted parameter vector.
-
-    Attributes
-    ----------
-    free
-        Positions of the fitted ones.
-    residual
-        Weighted residuals, shape (runs, n).
-    jacobian
-        Their derivatives with respect to the fitted parameters, shape (free, runs, n).
-    """
-
-    theta: Float[np.ndarray, " p"]
-    free: tuple[int, ...]
-    residual: Float[np.ndarray, "runs n"]
-    jacobian: Float[np.ndarray, "free runs n"]
-
-    @property
-    def cost(self) -> float:
-        """Sum over runs of the squared relative errors."""
-        return float(np.sum(self.residual**2))
-
-    @property
-    def run_errors(self) -> Float[np.ndarray, " runs"]:
-        """Root-mean-square error over root-mean-square stress of each run."""
-        return np.sqrt(np.sum(self.residual**2, axis=1))
-
-    @property
-    def usable(self) -> bool:
-        """Whether residuals and derivatives are all finite."""
-        return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
 
 
 def fit_batch(
@@ -298,60 +228,7 @@ def widths_of(
     return np.where(theta[at] + width > model.high[at], -width, width)
 
 
-def room_of(
-    model: AugmentedModel, theta: Float[np.ndarray, " p"], positions: Sequence[int]
-) -> Float[np.ndarray, "2 positions"]:
-    """Return how far parameters may go, down (none of it positive) and up."""
-    at = list(positions)
-    return np.stack([model.low[at] - theta[at], model.high[at] - theta[at]])
-
-
-def stepped(
-    model: AugmentedModel,
-    theta: Float[np.ndarray, " p"],
-    free: Sequence[int],
-    residual: Float[np.ndarray, "runs n"],
-    jacobian: Float[np.ndarray, "free runs n"],
-    damping: float,
-    prior: Prior,
-) -> Float[np.ndarray, " p"]:
-    """Return parameters after the best step that their ranges hold, of those that are free."""
-    at, moved = list(free), theta.copy()
-    known, room = prior.rows(theta, at), room_of(model, theta, at)
-    step = gauss_newton_step(jacobian, residual, damping, known, room)
-    moved[at] = np.clip(theta[at] + step, model.low[at], model.high[at])
-    return moved
-
-
 def _corrected(jacobian, step, change):
     """Return derivatives that explain the change that a step made."""
     missed = change - np.tensordot(step, jacobian, axes=1)
     return jacobian + np.multiply.outer(step / (step @ step), missed)
-
-
-def gauss_newton_step(jacobian, residual, damping, known=None, room=None):
-    """Return the damped step of the free parameters, with rows of what is known of them.
-
-    Of those that lead no further down and up than `room` allows, if that is given; see `room_of`.
-    """
-    if len(jacobian) == 0:
-        return np.zeros(0)
-    design = jacobian.reshape(len(jacobian), -1).T
-    if not np.all(np.isfinite(design)):
-        return np.zeros(len(jacobian))
-    residual = residual.ravel()
-    if known is not None and len(known[0]):
-        residual = np.concatenate([residual, known[0]])
-        design = np.concatenate([design, known[1]])
-    scale = np.linalg.norm(design, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    scaled = design / scale
-    padded = np.concatenate([scaled, np.sqrt(damping) * np.eye(len(jacobian))])
-    target = np.concatenate([-residual, np.zeros(len(jacobian))])
-    step = np.linalg.lstsq(padded, target, rcond=None)[0]
-    if room is not None:
-        low, high = (scale * bound for bound in room)
-        if np.any((step < low) | (step > high)):
-            high = np.maximum(high, np.nextafter(low, np.inf))  # a range may be one value
-            step = lsq_linear(padded, target, (low, high), method="bvls").x
-    return step / scale

@@ -9,15 +9,15 @@ from scipy.stats import norm
 from scipy.stats.qmc import LatinHypercube
 
 from discover.forward import Batch
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import Fit
-from discover.inference.degrees import Degree
-from discover.inference.problem import FitProblem
-from discover.inference.varying_constant import (
+from discover.inference.by_mode.degrees import Degree
+from discover.inference.by_mode.varying_constant import (
     FreerFit,
     VaryingConstant,
     varying_constants,
 )
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import Fit
+from discover.inference.problem import FitProblem
 from discover.statistics import root_of
 
 _TWO_SIDED = float(norm.ppf(0.975))

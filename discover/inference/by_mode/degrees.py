@@ -8,9 +8,9 @@ import numpy as np
 
 from discover.forward import AugmentedModel
 from discover.forward.by_mode import DEGREE, link_slope
-from discover.forward.least_squares import Fit
-from discover.inference.alone import told_beyond_a_polynomial
+from discover.inference.by_mode.alone import told_beyond_a_polynomial
 from discover.inference.evidence import BARE_MENTION
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 
 Tried = TypeVar("Tried")

@@ -6,8 +6,8 @@ from scipy.stats import t as student
 
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import Batch
-from discover.forward.least_squares import Fit
-from discover.forward.modulus_errors import response
+from discover.inference.least_squares import Fit
+from discover.inference.modulus_errors import response
 from discover.statistics import NoiseModel, least_squares_covariance
 
 

@@ -84,7 +84,7 @@ class ModeConstant:
         Of the mode.
     value, ci95
         The constant with its 95 % interval, given that it is a smooth function of the time (see
-        `discover.inference.by_mode`); without one where it is left open.
+        `discover.inference.by_mode.as_fitted`); without one where it is left open.
     left_open
         Whether these data leave it open: the interval leaves hardly a value out, the runs are as
         well described whatever this mode's constant, or it stands at the upper end of its range.

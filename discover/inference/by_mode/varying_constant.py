@@ -9,10 +9,10 @@ from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
 from discover.forward.by_mode import DEGREE, constants_of_modes, link_slope
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import NO_PRIOR, Fit, Prior, fit_batch
-from discover.inference.alone import told_beyond_a_polynomial
-from discover.inference.degrees import FREE, Degree
+from discover.inference.by_mode.alone import told_beyond_a_polynomial
+from discover.inference.by_mode.degrees import FREE, Degree
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import NO_PRIOR, Fit, Prior, fit_batch
 
 _FARTHEST = 50.0  # e^50 of a constant is any
 _ACROSS = 300.0  # on the link's scale, from one end of a range to the other wherever it began

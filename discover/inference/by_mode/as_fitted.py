@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward import AugmentedModel, Batch, FreeParameter
-from discover.forward.least_squares import Fit
-from discover.inference.alone import half_widths_alone, is_told
-from discover.inference.constants import ConstantByMode, ModeConstant
-from discover.inference.degrees import Degree
-from discover.inference.varying_constant import FreerFit, varying_constants
+from discover.inference.by_mode.alone import half_widths_alone, is_told
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
+from discover.inference.by_mode.degrees import Degree
+from discover.inference.by_mode.varying_constant import FreerFit, varying_constants
+from discover.inference.least_squares import Fit
 
 _AT_THE_END = 1e-3
 """Share of the range from its upper end within which a constant stands at that end: no finding, for

@@ -13,7 +13,7 @@ from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import TransientFlows, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.least_squares import Fit, gauss_newton_step
+from discover.inference.least_squares import Fit, gauss_newton_step
 from discover.protocols.rate_steps import steps_between_samples
 
 _MOST = 40

@@ -16,7 +16,7 @@ from discover.effects import simplest_terms
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import data_scales, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of
 from discover.statistics.noise.whiteness import separate_probability

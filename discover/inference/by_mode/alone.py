@@ -5,8 +5,8 @@ from jaxtyping import Bool, Float
 
 from discover.forward import AugmentedModel, Batch
 from discover.forward.by_mode import DEGREE
-from discover.forward.fit_uncertainty import uncertainty
-from discover.forward.least_squares import Fit, jacobians
+from discover.inference.fit_uncertainty import uncertainty
+from discover.inference.least_squares import Fit, jacobians
 
 _OPEN = float(np.log(0.95 / 0.05))
 """Half width of an interval, on the link's scale, from which on nothing is determined: about the

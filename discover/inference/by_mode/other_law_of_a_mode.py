@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from discover.forward.by_mode import DEGREE, LARGEST
-from discover.forward.least_squares import Fit
 from discover.inference.evidence import INDISTINGUISHABLE
+from discover.inference.least_squares import Fit
 from discover.inference.problem import FitProblem
 from discover.words import listed, plainly
 
