@@ -1,4 +1,4 @@
-"""The least squares of the loop on problems from the literature, against scipy's.
+"""Least squares on problems from the literature, by both ways, against scipy's.
 
 Moré, Garbow & Hillstrom 1981, ACM Trans. Math. Softw. 7, 17: their functions and starts. In several
 of them derivatives change so much on the way that those of a few steps before mislead.
@@ -6,12 +6,15 @@ of them derivatives change so much on the way that those of a few steps before m
 
 from types import SimpleNamespace
 
+import jax
+import jax.numpy as jnp
 import jaxtyping
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
 from discover.inference.least_squares import fit_batch
+from discover.inference.least_squares.tangents import bounded, by_differentiation, descend
 
 _TIMES = 0.1 * np.arange(1, 11)
 _Y = np.array(
@@ -32,28 +35,28 @@ _OSBORNE = np.array([
 
 
 def rosenbrock(x):
-    return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+    return jnp.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
 
 
 def freudenstein_and_roth(x):
     one = -13.0 + x[0] + ((5.0 - x[1]) * x[1] - 2.0) * x[1]
-    return np.array([one, -29.0 + x[0] + ((x[1] + 1.0) * x[1] - 14.0) * x[1]])
+    return jnp.array([one, -29.0 + x[0] + ((x[1] + 1.0) * x[1] - 14.0) * x[1]])
 
 
 def helical_valley(x):
-    turn = np.arctan2(x[1], x[0]) / (2.0 * np.pi)
-    return np.array([10.0 * (x[2] - 10.0 * turn), 10.0 * (np.hypot(x[0], x[1]) - 1.0), x[2]])
+    turn = jnp.arctan2(x[1], x[0]) / (2.0 * jnp.pi)
+    return jnp.array([10.0 * (x[2] - 10.0 * turn), 10.0 * (jnp.hypot(x[0], x[1]) - 1.0), x[2]])
 
 
 def bard(x):
-    u = np.arange(1, 16)
+    u = jnp.arange(1, 16)
     v = 16 - u
-    return _BARD - (x[0] + u / (v * x[1] + np.minimum(u, v) * x[2]))
+    return _BARD - (x[0] + u / (v * x[1] + jnp.minimum(u, v) * x[2]))
 
 
 def box(x):
-    rows = np.exp(-_TIMES * x[0]) - np.exp(-_TIMES * x[1])
-    return rows - x[2] * (np.exp(-_TIMES) - np.exp(-10.0 * _TIMES))
+    rows = jnp.exp(-_TIMES * x[0]) - jnp.exp(-_TIMES * x[1])
+    return rows - x[2] * (jnp.exp(-_TIMES) - jnp.exp(-10.0 * _TIMES))
 
 
 def kowalik_and_osborne(x):
@@ -61,17 +64,17 @@ def kowalik_and_osborne(x):
 
 
 def osborne(x):
-    return _OSBORNE - (x[0] + x[1] * np.exp(-_TENS * x[3]) + x[2] * np.exp(-_TENS * x[4]))
+    return _OSBORNE - (x[0] + x[1] * jnp.exp(-_TENS * x[3]) + x[2] * jnp.exp(-_TENS * x[4]))
 
 
 def jennrich_and_sampson(x):
-    i = np.arange(1, 11)
-    return 2.0 + 2.0 * i - np.exp(i * x[0]) - np.exp(i * x[1])
+    i = jnp.arange(1, 11)
+    return 2.0 + 2.0 * i - jnp.exp(i * x[0]) - jnp.exp(i * x[1])
 
 
 def wood(x):
     valleys = [10.0 * (x[1] - x[0] ** 2), 1.0 - x[0], 90.0**0.5 * (x[3] - x[2] ** 2), 1.0 - x[2]]
-    return np.array([*valleys, 10.0**0.5 * (x[1] + x[3] - 2.0), 0.1**0.5 * (x[1] - x[3])])
+    return jnp.array([*valleys, 10.0**0.5 * (x[1] + x[3] - 2.0), 0.1**0.5 * (x[1] - x[3])])
 
 
 PROBLEMS = {
@@ -105,7 +108,7 @@ def model_of(function, size, bounds=None):
 
     def residuals(thetas, batch, limits=None):
         asked.append(len(thetas))
-        return np.array([function(theta)[None] for theta in thetas])
+        return np.array([np.asarray(function(theta))[None] for theta in thetas])
 
     low, high = np.array(bounds or [[-1e3] * size, [1e3] * size])
     return SimpleNamespace(
@@ -129,6 +132,36 @@ def test_a_textbook_problem_ends_at_the_minimum_that_scipy_finds(function):
     assert fit.cost <= 2.0 * exact.cost * (1.0 + 1e-3) + 1e-9
     # derivatives are differences and count; Wood's function takes most
     assert sum(model.asked) < 250
+
+
+@pytest.mark.parametrize("function", PROBLEMS, ids=lambda function: function.__name__)
+def test_a_descent_by_tangents_ends_at_the_minimum_that_scipy_finds(function):
+    start = np.array(PROBLEMS[function])
+    exact = least_squares(function, start, method="lm", xtol=1e-14, ftol=1e-14)
+    linearise = by_differentiation(lambda x, _: function(x))
+    run = jax.jit(lambda x: descend(linearise, x, None, 1e-9, 300)[0])
+    found = np.sum(np.asarray(function(run(jnp.asarray(start)))) ** 2)
+    assert found <= 2.0 * exact.cost * (1.0 + 1e-6) + 1e-12
+
+
+def test_what_is_known_beside_the_residuals_is_told_where_a_descent_ends():
+    def linearise(x, factor):
+        return factor * (x - 2.0), factor * jnp.eye(2), {"twice": 2.0 * x}
+
+    found, beside = descend(linearise, jnp.zeros(2), jnp.asarray(3.0), 1e-9, 50)
+    np.testing.assert_allclose(found, 2.0, rtol=1e-8)
+    np.testing.assert_allclose(beside["twice"], 2.0 * found)
+
+
+def test_a_trial_that_runs_away_is_a_rejected_step():
+    def linearise(x, _):
+        # nothing finite beyond one, where a step from the start leads: the curve is flat there
+        residual = jnp.where(x > 1.0, jnp.inf, jnp.tanh(2.0 * x) - 0.9)
+        columns = jnp.diag(2.0 / jnp.cosh(2.0 * x) ** 2)
+        return *bounded(residual, columns)[:2], None
+
+    found, _ = descend(linearise, jnp.full(1, -0.9), None, 1e-10, 200)
+    np.testing.assert_allclose(found, np.arctanh(0.9) / 2.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("function", BOUNDS, ids=lambda function: function.__name__)
