@@ -39,14 +39,15 @@ def main() -> None:
         starts.append(theta)
         free.append(positions)
     program, numbers = model._program, model._numbers
-    weight, recorded = jnp.asarray(batch.weight), jnp.asarray(batch.recorded)
+    (flows,) = batch.parts
+    records = jax.tree.map(jnp.asarray, batch.records)
 
     @jax.jit
     def fit(used, theta, positions):
         def residual(moved, _):
             at = theta.at[positions].set(moved)
-            predicted = program._predict_all(numbers, used, at, batch)
-            return jnp.where(weight > 0.0, (predicted - recorded) * weight, 0.0)
+            found = program._predict_all(numbers, used, at, flows, records, None, jnp.inf)
+            return records.residual(found)
 
         low, high = jnp.asarray(model.low)[positions], jnp.asarray(model.high)[positions]
         found = optimistix.least_squares(

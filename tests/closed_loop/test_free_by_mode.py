@@ -9,7 +9,7 @@ from modes_in_start_up import noisy_start_ups
 
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference import degrees as of_degrees
+from discover.inference.by_mode import degrees as of_degrees
 from discover.inference.by_mode.as_fitted import constants_by_mode
 from discover.inference.by_mode.degrees import FREE, Degree, choose_degrees, one_degree_more
 from discover.inference.by_mode.draws import draw_constants

@@ -179,7 +179,7 @@ def test_a_fitted_instant_takes_the_place_of_the_run_s_own():
     theta = model.zero()
     assert model.free_positions == [model.size - 1]
     theta[model.instants] = 0.7
-    moved = eqx.tree_at(lambda b: b.steps.share, batch, jnp.array([[0.2]]))
+    moved = eqx.tree_at(lambda b: b.parts[0].steps.share, batch, jnp.array([[0.2]]))
     assert model.predict(theta, batch)[0] == pytest.approx(
         maxwell_after_a_step(times, 3.97), abs=0.02
     )

@@ -16,7 +16,8 @@ ALIAS_COSINE = 0.99
 _RUNAWAY = 1e9
 """Weighted residual from which on a trial says nothing but that its stress runs away."""
 
-_STRETCHES = (0.25, 1.0, 4.0, 16.0, 64.0)
+_STRETCHES = (0.25, 4.0, 16.0, 64.0)
+"""Multiples of the amplitude that a signature foretells which are tried beside it."""
 
 TRIED_AT = 4.0
 """Multiple of an effect's first trial at which it shows."""
@@ -169,34 +170,47 @@ def with_other_inner(
 
 
 def _try_amplitudes(model, batch, fit, candidates, bases, at, yields):
-    """Try amplitudes, with what is fitted already held, and giving way to first order."""
-    trials, owner = [], []
-    others = list(fit.free)
-    for i, (candidate, base, position, given) in enumerate(
-        zip(candidates, bases, at, yields, strict=True)
-    ):
+    """Try amplitudes, with what is fitted already held, and giving way to first order.
+
+    First those that the signatures foretell. Of the others each is followed as long as it is
+    better than the best of its effect by then.
+    """
+    for candidate, base in zip(candidates, bases, strict=True):
         candidate.start = base.copy()
-        if candidate.score <= 0:
-            continue
-        tried = np.multiply(_STRETCHES, candidate.step)
-        # several of them may be cut off at the same bound
-        for amplitude in np.unique(np.clip(tried, model.low[position], model.high[position])):
-            theta = base.copy()
-            theta[position] = amplitude
-            trials.append(theta)
-            owner.append(i)
-            if others:
-                moved = theta.copy()
-                moved[others] += theta[position] * given
-                trials.append(np.clip(moved, model.low, model.high))
-                owner.append(i)
-    if not trials:
-        return
-    with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
-        useful = np.full(len(trials), fit.cost)
-        costs = np.sum(model.residuals(trials, batch, useful) ** 2, axis=(1, 2))
-    for theta, i, cost in zip(trials, owner, costs, strict=True):
-        reduction = 1.0 - cost / fit.cost if np.isfinite(cost) else 0.0
-        if reduction > candidates[i].reduction:
-            candidates[i].reduction = float(reduction)
-            candidates[i].start = theta
+    least = {candidate.effect: fit.cost for candidate in candidates}
+    for only_foretold in (True, False):
+        trials = [
+            (candidate, theta)
+            for candidate, *about in zip(candidates, bases, at, yields, strict=True)
+            if candidate.score > 0
+            for theta in _amplitudes(model, fit, candidate.step, only_foretold, *about)
+        ]
+        if not trials:
+            return
+        useful = np.array([least[candidate.effect] for candidate, _ in trials])
+        with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
+            residuals = model.residuals([theta for _, theta in trials], batch, useful)
+            costs = np.sum(residuals**2, axis=(1, 2))
+        for (candidate, theta), cost in zip(trials, costs, strict=True):
+            reduction = 1.0 - cost / fit.cost if np.isfinite(cost) else 0.0
+            if reduction > candidate.reduction:
+                candidate.reduction = float(reduction)
+                candidate.start = theta
+                least[candidate.effect] = min(least[candidate.effect], float(cost))
+
+
+def _amplitudes(model, fit, step, only_foretold, base, position, given) -> list[np.ndarray]:
+    """Return parameter vectors with an effect at the step foretold, or at other multiples of it."""
+    others, found = list(fit.free), []
+    low, high = model.low[position], model.high[position]
+    foretold, *further = np.clip(np.multiply((1.0, *_STRETCHES), step), low, high)
+    # several of them may be cut off at the same bound
+    for amplitude in (foretold,) if only_foretold else sorted({*further} - {foretold}):
+        theta = base.copy()
+        theta[position] = amplitude
+        found.append(theta)
+        if others:
+            moved = theta.copy()
+            moved[others] += amplitude * given
+            found.append(np.clip(moved, model.low, model.high))
+    return found
