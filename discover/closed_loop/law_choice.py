@@ -22,7 +22,7 @@ from discover.forward import (
     make_batch,
 )
 from discover.inference.evidence import BARE_MENTION, criterion
-from discover.inference.least_squares import Fit, fit_batch
+from discover.inference.least_squares import Fit, best_of, fit_batch
 from discover.inference.problem import effect_of
 from discover.inference.step_instants import with_own_instants
 from discover.laws import LAWS
@@ -84,8 +84,7 @@ def choose_law(
         starts += _starts_at_contained(model, found)
         free = [model.free_positions] * len(starts)
         fits = fit_batch(model, batch, starts, free)
-        usable = [fit for fit in fits if fit.usable]
-        found[name] = model, min(usable, key=lambda fit: fit.cost, default=fits[0])
+        found[name] = model, best_of(fits) or fits[0]
     tried = list(found.values())
     usable = [fit for _, fit in tried if fit.usable]
     if not usable:

@@ -10,7 +10,7 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.inference.evidence import criterion, evidence
-from discover.inference.least_squares import NO_PRIOR, Fit, Prior, fit_batch, jacobians
+from discover.inference.least_squares import NO_PRIOR, Fit, Prior, best_of, fit_batch, jacobians
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation, judged_cost, summarise
@@ -60,8 +60,7 @@ class FitProblem:
     ) -> Fit:
         """Return the best of the fits from several starts; one that is not usable if all are so."""
         fits = self.fits(starts, [free] * len(starts), rivals=rivals)
-        usable = (fit for fit in fits if fit.usable)
-        return min(usable, key=lambda fit: fit.cost, default=fits[0])
+        return best_of(fits) or fits[0]
 
     def without(self, fit: Fit, *effects: str) -> tuple[np.ndarray, tuple[int, ...]]:
         """Return a fit's parameters with effects at zero, and those still free without them."""

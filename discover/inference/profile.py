@@ -177,7 +177,8 @@ def profiled(problem: FitProblem, fit: Fit, bounds: Bounds, positions: Sequence[
         free = [[p for p in fit.free if p != end.at] for end in going]
         fits = problem.fits([end.start for end in going], free, tolerance=_TOLERANCE)
         for end, one in zip(going, fits, strict=True):
-            more = (_misfit(problem, one) - least) / units[end.at] if one.usable else np.inf
+            more = _misfit(problem, one) - least
+            more = more / units[end.at] if np.isfinite(more) else np.inf
             deviations = float(np.sqrt(max(more, 0.0)))
             end.tell(deviations, quantile, one.theta)
             if deviations < quantile:

@@ -171,7 +171,7 @@ def _note_shorter(search: Search) -> None:
     if not sets:
         return
     for effects, fit in zip(sets, problem.fits(starts, free), strict=True):
-        if fit.usable:
+        if np.isfinite(fit.cost):
             search.seen.note(effects, fit, problem.weight)
 
 

@@ -131,8 +131,8 @@ def other_constants(
         starts = [theta for theta, _ in tried.values()]
         free = [(*own, *held.positions) for _, own in tried.values()]
         for names, fit in zip(tried, search.problem.fits(starts, free, rivals=True), strict=True):
-            usable = fit.usable and _inside(search.model, fit, held)
-            if usable and search.tolerated.explained(fit, names):
+            possible = np.isfinite(fit.cost) and _inside(search.model, fit, held)
+            if possible and search.tolerated.explained(fit, names) and fit.usable:
                 found.append(_found(search, held, names, fit, unseen))
     # beside effects that do as well alone the constants do nothing
     alone = {one.effects: _worth(search, one.cost, one.free, one.effects) for one in search.seen}

@@ -14,7 +14,7 @@ from discover.comparison.outcomes.flows import (
 )
 from discover.dataset import Run
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.least_squares import fit_batch
+from discover.inference.least_squares import best_of, fit_batch
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_values
 from discover.learners.tensor_sindy.selection import extended_bic
@@ -65,10 +65,9 @@ def fit_further_laws(
         further = np.clip(_SPREAD * start, forward.low, forward.high) if values else start
         starts = [start, further][: 1 + bool(values)]
         found = fit_batch(forward, batch, starts, [forward.free_positions] * len(starts))
-        usable = [fit for fit in found if fit.usable]
+        best = best_of(found)
         parameters, misfit, criterion, fluid = {}, None, None, None
-        if usable:
-            best = min(usable, key=lambda fit: fit.cost)
+        if best is not None:
             constants = zip(values, best.theta[2 : 2 + len(values)], strict=True)
             ends = LAWS[name].parameters
             parameters = {key: float(np.clip(value, *ends[key])) for key, value in constants}

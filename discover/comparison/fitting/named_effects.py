@@ -186,7 +186,7 @@ def _best_fits(problem: FitProblem, sets: Sequence[tuple[str, ...]]) -> dict[tup
     fits = fit_batch(model, problem.batch, starts, free, max_steps=_MOST_STEPS, rivals=True)
     best: dict[tuple[str, ...], Fit] = {}
     for names, fit in zip(owners, fits, strict=True):
-        if fit.usable and (names not in best or fit.cost < best[names].cost):
+        if (names not in best or fit.cost < best[names].cost) and fit.usable:
             best[names] = fit
     return best
 
@@ -208,7 +208,7 @@ def _to_the_end(
     free = [best[names].free for names in owners]
     fits = fit_batch(problem.model, problem.batch, starts, free)
     for names, fit in zip(owners, fits, strict=True):
-        if fit.usable and fit.cost < best[names].cost:
+        if fit.cost < best[names].cost and fit.usable:
             best[names] = fit
 
 

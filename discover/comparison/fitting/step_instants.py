@@ -10,7 +10,7 @@ from discover.comparison.fitting.prepared import with_each_run
 from discover.dataset import Run
 from discover.effects import library_term
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.inference.least_squares import fit_batch
+from discover.inference.least_squares import best_of, fit_batch
 from discover.inference.step_instants import with_own_instants, with_places, with_rate_steps
 from discover.statistics.residual import summarise
 from discover.study.data import StudyData
@@ -76,8 +76,7 @@ def _few_terms(model: AugmentedModel, batch: Batch, terms: Sequence[int]) -> np.
         further = [at for at in terms if at not in best.free]
         starts = [best.theta] * len(further)
         fits = fit_batch(model, batch, starts, [(*best.free, at) for at in further], rivals=True)
-        usable = [fit for fit in fits if fit.usable]
-        after = min(usable, key=lambda fit: fit.cost, default=best)
+        after = best_of(fits) or best
         # Schwarz 1978, Ann. Stat. 6, 461, with the choice among the terms
         price = np.log(effective) + 2.0 * np.log(len(terms))
         if not best.usable or effective * np.log(best.cost / after.cost) <= price:

@@ -11,7 +11,7 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
-from discover.inference.least_squares import Fit, fit_batch
+from discover.inference.least_squares import Fit, best_of, fit_batch
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.shorter_holds import with_shorter_holds
 from discover.protocols import strains
@@ -146,7 +146,7 @@ class BeforeLearning:
     ) -> Fit:
         batch = self.batch if batch is None else batch
         fits = fit_batch(model, batch, list(starts), free, rivals=True)
-        best = min((fit for fit in fits if fit.usable), key=lambda fit: fit.cost, default=fits[0])
+        best = best_of(fits) or fits[0]
         if not best.usable:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: its stress runs "

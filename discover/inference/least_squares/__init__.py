@@ -9,13 +9,14 @@
 """
 
 from discover.inference.least_squares.differences import fit_batch, jacobians, widths_of
-from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior
+from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior, best_of
 from discover.inference.least_squares.steps import gauss_newton_step, room_of, stepped
 
 __all__ = [
     "NO_PRIOR",
     "Fit",
     "Prior",
+    "best_of",
     "fit_batch",
     "gauss_newton_step",
     "jacobians",

@@ -30,6 +30,7 @@ def fit_batch(
     tolerance: float = 1e-4,
     prior: Prior = NO_PRIOR,
     rivals: bool = False,
+    known: float = np.inf,
 ) -> list[Fit]:
     """Minimise the squared residuals from several starts, each in its own free parameters.
 
@@ -60,6 +61,8 @@ def fit_batch(
     rivals
         Whether only the best problems matter: one that is far behind and hardly gains any more is
         left where it is.
+    known
+        Cost of the best fit that the problems compete with beside one another.
     """
     thetas = np.array(starts, dtype=float)
     residuals = model.residuals(thetas, batch)
@@ -75,15 +78,9 @@ def fit_batch(
         trials = np.array([one.trial() for one in going])
         tried = model.residuals(trials, batch, np.array([one.cost for one in going]))
         for one, trial, residual in zip(going, trials, tried, strict=True):
-            best = min(other.cost for other in descents) if rivals else np.inf
+            best = min(known, *(other.cost for other in descents)) if rivals else np.inf
             one.judge(trial, residual, tolerance, best)
-    # derivatives are those of the last step, unless that was not the last
-    _differentiate([one for one in descents if not one.fresh], batch)
-    return [
-        Fit(one.theta, tuple(one.free), one.residual, one.derivatives)
-        for one in descents
-        if one.derivatives is not None
-    ]
+    return [one.ended(batch) for one in descents]
 
 
 @dataclass
@@ -121,6 +118,17 @@ class _Descent:
     def __post_init__(self):
         self.cost = self._cost(self.theta, self.residual)
         self.done = not np.isfinite(self.cost) or not self.free
+
+    def ended(self, batch: Batch) -> Fit:
+        """Return the fit, with derivatives where it has ended."""
+        at, free = self.theta, tuple(self.free)
+        if self.fresh and self.derivatives is not None:
+            return Fit(at, free, self.residual, self.derivatives)
+
+        def anew() -> np.ndarray:
+            return jacobians(self.model, batch, [at], self.residual[None], [free])[0]
+
+        return Fit(at, free, self.residual, anew)
 
     def _cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
         """Return the sum of squares, what is known of parameters included; else infinite."""

@@ -1,7 +1,8 @@
 """A fitted vector of parameters, and what other data say of some of them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
@@ -52,14 +53,22 @@ class Fit:
         Positions of the fitted ones.
     residual
         Weighted residuals, shape (runs, n).
-    jacobian
-        Their derivatives with respect to the fitted parameters, shape (free, runs, n).
+    derivatives
+        Those of the residuals, as `jacobian` returns them, or what computes them.
     """
 
     theta: Float[np.ndarray, " p"]
     free: tuple[int, ...]
     residual: Float[np.ndarray, "runs n"]
-    jacobian: Float[np.ndarray, "free runs n"]
+    derivatives: Float[np.ndarray, "free runs n"] | Callable[[], Float[np.ndarray, "free runs n"]]
+
+    @cached_property
+    def jacobian(self) -> Float[np.ndarray, "free runs n"]:
+        """Derivatives of the residuals in the fitted parameters, computed when first asked for.
+
+        Of rival fits most are never asked.
+        """
+        return self.derivatives() if callable(self.derivatives) else self.derivatives
 
     @property
     def cost(self) -> float:
@@ -75,3 +84,9 @@ class Fit:
     def usable(self) -> bool:
         """Whether residuals and derivatives are all finite."""
         return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
+
+
+def best_of(fits: Iterable[Fit]) -> Fit | None:
+    """Return the usable fit of the least cost; None where none is usable."""
+    by_cost = sorted(fits, key=lambda fit: fit.cost if np.isfinite(fit.cost) else np.inf)
+    return next((fit for fit in by_cost if fit.usable), None)

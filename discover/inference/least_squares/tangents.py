@@ -40,7 +40,7 @@ def descend(
     linearise: Linearise,
     start: Float[Array, " p"],
     args: Any,
-    tolerance: Float[Array, ""] | float,
+    tolerance: Any,
     max_steps: int,
 ) -> tuple[Float[Array, " p"], Any]:
     """Return the parameters of least squares, and what is known beside the residuals there.

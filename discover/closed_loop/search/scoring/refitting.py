@@ -21,7 +21,7 @@ from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel
 from discover.inference.evidence import BARE_MENTION, INDISTINGUISHABLE
 from discover.inference.fit_uncertainty import intervals
-from discover.inference.least_squares import Fit
+from discover.inference.least_squares import Fit, best_of
 from discover.inference.problem import FitProblem
 
 IMPROVEMENT = 0.98
@@ -74,7 +74,7 @@ def refit(problem: FitProblem, fit: Fit, leaders: Sequence[CandidateScore]) -> l
     free = [(*fit.free, *problem.model.positions(candidate.effect)) for candidate in leaders]
     starts = [candidate.start for candidate in leaders]
     fits = _restarted(problem, problem.fits(starts, free, tolerance=RANKING, rivals=True))
-    best = min((trial for trial in fits if trial.usable), key=lambda f: f.cost, default=fit)
+    best = best_of(fits) or fit
     effective = problem.independent_samples(best)
     choices = []
     samples = np.count_nonzero(weight)
@@ -103,7 +103,8 @@ def _restarted(problem: FitProblem, fits: Sequence[Fit]) -> list[Fit]:
     beyond a minimum may end in another one there, and what is at an end is never a finding.
     """
     model, fits = problem.model, list(fits)
-    order = sorted((i for i, fit in enumerate(fits) if fit.usable), key=lambda i: fits[i].cost)
+    finite = (i for i, fit in enumerate(fits) if np.isfinite(fit.cost))
+    order = sorted(finite, key=lambda i: fits[i].cost)
     starts, owners = [], []
     for i in order[:_RESTARTED]:
         for effect in model.effects:
@@ -121,9 +122,10 @@ def _restarted(problem: FitProblem, fits: Sequence[Fit]) -> list[Fit]:
     if not starts:
         return fits
     free = [fits[i].free for i in owners]
-    again = problem.fits(starts, free, tolerance=RANKING, rivals=True)
+    known = fits[order[0]].cost
+    again = problem.fits(starts, free, tolerance=RANKING, rivals=True, known=known)
     for i, fit in zip(owners, again, strict=True):
-        if fit.usable and fit.cost < fits[i].cost:
+        if fit.cost < fits[i].cost and fit.usable:
             fits[i] = fit
     return fits
 
