@@ -316,9 +316,8 @@ class AugmentedModel:
         sums = np.zeros(len(vectors))
         # a factor may lessen what a loading leaves on the way
         ahead = np.inf if batch.records.loadings is not None else 1.0
-        for i in sorted(
-            range(len(batch.parts)), key=lambda i: _BY_SPEED.index(type(batch.parts[i]))
-        ):
+        parts = sorted(enumerate(batch.parts), key=lambda one: _BY_SPEED.index(type(one[1])))
+        for i, _ in parts:
             asked = np.flatnonzero(sums < limits)
             if not len(asked):
                 break
