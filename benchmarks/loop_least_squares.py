@@ -62,7 +62,7 @@ def main() -> None:
 
     def by_optimistix():
         return [
-            [float(of) for of in fit(program.in_use(theta), theta, jnp.asarray(positions))]
+            [float(of) for of in fit(program.fluid.in_use(theta), theta, jnp.asarray(positions))]
             for theta, positions in zip(starts, free, strict=True)
         ]
 

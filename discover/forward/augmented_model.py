@@ -91,8 +91,8 @@ class AugmentedModel:
                 declared.added_modes,
             )
         )
-        self.slices, self.size = self._program.slices, self._program.size
-        self.instants = self._program.instants
+        fluid = self._program.fluid
+        self.slices, self.size, self.instants = fluid.slices, fluid.size, fluid.instants
         parameters = [p for effect in self.effects for p in effect.parameters]
         sizes = {"one": 1.0} | dict(scales or {})
         units = [sizes.get(p.range_scale, 1.0) for p in parameters]
@@ -254,7 +254,7 @@ class AugmentedModel:
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial
-            used = program.in_use(theta)
+            used = program.fluid.in_use(theta)
             weights = self._weights(theta, part)
             limit = np.float64(limit if program.is_judged_by_modes(theta) else np.inf)
             found = program.predict(self._numbers, used, theta, part, judging, weights, limit)

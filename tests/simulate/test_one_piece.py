@@ -48,7 +48,7 @@ def test_no_candidate_of_the_loop_brings_a_matrix_product_into_the_steps(run, te
     def predict(numbers, used, theta, flows, records):
         return program._predict_all(numbers, used, theta, flows, records, None, np.inf)
 
-    used = program.in_use(theta)
+    used = program.fluid.in_use(theta)
     assert products(predict, model._numbers, used, theta, flows, records) == 0
 
 

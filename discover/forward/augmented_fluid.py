@@ -1,0 +1,252 @@
+"""The fluid that a vector of parameters is: a declared law with effects, as integrators take it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from discover.effects import (
+    AbstractEffect,
+    ConstitutiveEffect,
+    ModeDependence,
+    ModeEffect,
+    SeriesElement,
+    StateEffect,
+)
+from discover.forward.added_terms import AddedTerms, InUse
+from discover.forward.by_mode import DEGREE, constants_of_modes, decades
+from discover.forward.dynamics import Dynamics, Modes, Series
+from discover.forward.structure import Structure
+from discover.laws import LAWS, AbstractConstitutiveLaw
+from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
+from discover.protocols.kinematics import Kinematics
+from tensor_library.kinematics import rate_of_deformation
+
+
+class AugmentedFluid:
+    """What a structure makes of a vector of parameters: the fluid, and what gives way beside it.
+
+    Attributes
+    ----------
+    slices
+        Where the parameters of each effect stand in the vector, by name.
+    instants
+        Where the instants of steps of the rate stand.
+    size
+        Length of the vector.
+    series
+        Effects that give way in series with the fluid.
+    """
+
+    def __init__(self, structure: Structure):
+        self.structure = structure
+        effects = structure.effects
+        self.slices: dict[str, slice] = {}
+        # first the logarithms of the factors on moduli and times, then the law's free parameters
+        position = max(
+            [2 + len(structure.free_parameters), *(end for *_, end in structure.by_mode)]
+        )
+        for effect in effects:
+            self.slices[effect.name] = slice(position, position + len(effect.parameters))
+            position += len(effect.parameters)
+        self.instants = slice(position, position + structure.step_instants)
+        self.size = self.instants.stop
+        self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
+        # of the law's constants, and of effects' amplitudes
+        slots = {name: slice(start, end) for name, start, end in structure.by_mode}
+        free = structure.free_parameters
+        self._varying_law = {name: at for name, at in slots.items() if name in free}
+        self._varying_effects = {
+            e: slots[e.name] for e in self._constitutive if e.name in slots and e.name not in free
+        }
+        of_effects = {e.name: at for e, at in self._varying_effects.items()}
+        self._added = AddedTerms(self._constitutive, self.slices, of_effects)
+        self._by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
+        self._modes = [e for e in effects if isinstance(e, ModeEffect)]
+        self._states = [e for e in effects if isinstance(e, StateEffect)]
+        self.series = [e for e in effects if isinstance(e, SeriesElement)]
+
+    def values(self, theta, effect: AbstractEffect):
+        """Return the parameters of an effect."""
+        return theta[self.slices[effect.name]]
+
+    def in_use(self, theta: np.ndarray) -> InUse:
+        """Return the branches that a parameter vector takes."""
+        states = [i for i, e in enumerate(self._states) if theta[self.slices[e.name].start] != 0.0]
+        several = len(self._states) + 1
+        used = self._added.in_use(theta)._replace(
+            states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
+            times=np.int32(any(self._states[i].changes_times for i in states)),
+        )
+        if self._by_mode is None:
+            return used
+        differ = theta[self.slices[self._by_mode.name].start] != 0.0
+        return used._replace(by_mode=np.int32(differ))
+
+    def beside(self, numbers, theta, rate, flow: Kinematics | None):
+        """Return the recorded stress of the solvent and of what effects add beside the modes.
+
+        What an effect says of shear holds for any flow of the same intensity: the stress is that of
+        a generalised Newtonian fluid   [Bird, Armstrong & Hassager 1987, vol. 1, chapter 4].
+        """
+        intensity, viscous = (1.0, 1.0) if flow is None else (flow.intensity, flow.viscous)
+        total = numbers.solvent_viscosity * viscous * rate
+        for effect in self._constitutive:
+            shear = effect.instantaneous_stress(self.values(theta, effect), intensity * rate)
+            total = total + viscous / intensity * shear
+        return total
+
+    def _varied(self, theta, mean, ends: tuple[float, float], at: slice, places):
+        """Return a constant of each mode; one that an effect adds deviates from no polynomial."""
+        coefficients, deviations = jnp.split(theta[at], [DEGREE])
+        deviations = jnp.append(deviations, jnp.zeros(len(places) - len(deviations)))
+        low, high = ends
+        mean = jnp.asarray(mean)
+        return constants_of_modes(mean, low, high, coefficients, deviations, places)
+
+    def _law(self, theta, numbers, places):
+        """Return the law with the values of its free parameters, which may differ by mode.
+
+        Of constants by mode, a mode that an effect adds has the one of its own time.
+        """
+        free = self.structure.free_parameters
+        if not free:
+            return numbers.law
+        named = LAWS[self.structure.law_name]
+        known = dict(self.structure.parameters) | dict(
+            zip(free, theta[2 : 2 + len(free)], strict=True)
+        )
+        if not self._varying_law:
+            return named.build(*known.values())
+        for name, at in self._varying_law.items():
+            known[name] = self._varied(theta, known[name], named.parameters[name], at, places)
+        columns = [jnp.broadcast_to(value, places.shape) for value in known.values()]
+        built = jax.vmap(named.build)(*columns)
+        return LawOfEachMode(law=built, linear_relaxation=built.linear_relaxation)
+
+    def _terms_by_mode(self, law, added, theta, modes: Modes):
+        """Return the function by how much h of each mode differs from that of equal constants."""
+        by_mode = self._by_mode
+        assert by_mode is not None
+        factors = by_mode.factors(self.values(theta, by_mode), *modes)
+
+        def of_mode(law, stress, gradient):
+            return law.extra_term(stress, rate_of_deformation(gradient))
+
+        of_law = over_modes(of_mode, law, -1)
+
+        def differing(stress, gradient):
+            # a mode that an effect adds stands after the declared ones, and is as they are in mean
+            declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
+            extra = of_law(stress, gradient) + added(stress, gradient)
+            return (declared - 1.0) * extra.at[4:].set(0.0)
+
+        return differing
+
+    def dynamics(
+        self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
+    ) -> Dynamics:
+        """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
+
+        Parameters
+        ----------
+        numbers, used, theta
+            What is data to the program, the branches that the vector takes, and the vector.
+        flow, in_one_piece
+            The flow, and whether steps are one piece of machine code.
+        """
+        extra = None
+        if self._modes:
+            pairs = [effect.mode(self.values(theta, effect)) for effect in self._modes]
+            extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
+        places = None
+        if self._varying_law or self._varying_effects:
+            places = decades(numbers.modulus, numbers.relaxation_time)
+            if extra is not None:
+                own = self.structure.added_modes > 0
+                times = numbers.relaxation_time * (jnp.exp(theta[1]) if own else 1.0)
+                added_at = decades(numbers.modulus, times, extra.relaxation_time, beyond=own)
+                places = jnp.append(places, added_at)
+        law = self._law(theta, numbers, places)
+        if extra is not None and not self._varying_law:
+            every = jnp.append(numbers.relaxation_time, extra.relaxation_time)
+            law = with_modes(law, numbers.relaxation_time, every)
+        modulus, relaxation_time = numbers.modulus, numbers.relaxation_time
+        # a factor that is not fitted stays a constant: no trial and no derivative passes through
+        if self.structure.fit_modulus:
+            modulus = modulus * jnp.exp(theta[0])
+        # that on the times is tried where it is not fitted too
+        relaxation_time = relaxation_time * jnp.exp(theta[1])
+        of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
+        amplitudes = {
+            e.name: self._varied(
+                theta,
+                self.values(theta, e)[0],
+                (float(e.parameters[0].low), float(e.parameters[0].high)),
+                at,
+                places,
+            )
+            for e, at in self._varying_effects.items()
+        }
+        added = self._added.rate(theta, used, amplitudes, in_one_piece)
+
+        def modes_rate(stress, gradient):
+            same = of_law(stress, gradient) - added(stress, gradient)
+            if self._by_mode is None:
+                return same
+            differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))
+            return same - jax.lax.switch(
+                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, gradient
+            )
+
+        series = None
+        if self.series:
+            pairs = [e.slip_and_compliance(self.values(theta, e)) for e in self.series]
+            both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
+            slip, compliance = where_in_shear(flow, both, jnp.zeros(2))
+            series = Series(slip, compliance, self._slip_by_stress(theta, flow))
+        return Dynamics(
+            modes_rate,
+            law.linear_relaxation,
+            Modes(modulus, relaxation_time),
+            extra,
+            {effect: self.values(theta, effect) for effect in self._states},
+            series,
+            self.beside(numbers, theta, jnp.ones(1), flow)[0],
+            self._of_modes_at_rest("relaxations", law, modulus, extra) if law.retracts else None,
+            used.times,
+            used.states,
+            law.variables,
+            self._of_modes_at_rest("shares", law, modulus, extra) if law.tensors else None,
+            in_one_piece,
+        )
+
+    def _slip_by_stress(self, theta, flow: Kinematics | None):
+        """Return what slip depends on the stress, as a function of it; None where nothing does."""
+        elements = [e for e in self.series if e.slips_by_stress]
+        if not elements:
+            return None
+
+        def slip(stress):
+            found = jnp.zeros(())
+            for element in elements:
+                found = found + element.slip_at(self.values(theta, element), stress)
+            return where_in_shear(flow, found, jnp.zeros(()))
+
+        return slip
+
+    def _of_modes_at_rest(
+        self, name: str, law: AbstractConstitutiveLaw, modulus, extra: Modes | None
+    ):
+        """Return what decides how modes are stepped through; no gradient passes through that."""
+        count = len(modulus) + (0 if extra is None else len(extra.modulus))
+        values = of_each_mode(lambda law: getattr(law, name)(), law, count)
+        return jax.lax.stop_gradient(jnp.moveaxis(values, 0, -1))
+
+
+def where_in_shear(flow: Kinematics | None, changed, unchanged):
+    """Return what a rotational rheometer's drive changes: runs in shear alone.
+
+    An extension is made on another instrument, with flaws of its own. What distorts the signal of
+    the torque changes neither that nor the normal force.
+    """
+    return changed if flow is None else jnp.where(flow.is_shear, changed, unchanged)
