@@ -1,61 +1,25 @@
 """The closed loop: residual, attribution, augmentation, before and after."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
-import numpy as np
-
-from discover.closed_loop.beyond_the_search import beyond_the_search
-from discover.closed_loop.candidates import (
-    candidates_of,
-    require_possible,
-    require_present,
-)
-from discover.closed_loop.explanations import (
-    BEAM_WIDTH,
-    explain,
-    modes_over_explanations,
-    over_explanations,
-    weighed_constants,
-    why_untested,
-)
-from discover.closed_loop.final_fit import FinalConstants, FinalFit, final_constants, final_fit
-from discover.closed_loop.final_model import (
-    augmented_fluid,
-    declared_effects,
-    declared_law,
-    declared_parameters,
-    stage_of,
-    states_of,
-    with_shared_interval,
-)
-from discover.closed_loop.judging.judgement import Judgement
+from discover.closed_loop.ended import Ended, result_of
+from discover.closed_loop.explanations import BEAM_WIDTH
+from discover.closed_loop.final_fit import final_constants, final_fit
 from discover.closed_loop.judging.silence import records_are_silent
-from discover.closed_loop.judging.told_by_kinds import told_by_kinds
 from discover.closed_loop.own_noise import searched_by_noise
-from discover.closed_loop.results.explanation import Explanations
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.runs import (
-    MOST_SAMPLES,
-    require_samples,
-    split_runs,
-    with_later_spikes,
-)
-from discover.closed_loop.search import Search
+from discover.closed_loop.runs import MOST_SAMPLES
 from discover.closed_loop.search.checkpoint import Store
 from discover.closed_loop.searching import SearchResult, SearchTask
-from discover.closed_loop.verdict import FinalVerdict, verdict_on
-from discover.dataset import Dataset, Run
-from discover.dataset.records.own_loadings import with_loadings
+from discover.closed_loop.starting_point import starting_point
+from discover.closed_loop.verdict import verdict_on
+from discover.dataset import Dataset
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.by_mode.degrees import lowest_not_refuted
-from discover.inference.scattered_rates import smoothed, unfelt_scatter
-from discover.inference.step_instants import instants_found, with_places
 from discover.linear_algebra_threads import in_one_thread
-from discover.statistics.residual import summarise
 
 
 @in_one_thread
@@ -133,106 +97,34 @@ def run_loop(
         If runs, window or effects are not as they should be.
     """
     started = time.perf_counter()
-    say = progress or (lambda line: None)
-    fitted_runs, held_runs, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
-    fitted_runs, held_runs = (
-        with_loadings(some, loading, noise) for some in (fitted_runs, held_runs)
-    )
-    candidates = candidates_of(effects)
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
-    declared, fitted_runs, held_runs = with_places(declared, fitted_runs, held_runs)
-    require_samples(fitted_runs, declared)
-    known = {effect.name for effect in declared.effects}
-    require_present(declared, {*known, *(effect.name for effect in candidates)})
-    candidates = [effect for effect in candidates if effect.name not in known]
-    require_possible(declared, [*fitted_runs, *held_runs])
-    of_scatter = unfelt_scatter(declared, fitted_runs)
-    if of_scatter:
-        fitted_runs, held_runs = [*map(smoothed, fitted_runs)], [*map(smoothed, held_runs)]
-    silent = records_are_silent(fitted_runs)
+    begun = starting_point(
+        dataset, declared, (fit, held_out), effects, strain, most_samples, loading, noise
+    )
     task = SearchTask(
-        candidates,
-        fitted_runs,
-        held_runs,
+        begun.candidates,
+        begun.fitted,
+        begun.held_out,
         noise=noise,
         max_effects=max_effects,
         width=explanations,
-        silent=silent,
+        silent=records_are_silent(begun.fitted),
         store=store,
         name=name,
-        say=say,
+        say=progress or (lambda line: None),
     )
-    task, ended = searched_by_noise(task, task.search(declared, laws), declared, laws)
-    fitted_runs = list(task.fitted)
-    whole = dataset.select([run.name for run in fitted_runs]).runs
+    found = task.search(begun.declared, laws)
+    task, found = searched_by_noise(task, found, begun.declared, laws)
+    whole = dataset.select([run.name for run in task.fitted]).runs
 
-    def judged(ended: SearchResult) -> Ended:
-        final = final_fit(ended, fitted_runs, held_runs, dataset.names)
-        constants = final_constants(final, ended.by_mode)
-        return ended, final, constants, verdict_on(final, constants, silent, whole)
+    def judged(one: SearchResult) -> Ended:
+        final = final_fit(one, list(task.fitted), begun.held_out, dataset.names)
+        constants = final_constants(final, one.by_mode)
+        return Ended(one, final, constants, verdict_on(final, constants, task.silent, whole))
 
-    ended, final, constants, verdict = _carrying_over(task, judged(ended), judged)
-    declared, search, judgement = ended.declared, ended.search, verdict.judgement
-    tested = final.fitted, final.fitted if left_out_in_turn else final.held_out
-    side_by_side = Explanations()
-    if final.carried:
-        side_by_side = explain(
-            search, final.beside_benches, tested, final.held_batch, judgement,
-            min((one.criterion for one in verdict.other_constants), default=np.inf),
-        )  # fmt: skip
-    beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
-    bounds, seen = (
-        constants.bounds,
-        (final.model, final.fit, final.beside_benches, side_by_side),
-    )
-    by_mode = modes_over_explanations(constants.by_mode, *seen)
-    others = weighed_constants(verdict.other_constants, final.carried, final.active)
-    over_all = over_explanations(bounds, *seen, others)
-    differ = {name for name, found in by_mode.items() if found.degree}
-    own = declared_parameters(declared, final.fit, (bounds, over_all))
-    of_law = {n: with_shared_interval(by_mode[n], one) for n, one in own.items() if n in by_mode}
-    fluid = augmented_fluid(final.model, final.fit, final.present)
-    states = states_of(final.model, final.fit, final.present)
-    unseen_runs = None if final.held_batch is None else (final.held_batch, final.held_out)
-    return LoopResult(
-        verdict=judgement.verdict,
-        error_before=final.error_at(0),
-        error_after=final.error_after,
-        noise_floor=judgement.left.noise,
-        stages=tuple(
-            stage_of(
-                search, name, (bounds, over_all), final.error_at(i), by_mode.get(name),
-                constants.possible,
-            )
-            for i, name in enumerate(final.active, start=1)
-        ),
-        remaining=_remaining(
-            final, constants, verdict, with_later_spikes(spikes, final.fitted, judgement), tested,
-            of_scatter,
-        ),
-        rankings=tuple(search.rankings),
-        records=tuple(beyond.records),
-        declared_parameters=own | of_law,
-        declared_effects=declared_effects(final.model, final.fit, bounds, by_mode),
-        declared_law=declared_law(declared, final.fit, {n: by_mode[n] for n in differ & {*of_law}}),
-        explanations=side_by_side,
-        next_tests=beyond.next_tests,
-        laws=ended.laws,
-        free_form=beyond.free_form,
-        told_by=told_by_kinds(
-            final.model, final.batch, final.fit, final.fitted, final.present, unseen_runs,
-            final.shifts,
-        ),
-        fluid=None if differ or states != () else fluid,
-        fluid_at_mean=fluid if differ or states else None,
-        states=states or (),
-        seconds=time.perf_counter() - started,
-    )  # fmt: skip
-
-
-Ended = tuple[SearchResult, FinalFit, FinalConstants, FinalVerdict]
-"""A search that has ended, its final model, and what is to be believed of that."""
+    ended = _carrying_over(task, judged(found), judged)
+    return result_of(begun, ended, left_out_in_turn, started)
 
 
 def _carrying_over(
@@ -245,76 +137,11 @@ def _carrying_over(
     """
 
     def more(before: Ended) -> Ended | None:
-        ended = task.one_degree_more(before[0])
+        ended = task.one_degree_more(before.search)
         return None if ended is None else judged(ended)
 
-    last = lowest_not_refuted(first, more, lambda one: not one[-1].judgement.carries_over)
-    if last is first or last[-1].judgement.structured:
+    last = lowest_not_refuted(first, more, lambda one: not one.verdict.judgement.carries_over)
+    if last is first or last.verdict.judgement.structured:
         return first
-    last = judged(task.carried(last[0]))
-    return first if last[-1].judgement.structured else last
-
-
-def _remaining(
-    final: FinalFit,
-    constants: FinalConstants,
-    verdict: FinalVerdict,
-    spikes: Mapping[str, Sequence[float]],
-    tested: tuple[Sequence[Run], Sequence[Run]],
-    of_rates: str,
-) -> dict[str, Any]:
-    """Return what is left, as the contract names it."""
-    search, judgement, coarse = final.search, verdict.judgement, constants.coarse
-    left = judgement.left
-    summary = summarise(final.fit.residual, np.asarray(final.batch.weight))
-    return {
-        "structured": judgement.structured,
-        "error": final.error_after.fit,
-        "noise_floor": left.noise,
-        "noise_unsure": left.noise_unsure,
-        "outliers": sum(map(len, spikes.values())),
-        "outlier_times_s": spikes,
-        "probability": left.probability,
-        "resolution": judgement.resolution,
-        "sampled_rate": {} if coarse is None else coarse.to_json(),
-        "noise_known": judgement.noise_known,
-        "carries_over": judgement.carries_over,
-        "without_fluid": verdict.silence is not None,
-        "untested": why_untested(final.model, final.fit, final.active, tested),
-        "not_judging": list(judgement.not_judging),
-        "weights": {run.name: run.weight for run in final.fitted if run.weight != 1.0},
-        "linear_error": final.model.declared.linear_error,
-        "autocorrelation": float(np.mean(summary.autocorrelation)),
-        "worst_run": judgement.worst.name,
-        "worst_run_error": float(judgement.worst.errors[-1]),
-        "description": f"{of_rates}. " * bool(of_rates) + _with_refusals(judgement, search),
-        "read_as": judgement.read_as,
-        "advice": left.advice,
-        # of what explains nothing no interval is claimed
-        "read_otherwise": "" if judgement.structured else constants.misread_said,
-        "step_instants": instants_found(
-            final.model, final.fit, constants.bounds, final.fitted, final.held_out
-        ),
-        "not_named": {n: text for n, text in search.not_named.items() if n not in final.active},
-        **_of_loadings(final, judgement.structured),
-    }
-
-
-def _of_loadings(final: FinalFit, structured: bool) -> dict[str, Any]:
-    """Return the factors of loadings by name of the run, where runs are loadings of their own."""
-    if not final.loading:
-        return {}
-    found = {}
-    for one in final.loadings:
-        # beside a law that is missing no interval is claimed
-        ci95 = None if structured or one.ci95 is None else [*one.ci95]
-        found[one.run] = {"factor": one.factor, "ci95": ci95, "held_out": one.held_out}
-    return {"loading_deviation": final.loading, "loading": found}
-
-
-def _with_refusals(judgement: Judgement, search: Search) -> str:
-    """Return the verdict's reasons, with the effects that fitted and cannot be what is missing."""
-    refused = [search.not_named[name] for name in sorted(search.refused)]
-    if not judgement.structured or not refused:
-        return judgement.description
-    return f"{judgement.description} {' '.join(f'{text}.' for text in refused)}"
+    last = judged(task.carried(last.search))
+    return first if last.verdict.judgement.structured else last

@@ -14,9 +14,9 @@ from independent.instruments import Instrument
 from scipy.integrate import cumulative_simpson
 
 import discover as dc
-from discover.closed_loop import free_form
-from discover.closed_loop.beyond_the_search import predicts_worse
-from discover.closed_loop.free_variables import Variables
+from discover.closed_loop.beyond import free_form
+from discover.closed_loop.beyond.beyond_the_search import predicts_worse
+from discover.closed_loop.beyond.free_variables import Variables
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
 from discover.report.loop.verdict import loop_verdict

@@ -15,7 +15,7 @@ from independent.instruments import Instrument
 from independent.thixotropic import Thixotropic
 
 import discover as dc
-from discover.closed_loop import free_in_model
+from discover.closed_loop.beyond import free_in_model
 from discover.closed_loop.search.seen_sets import SeenSet, SeenSets
 from discover.effects import make_effect
 from discover.effects.free_function import (

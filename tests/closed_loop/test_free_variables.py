@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import cumulative_simpson
 
 import discover as dc
-from discover.closed_loop.free_variables import Variables, columns, spline
+from discover.closed_loop.beyond.free_variables import Variables, columns, spline
 
 TIMES = np.linspace(0.05, 12.0, 121)
 

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from discover.closed_loop.beyond.free_form import free_forms
+from discover.closed_loop.beyond.free_in_model import free_functions_in_model
 from discover.closed_loop.explanations import next_tests, with_band
 from discover.closed_loop.final_fit import FinalConstants, FinalFit
-from discover.closed_loop.free_form import free_forms
-from discover.closed_loop.free_in_model import free_functions_in_model
 from discover.closed_loop.judging.between_samples import wider_bands
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair

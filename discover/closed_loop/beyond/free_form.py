@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from sklearn.preprocessing import SplineTransformer
 
-from discover.closed_loop.free_variables import PLACES, Variables, columns, spline
+from discover.closed_loop.beyond.free_variables import PLACES, Variables, columns, spline
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import FreeForm, Slot, drawn_form, error_of
 from discover.closed_loop.runs import all_at_a_rate_in_shear
