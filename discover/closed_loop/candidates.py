@@ -74,7 +74,7 @@ def admission(fitted: Sequence[Run], held: Sequence[Run]) -> Callable[[AbstractE
     return admitted
 
 
-def require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
+def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
     """Refuse a known effect that the rates of these runs contain already."""
     measured = [run.name for run in runs if run.rate_is_measured]
     for known in declared.effects:
@@ -86,7 +86,7 @@ def require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
             )
 
 
-def require_present(declared: DeclaredModel, present: set[str]) -> None:
+def _require_present(declared: DeclaredModel, present: set[str]) -> None:
     """Refuse an effect by mode that is neither declared nor a candidate."""
     free = {parameter.name for parameter in declared.free_parameters}
     absent = [name for name in declared.by_mode if name not in free and name not in present]
@@ -95,3 +95,30 @@ def require_present(declared: DeclaredModel, present: set[str]) -> None:
             f"by_mode names the effect {absent[0]}, which is neither declared nor a candidate. Add "
             "it to [model] effects or to [loop] effects, or take it out of by_mode."
         )
+
+
+def candidates_beside(
+    declared: DeclaredModel,
+    effects: Sequence[str | AbstractEffect] | str | None,
+    runs: Sequence[Run],
+) -> list[AbstractEffect]:
+    """Return the effects that are asked for and that the declared model does not know.
+
+    Parameters
+    ----------
+    effects
+        As `candidates_of` takes them.
+    runs
+        Those that are fitted and those that judge.
+
+    Raises
+    ------
+    InputError
+        If they are not as `candidates_of` takes them, an effect by mode is neither declared nor
+        among them, or the rates of the runs contain a known effect already.
+    """
+    candidates = candidates_of(effects)
+    known = {effect.name for effect in declared.effects}
+    _require_present(declared, {*known, *(effect.name for effect in candidates)})
+    _require_possible(declared, runs)
+    return [effect for effect in candidates if effect.name not in known]

@@ -32,9 +32,9 @@ from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.runs import with_later_spikes
 from discover.closed_loop.search import Search
 from discover.closed_loop.searching import SearchResult
-from discover.closed_loop.starting_point import StartingPoint
 from discover.closed_loop.verdict import FinalVerdict
 from discover.dataset import Run
+from discover.effects import AbstractEffect
 from discover.inference.step_instants import instants_found
 from discover.statistics.residual import summarise
 
@@ -50,14 +50,21 @@ class Ended:
 
 
 def result_of(
-    begun: StartingPoint, ended: Ended, left_out_in_turn: bool, started: float
+    ended: Ended,
+    candidates: list[AbstractEffect],
+    noted: tuple[dict[str, list[float]], str],
+    left_out_in_turn: bool,
+    started: float,
 ) -> LoopResult:
     """Return the result of a loop.
 
     Parameters
     ----------
-    begun, ended
-        What it started from, and where it ended.
+    ended, candidates
+        Where it ended, and the effects among which it searched.
+    noted
+        Times of samples set aside as outliers, by run; and that rates were read with noise which
+        the fluid did not feel, in words, empty where not.
     left_out_in_turn
         Whether other searches leave each of the runs out.
     started
@@ -72,7 +79,7 @@ def result_of(
             search, final.beside_benches, tested, final.held_batch, judgement,
             min((one.criterion for one in verdict.other_constants), default=np.inf),
         )  # fmt: skip
-    beyond = beyond_the_search(final, constants, judgement, side_by_side, list(begun.candidates))
+    beyond = beyond_the_search(final, constants, judgement, side_by_side, candidates)
     bounds = constants.bounds
     seen = final.model, final.fit, final.beside_benches, side_by_side
     by_mode = modes_over_explanations(constants.by_mode, *seen)
@@ -84,7 +91,7 @@ def result_of(
     fluid = augmented_fluid(final.model, final.fit, final.present)
     states = states_of(final.model, final.fit, final.present)
     unseen_runs = None if final.held_batch is None else (final.held_batch, final.held_out)
-    spikes = with_later_spikes(begun.spikes, final.fitted, judgement)
+    spikes, of_rates = with_later_spikes(noted[0], final.fitted, judgement), noted[1]
     return LoopResult(
         verdict=judgement.verdict,
         error_before=final.error_at(0),
@@ -97,7 +104,7 @@ def result_of(
             )
             for i, name in enumerate(final.active, start=1)
         ),
-        remaining=_remaining(final, constants, verdict, spikes, tested, begun.of_rates),
+        remaining=_remaining(final, constants, verdict, spikes, tested, of_rates),
         rankings=tuple(search.rankings),
         records=tuple(beyond.records),
         declared_parameters=own | of_law,

@@ -3,22 +3,25 @@
 import time
 from collections.abc import Callable, Sequence
 
+from discover.closed_loop.candidates import candidates_beside
 from discover.closed_loop.ended import Ended, result_of
 from discover.closed_loop.explanations import BEAM_WIDTH
 from discover.closed_loop.final_fit import final_constants, final_fit
 from discover.closed_loop.judging.silence import records_are_silent
 from discover.closed_loop.own_noise import searched_by_noise
 from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.runs import MOST_SAMPLES
+from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.closed_loop.search.checkpoint import Store
 from discover.closed_loop.searching import SearchResult, SearchTask
-from discover.closed_loop.starting_point import starting_point
 from discover.closed_loop.verdict import verdict_on
 from discover.dataset import Dataset
+from discover.dataset.records.own_loadings import with_loadings
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.by_mode.degrees import lowest_not_refuted
+from discover.inference.scattered_rates import smoothed, unfelt_scatter
+from discover.inference.step_instants import with_places
 from discover.linear_algebra_threads import in_one_thread
 
 
@@ -99,32 +102,37 @@ def run_loop(
     started = time.perf_counter()
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
-    begun = starting_point(
-        dataset, declared, (fit, held_out), effects, strain, most_samples, loading, noise
-    )
+    fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
+    fitted, held = (with_loadings(some, loading, noise) for some in (fitted, held))
+    declared, fitted, held = with_places(declared, fitted, held)
+    require_samples(fitted, declared)
+    candidates = candidates_beside(declared, effects, [*fitted, *held])
+    of_rates = unfelt_scatter(declared, fitted)
+    if of_rates:
+        fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
     task = SearchTask(
-        begun.candidates,
-        begun.fitted,
-        begun.held_out,
+        candidates,
+        fitted,
+        held,
         noise=noise,
         max_effects=max_effects,
         width=explanations,
-        silent=records_are_silent(begun.fitted),
+        silent=records_are_silent(fitted),
         store=store,
         name=name,
         say=progress or (lambda line: None),
     )
-    found = task.search(begun.declared, laws)
-    task, found = searched_by_noise(task, found, begun.declared, laws)
+    found = task.search(declared, laws)
+    task, found = searched_by_noise(task, found, declared, laws)
     whole = dataset.select([run.name for run in task.fitted]).runs
 
     def judged(one: SearchResult) -> Ended:
-        final = final_fit(one, list(task.fitted), begun.held_out, dataset.names)
+        final = final_fit(one, list(task.fitted), held, dataset.names)
         constants = final_constants(final, one.by_mode)
         return Ended(one, final, constants, verdict_on(final, constants, task.silent, whole))
 
     ended = _carrying_over(task, judged(found), judged)
-    return result_of(begun, ended, left_out_in_turn, started)
+    return result_of(ended, candidates, (spikes, of_rates), left_out_in_turn, started)
 
 
 def _carrying_over(
