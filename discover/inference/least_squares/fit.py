@@ -73,7 +73,8 @@ class Fit:
     @property
     def cost(self) -> float:
         """Sum over runs of the squared relative errors."""
-        return float(np.sum(self.residual**2))
+        with np.errstate(over="ignore", invalid="ignore"):  # of what ran away
+            return float(np.sum(self.residual**2))
 
     @property
     def run_errors(self) -> Float[np.ndarray, " runs"]:
