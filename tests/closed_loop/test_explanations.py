@@ -14,9 +14,10 @@ from sklearn.linear_model import BayesianRidge
 
 import discover as dc
 from discover.closed_loop.explanations.bands.discrepancy import posterior
-from discover.closed_loop.explanations.probabilities import unexplained_probability
+from discover.closed_loop.explanations.probabilities import _inclusion, unexplained_probability
 from discover.closed_loop.judging.judgement import Judgement
 from discover.closed_loop.results.error_pair import ErrorPair
+from discover.closed_loop.results.explanation import Explanation
 from discover.closed_loop.results.loop_result import LoopResult
 from discover.closed_loop.results.run_record import RunRecord
 from discover.errors import InputError
@@ -115,6 +116,13 @@ def test_nothing_is_the_explanation_of_the_declared_fluid(tmp_path):
     assert first.effects == ()
     # noise of one draw in some looks like a gain of its own, but never as likely as none
     assert first.probability > 0.5 > sum(loop.explanations.inclusion.values())
+
+
+def test_effects_as_probable_as_one_another_are_told_in_the_order_of_their_names():
+    # the order of a set of names is another in every process
+    error = ErrorPair(0.1, None)
+    told = [Explanation(("b", "a", "c"), 0.6, error, {}), Explanation(("c",), 0.4, error, {})]
+    assert list(_inclusion(told)) == ["c", "a", "b"]
 
 
 @pytest.mark.slow

@@ -154,7 +154,10 @@ def _on_bench(
     problem, model = search.problem, search.model
     modulus = float(np.sum(np.asarray(model.declared.modulus, dtype=float)))
     places = {} if _TIMES_AT in free else {_TIMES_AT: (_TIMES, 1.0)}
-    for name in {effect.name for effect in model.effects} & {*_FAULTS} - {*apart}:
+    # in the order of the model: that of a set is another in every process
+    for name in (
+        one.name for one in model.effects if one.name in _FAULTS and one.name not in apart
+    ):
         at = model.positions(name)[0]
         if at not in free:
             places[at] = _FAULTS[name], modulus if name == _TOOL else 1.0

@@ -239,8 +239,8 @@ def compared_with_constants(
     instead = {
         name: one
         for one in sorted(others, key=lambda one: -one.criterion)
-        for name in set(active) - set(one.effects)
-        if one.criterion < own + INDISTINGUISHABLE
+        for name in active
+        if name not in one.effects and one.criterion < own + INDISTINGUISHABLE
     }
     if instead:
         judgement = _with_sentence(judgement, min(instead.values(), key=lambda one: one.criterion))

@@ -155,10 +155,13 @@ def _parameters(model: AugmentedModel, one: Carried) -> Mapping[str, Mapping[str
 
 
 def _inclusion(found: Sequence[Explanation], spelled=lambda name: name) -> dict[str, float]:
-    """Return the probability of each name in what its effects are spelled as, the largest first."""
+    """Return the probability of each name in what its effects are spelled as, the largest first.
+
+    Those that are as large as one another are in the order of their names, whatever a set's is.
+    """
     total: dict[str, float] = {}
     for one in found:
         for effects in one.members:
-            for name in {spelled(effect) for effect in effects}:
+            for name in dict.fromkeys(map(spelled, effects)):
                 total[name] = total.get(name, 0.0) + one.probability / len(one.members)
-    return dict(sorted(total.items(), key=lambda pair: -pair[1]))
+    return dict(sorted(total.items(), key=lambda pair: (-pair[1], pair[0])))

@@ -89,7 +89,7 @@ def _units(result: Any, explanations: Sequence["Explanation"]) -> dict[str, str]
     What is dimensionless has the unit 1.
     """
     units = {}
-    for effect in {name for one in explanations for name in one.parameters}:
+    for effect in dict.fromkeys(name for one in explanations for name in one.parameters):
         try:
             of_effect = make_effect(effect).parameters
         except InputError:

@@ -93,7 +93,7 @@ def exact_terms(
     }
     bases = {
         name: _sum([_word(word, tensors) for word in name.split("+")])
-        for name in {TENSOR_NAMES[term.tensor] for term in terms}
+        for name in dict.fromkeys(TENSOR_NAMES[term.tensor] for term in terms)
     }
     values: list[Components] = []
     for term in terms:
