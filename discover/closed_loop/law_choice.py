@@ -86,14 +86,13 @@ def choose_law(
         fits = fit_batch(model, batch, starts, free)
         found[name] = model, best_of(fits) or fits[0]
     tried = list(found.values())
-    usable = [fit for _, fit in tried if fit.usable]
-    if not usable:
+    best = best_of(fit for _, fit in tried)
+    if best is None:
         raise InputError(
             f"None of the laws {', '.join(names)} can be integrated through the fitted runs: their "
             "stress runs away. Check modes and units."
         )
     weight = np.asarray(batch.weight)
-    best = min(usable, key=lambda fit: fit.cost)
     effective = summarise(best.residual, weight).effective_samples
     costs = [judged_cost(fit.residual, weight) if fit.usable else np.inf for _, fit in tried]
     criteria = [

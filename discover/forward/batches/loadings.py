@@ -82,8 +82,11 @@ class Loadings(eqx.Module):
             # what the likely factor takes, and no more where nothing is predicted
             share = (1.0 - (1.0 + signal * size) ** -0.5) * along / (size + (size == 0.0))
             # a loading whose runs ran away leaves the others as they are
-            own = _where(self.members, share[..., :, None]).sum(-2)
-            return residual - own[..., None] * predicted
+            return residual - self.at_rows(share)[..., None] * predicted
+
+    def at_rows(self, values: Float[Values, "*trials loadings"]) -> Float[Values, "*trials rows"]:
+        """Return values of loadings at the rows of their records; zero at rows of none."""
+        return _where(self.members, values[..., :, None]).sum(-2)
 
     def factors(
         self,

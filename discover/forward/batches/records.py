@@ -135,8 +135,7 @@ class Records(eqx.Module):
         factors, precision = self.factors(predicted)
         prior = self.loadings.deviation**2
         factors = factors * prior * precision / (1.0 + prior * precision)
-        of_run = np.where(self.loadings.members, factors[..., None], 0.0).sum(-2)
-        return predicted * (1.0 + of_run)[..., None]
+        return predicted * (1.0 + self.loadings.at_rows(factors))[..., None]
 
     @property
     def deviation_of_loadings(self) -> float:
