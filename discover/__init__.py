@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
     from discover.errors import InputError as InputError
+    from discover.fitting import fit as fit
     from discover.laws import AbstractConstitutiveLaw as AbstractConstitutiveLaw
     from discover.laws import Fluid as Fluid
     from discover.laws import make_law as make_law
@@ -69,6 +70,7 @@ __all__ = [
     "close_loop",
     "compare",
     "effects",
+    "fit",
     "from_dataframe",
     "in_flow",
     "laws",
@@ -102,6 +104,7 @@ _PLACES = {
     "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),
+    "discover.fitting": ("fit",),
     "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),
     "discover.laws.registry": ("register_law",),
     "discover.learners": ("register_learner",),

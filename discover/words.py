@@ -1,6 +1,7 @@
 """Lists and shares as sentences have them, for all rooms."""
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 
 
 def listed(parts: Sequence[str]) -> str:
@@ -21,3 +22,9 @@ def plainly(value: float) -> str:
 def percent_of(share: float) -> str:
     """Return a share as a percentage, with two digits below a hundred and whole from there."""
     return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"
+
+
+def did_you_mean(given: object, known: Iterable[str]) -> str:
+    """Return a question that names what is spelled most like a text; empty where nothing is."""
+    near = difflib.get_close_matches(str(given), list(known), 1)
+    return f" Did you mean {near[0]!r}?" if near else ""

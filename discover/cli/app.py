@@ -13,6 +13,7 @@ from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export
 from discover.cli.fetch_command import fetch_data
+from discover.cli.fit_command import fit
 from discover.cli.interruption import obeying_interrupts
 from discover.cli.names_commands import effects, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
@@ -49,6 +50,7 @@ app.command("demo")(demo)
 app.command("compare")(compare)
 app.command("close-loop")(close_loop)
 app.command("batch")(batch)
+app.command("fit")(fit)
 app.command("distil")(distil)
 app.command("export")(export)
 app.command("laws")(laws)

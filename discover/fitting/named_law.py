@@ -1,0 +1,338 @@
+"""Least-squares fit of one named law, within bounds, from several starts."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import qmc
+
+from discover.closed_loop.final_model import augmented_fluid, declared_law
+from discover.closed_loop.judging.before_after import record_runs
+from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.dataset import Dataset, Run
+from discover.errors import InputError
+from discover.fitting.named_law_fit import Constant, NamedLawFit
+from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.least_squares import Fit
+from discover.inference.modulus_errors import modulus_shifts, response
+from discover.inference.problem import FitProblem
+from discover.laws import LAWS
+from discover.laws.multimode import Fluid
+from discover.laws.registry import make_law, starting_values
+from discover.linear_algebra_threads import in_one_thread
+from discover.statistics.residual import Expectation
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
+from discover.words import did_you_mean
+
+_STARTS = 8
+"""Starts of a fit, spread evenly over the ranges   [Sobol 1967]; the best end counts."""
+
+_DECADES = 1.5
+"""To either side of the estimate, over which starts of a modulus or a time are spread."""
+
+Bounds = Mapping[str, tuple[float, float]]
+
+
+@in_one_thread
+def fit(
+    law: str,
+    data: Dataset,
+    *,
+    base: Fluid | None = None,
+    bounds: Bounds | None = None,
+    start: Mapping[str, float] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    effects: Mapping[str, Any] | None = None,
+    held_out: HeldOut = (),
+    noise: float | None = None,
+    most_samples: int = MOST_SAMPLES,
+) -> NamedLawFit:
+    """Fit one named law to runs.
+
+    Modes come from `base`, else from the linear sweep of the data, else one mode is fitted along.
+
+    Parameters
+    ----------
+    law
+        Name of the law; `discover.laws` lists them.
+    data
+        The runs to fit: transients, creep, flow curves, sweeps, in shear or extension.
+    base
+        A fluid whose modes and solvent are taken; its own law is not.
+    bounds
+        Range (low, high) of constants, by name, inside the law's own: parameters of the law,
+        ``modulus_Pa``, ``relaxation_time_s``. Naming one of the last two fits it, for several modes
+        as one factor on all of them.
+    start
+        Values from which the fit starts, by name, beside the starts that it spreads by itself.
+    fixed
+        Constants that are not fitted, by name.
+    effects
+        Effects beside the law, as ``[model] effects`` in a study, such as
+        ``{"solvent_viscosity": "fit"}``.
+    held_out
+        Names of runs of `data` that only test the fit, or a data set of such runs.
+    noise
+        Relative noise of the runs, where known.
+    most_samples
+        Samples of a run that are used, at most.
+
+    Returns
+    -------
+    The fit: ``summary()``, ``conf_int()``, ``correlation``, ``predict()``, ``plot()``, ``use``.
+
+    Raises
+    ------
+    InputError
+        If a name, a value or a range is none, or the law cannot be integrated through the runs.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01)
+    >>> dc.fit("giesekus", data).summary()  # doctest: +SKIP
+    """
+    if not isinstance(law, str) or law not in LAWS:
+        raise InputError(f"Unknown law {law!r}.{did_you_mean(law, LAWS)} Laws: {', '.join(LAWS)}.")
+    if held_out == "each":
+        raise InputError("fit has no held_out='each'. Name runs, or use close_loop.")
+    bounds, start, fixed = (
+        _numbers(name, given, count)
+        for name, given, count in (("bounds", bounds, 2), ("start", start, 1), ("fixed", fixed, 1))
+    )
+    both = sorted(fixed.keys() & (bounds.keys() | start.keys()))
+    if both:
+        raise InputError(f"{both[0]!r} is fixed, and has a range or a start. Choose one.")
+    divided = data_in_memory(data, held_out)
+    whole = divided.dataset
+    fitted, held, _ = split_runs(
+        whole, divided.fit.names, divided.held_out.names, None, most_samples
+    )
+    declared = _declared(law, data, base, fitted, (bounds, start, fixed), effects)
+    forward = forward_model(declared)
+    require_samples(fitted, forward)
+    batch = make_batch(fitted)
+    model = AugmentedModel(forward, [], data_scales(fitted), batch)
+    names = _narrow(model, declared, bounds)
+    problem = FitProblem(model, batch)
+    free = model.free_positions
+    best = problem.best_fit(_starts(model, names, free, start, declared), free)
+    if not best.usable:
+        raise InputError(
+            f"{LAWS[law].title} cannot be integrated through these runs with any of {_STARTS} "
+            "starts. Narrow the ranges with bounds, or give a start."
+        )
+    expectation = Expectation(noise, forward.linear_error)
+    covariance, degrees = _uncertainty(problem, best)
+    held_batch = make_batch(held) if held else None
+    records = record_runs(model, batch, fitted, [best.theta], held_out=False)
+    if held_batch is not None:
+        records += record_runs(model, held_batch, held, [best.theta], held_out=True)
+    active = [known.name for known in forward.effects]
+    return NamedLawFit(
+        law,
+        _constants(model, best, names, covariance, declared),
+        covariance,
+        degrees,
+        augmented_fluid(model, best, active),
+        {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
+        problem.lack_of_fit(best, fitted, expectation),
+        tuple(records),
+        model,
+        best.theta,
+        declared_law(forward, best, {}),
+        data.name,
+    )
+
+
+def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
+    """Return constants by name with one number each, or two increasing ones."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise InputError(f"{name} must be a mapping from names to numbers; got {given!r}.")
+    found = {}
+    for key, value in given.items():
+        try:
+            numbers = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            numbers = np.full(1, np.nan)
+        wanted = "a finite number" if count == 1 else "two increasing numbers (low, high)"
+        plain = not isinstance(value, str | bytes | bool) and numbers.size == count
+        if not plain or not np.all(np.isfinite(numbers)) or np.any(np.diff(numbers.ravel()) <= 0):
+            raise InputError(f"{name}[{key!r}] must be {wanted}; got {value!r}.")
+        found[key] = float(numbers.ravel()[0]) if count == 1 else tuple(map(float, numbers))
+    return found
+
+
+def _declared(
+    law: str,
+    data: Dataset,
+    base: Fluid | None,
+    runs: Sequence[Run],
+    given: tuple[dict, dict, dict],
+    effects: Mapping[str, Any] | None,
+) -> DeclaredModel:
+    """Return the law with its modes, and what of them is free."""
+    bounds, start, fixed = given
+    own = LAWS[law].parameters
+    possible = [*own, *MODE_CONSTANTS]
+    for name in (*bounds, *start, *fixed):
+        if name not in possible:
+            raise InputError(
+                f"{LAWS[law].title} has no constant {name!r}.{did_you_mean(name, possible)} "
+                f"Constants: {', '.join(possible)}."
+            )
+    values = {key: min(max(value, own[key][0]), own[key][1])
+              for key, value in starting_values(law).items()}  # fmt: skip
+    values |= {key: value for key, value in (start | fixed).items() if key in own}
+    built = make_law(law, values)
+    free = [name for name in own if name not in fixed]
+    one_mode = base is None and (data.linear_sweep is None or not LAWS[law].is_one_mode)
+    if base is not None:
+        if not isinstance(base, Fluid):
+            raise InputError(f"base must be a Fluid; got a {type(base).__name__}.")
+        fluid = Fluid(built, base.modulus, base.relaxation_time, base.solvent_viscosity)
+    elif one_mode:
+        estimate = dict(zip(MODE_CONSTANTS, _estimated_mode(runs), strict=True))
+        fluid = Fluid(built, *((estimate | start | fixed)[name] for name in MODE_CONSTANTS))
+    else:
+        fluid = Fluid.from_sweep(data.linear_sweep, built)
+    asked = [name for name in MODE_CONSTANTS if one_mode or name in bounds or name in start]
+    if not one_mode and fixed.keys() & set(MODE_CONSTANTS):
+        raise InputError("Modes come from base or the linear sweep; they cannot be fixed here.")
+    free += [name for name in asked if name not in fixed]
+    return with_known(declared_fluid(fluid, data), effects, free)
+
+
+def _estimated_mode(runs: Sequence[Run]) -> tuple[float, float]:
+    """Return a modulus in Pa and a time in s from the largest stresses, rates and durations.
+
+    The stress of a steady flow is about Gλγ̇, and a flow that shows relaxation lasts about λ or has
+    a rate of about 1/λ.
+    """
+    rates = [float(np.max(np.abs(run.rate))) for run in runs]
+    rate = float(np.median([r for r in rates if r > 0.0] or [1.0]))
+    time = 1.0 / rate
+    stress = float(np.median([np.max(np.abs(run.stress)) for run in runs])) or 1.0
+    return stress / (time * rate), time
+
+
+def _narrow(model: AugmentedModel, declared: DeclaredModel, bounds: Bounds) -> dict[int, str]:
+    """Narrow the model's ranges to the bounds; return the names of the free constants."""
+    names = {}
+    free = [p.name for p in model.declared.free_parameters]
+    for position in model.declared.free_positions:
+        name = MODE_CONSTANTS[position] if position < 2 else free[position - 2]
+        names[position] = name
+        if name not in bounds:
+            continue
+        low, high = bounds[name]
+        if position < 2:
+            if low <= 0.0:
+                raise InputError(f"bounds[{name!r}] must be positive; got {bounds[name]}.")
+            unit = _size(declared, position)
+            low, high = np.log(low / unit), np.log(high / unit)
+        first, last = float(model.low[position]), float(model.high[position])
+        if low >= last or high <= first:
+            raise InputError(
+                f"bounds[{name!r}] = {bounds[name]} lies outside the range of the law, "
+                f"{first:g} to {last:g}."
+            )
+        model.low[position], model.high[position] = max(low, first), min(high, last)
+    for known in model.declared.effects:
+        for position, parameter in zip(
+            model.positions(known.name), known.effect.parameters, strict=True
+        ):
+            if position in model.free_positions:
+                names[position] = f"{known.name}.{parameter.name}"
+    return names
+
+
+def _size(declared: DeclaredModel, position: int) -> float:
+    """Return the modulus or time of one mode; 1 where one factor on several is fitted."""
+    values = (declared.modulus, declared.relaxation_time)[position]
+    return float(values[0]) if len(values) == 1 else 1.0
+
+
+def _starts(
+    model: AugmentedModel,
+    names: Mapping[int, str],
+    free: Sequence[int],
+    start: Mapping[str, float],
+    declared: DeclaredModel,
+) -> list[Float[np.ndarray, " p"]]:
+    """Return where the fit starts: as declared, and spread over the ranges."""
+    first = np.clip(model.zero(), model.low, model.high)
+    for position, name in names.items():
+        if name in start:
+            value = start[name]
+            if position < 2:
+                value = float(np.log(value / _size(declared, position)))
+            if not model.low[position] <= value <= model.high[position]:
+                raise InputError(f"start[{name!r}] = {start[name]:g} lies outside its range.")
+            first[position] = value
+    if not free:
+        return [first]
+    starts = [first]
+    for point in qmc.Sobol(len(free), scramble=False).random(_STARTS)[1:]:
+        theta = first.copy()
+        for share, position in zip(point, free, strict=True):
+            low, high = float(model.low[position]), float(model.high[position])
+            if position < 2:
+                reach = _DECADES * np.log(10.0)
+                low, high = max(low, first[position] - reach), min(high, first[position] + reach)
+            elif low >= 0.0:
+                # amplitudes are small where laws are mild: even in the logarithm
+                top = min(high, 1e3 * max(float(model.first_trial[position]), low))
+                low, high = np.log(max(low, 1e-3 * top)), np.log(top)
+                theta[position] = np.exp(low + share * (high - low))
+                continue
+            theta[position] = low + share * (high - low)
+        starts.append(np.clip(theta, model.low, model.high))
+    return starts
+
+
+def _uncertainty(problem: FitProblem, fit: Fit) -> tuple[Float[np.ndarray, "p p"], float]:
+    """Return covariance and degrees of freedom, errors of the modes' moduli included."""
+    if not fit.free:
+        return np.zeros((0, 0)), 1.0
+    covariance, noise = covariance_and_noise(problem.batch, fit.residual, fit.jacobian)
+    shifts = modulus_shifts(problem.model, fit.theta, problem.batch)
+    if len(shifts):
+        off = response(fit.jacobian, shifts)
+        covariance = covariance + off @ off.T
+    return covariance, max(noise.effective_samples - len(fit.free), 1.0)
+
+
+def _constants(
+    model: AugmentedModel,
+    fit: Fit,
+    names: Mapping[int, str],
+    covariance: Float[np.ndarray, "p p"],
+    declared: DeclaredModel,
+) -> tuple[Constant, ...]:
+    units = {
+        f"{known.name}.{parameter.name}": parameter.unit or "1"
+        for known in model.declared.effects
+        for parameter in known.effect.parameters
+    }
+    constants = []
+    for i, position in enumerate(fit.free):
+        name, value = names[position], float(fit.theta[position])
+        error = float(np.sqrt(max(covariance[i, i], 0.0)))
+        low, high = float(model.low[position]), float(model.high[position])
+        if position >= 2:
+            unit = units.get(name, "1")
+            constants.append(Constant(name, unit, value, error, low, high))
+            continue
+        several = len(declared.modulus) > 1
+        size = _size(declared, position) * float(np.exp(value))
+        unit = "1" if several else ("Pa", "s")[position]
+        name = ("modulus_factor", "relaxation_time_factor")[position] if several else name
+        low, high = (_size(declared, position) * float(np.exp(end)) for end in (low, high))
+        constants.append(Constant(name, unit, size, size * error, low, high, logarithmic=True))
+    return tuple(constants)

@@ -1,0 +1,307 @@
+"""The result of fitting one named law."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+from scipy.stats import t as student
+
+from discover.closed_loop.results.run_record import RunRecord
+from discover.dataset import Dataset
+from discover.equations import Equation, HasEquation
+from discover.equations.equation import mean_relaxation_time
+from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
+from discover.laws import LAWS
+from discover.laws.multimode import Fluid
+from discover.notebook_view import NotebookView
+from discover.page_view import PageView
+from discover.statistics import LackOfFit
+from discover.words import percent_of
+
+_LABELS = {"modulus_Pa": "G", "relaxation_time_s": "λ"}
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A fitted constant.
+
+    Attributes
+    ----------
+    name, unit
+        As a study spells it; ``"1"`` for a dimensionless one.
+    value, standard_error
+        In that unit. The error of a modulus or a relaxation time is that of its logarithm, times
+        the value.
+    low, high
+        Range in which it was fitted.
+    logarithmic
+        Whether its logarithm was fitted, so that its interval is one of a factor.
+    """
+
+    name: str
+    unit: str
+    value: float
+    standard_error: float
+    low: float
+    high: float
+    logarithmic: bool = False
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether it lies at an end of its range, so that the range and not the data set it."""
+        margin = 1e-6 * (self.high - self.low if np.isfinite(self.high - self.low) else 1.0)
+        return self.value - self.low <= margin or self.high - self.value <= margin
+
+    def estimate(self, low: float, high: float) -> str:
+        """Return name, value and interval in words, to as many digits as the interval has."""
+        digits = 3 if high <= low else max(0, 1 - int(np.floor(np.log10(0.5 * (high - low)))))
+        label = _LABELS.get(self.name, self.name.rpartition(".")[2].replace("_", " "))
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        value, *ends = (
+            f"{number:.{digits}f}" if digits < 6 and abs(number) < 1e6 else f"{number:.4g}"
+            for number in (self.value, low, high)
+        )
+        return f"{label} = {value}{unit} (95 %: {ends[0]} to {ends[1]})"
+
+    def interval(self, quantile: float) -> tuple[float, float]:
+        """Return the ends of an interval of so many standard errors, inside the range."""
+        off = quantile * self.standard_error
+        if self.logarithmic:
+            ends = self.value * np.exp(np.array([-1.0, 1.0]) * off / self.value)
+        else:
+            ends = self.value + np.array([-off, off])
+        low, high = np.clip(ends, self.low, self.high)
+        return float(low), float(high)
+
+
+@dataclass(frozen=True, eq=False)
+class NamedLawFit(NotebookView, PageView, HasEquation):
+    """One named law fitted to runs by least squares.
+
+    Attributes
+    ----------
+    law
+        Name of the law, as in `discover.laws`.
+    constants
+        What was fitted, in the order of `correlation`.
+    covariance
+        Of the constants as they were fitted (moduli and times as logarithms), shape (p, p).
+    degrees_of_freedom
+        Independent samples of the residual less fitted constants.
+    fluid
+        The fitted fluid.
+    effects
+        Effects that were fitted or declared beside the law, with their values, by name.
+    misfit
+        What the fit leaves of the runs, and whether that is noise.
+    records
+        The runs, measured and predicted, those held out among them.
+    model, theta
+        The forward model and its parameter vector.
+    written
+        The law as an equation; None where it cannot be written out.
+    title
+        Name of the data.
+    """
+
+    law: str
+    constants: tuple[Constant, ...]
+    covariance: Float[np.ndarray, "p p"]
+    degrees_of_freedom: float
+    fluid: Fluid
+    effects: Mapping[str, tuple[float, ...]]
+    misfit: LackOfFit
+    records: tuple[RunRecord, ...]
+    model: AugmentedModel
+    theta: Float[np.ndarray, " p"]
+    written: Equation | None = None
+    title: str = ""
+
+    _page: ClassVar[str] = "discover.report.fit:fit_page"
+
+    @property
+    def error(self) -> float:
+        """Relative error, mean over the fitted runs."""
+        return float(np.mean([one.errors[0] for one in self.records if not one.held_out]))
+
+    @property
+    def held_out_error(self) -> float | None:
+        """Relative error, mean over the runs held out; None without any."""
+        held = [one.errors[0] for one in self.records if one.held_out]
+        return float(np.mean(held)) if held else None
+
+    @property
+    def fits_to_the_noise(self) -> bool:
+        """Whether what the fit leaves is noise."""
+        return self.misfit.verdict == "explained"
+
+    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
+        """Return confidence intervals of the constants, columns ``low`` and ``high``.
+
+        From the curvature at the fit and the noise of the residual, autocorrelation included. Where
+        a systematic misfit remains they hold only the noise.
+
+        Parameters
+        ----------
+        level
+            Probability, between 0 and 1.
+
+        Raises
+        ------
+        InputError
+            If `level` is none.
+        """
+        if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
+            raise InputError(f"level must be a number between 0 and 1; got {level!r}. Try 0.95.")
+        quantile = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom))
+        ends = [constant.interval(quantile) for constant in self.constants]
+        return pd.DataFrame(ends, index=self._index, columns=["low", "high"], dtype=float)
+
+    def summary(self) -> pd.DataFrame:
+        """Return the constants, one line each: value, standard error, 95 % interval, unit."""
+        values = pd.DataFrame(
+            {
+                "value": [constant.value for constant in self.constants],
+                "standard_error": [constant.standard_error for constant in self.constants],
+            },
+            index=self._index,
+            dtype=float,
+        )
+        notes = pd.DataFrame(
+            {
+                "unit": [constant.unit for constant in self.constants],
+                "at_bound": [constant.at_bound for constant in self.constants],
+            },
+            index=self._index,
+        )
+        return pd.concat([values, self.conf_int(), notes], axis=1)
+
+    @property
+    def correlation(self) -> pd.DataFrame:
+        """Correlation matrix of the constants; beyond ±0.95 only a combination is determined."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        scale = np.where(deviation > 0.0, deviation, 1.0)
+        matrix = self.covariance / np.outer(scale, scale)
+        return pd.DataFrame(matrix, index=self._index, columns=self._index)
+
+    @property
+    def _index(self) -> pd.Index:
+        return pd.Index([constant.name for constant in self.constants], name="constant")
+
+    def predict(self, data: Dataset) -> dict[str, Float[np.ndarray, " n"]]:
+        """Return what the fitted law records in each run: stress in Pa, or strain, by run."""
+        if not isinstance(data, Dataset):
+            raise InputError(
+                f"predict needs a data set; got a {type(data).__name__}. Load one with "
+                "dc.load_dataset."
+            )
+        predicted = self.model.predict(self.theta, make_batch(data.runs))
+        return {run.name: row[: len(run)] for run, row in zip(data.runs, predicted, strict=True)}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the relative error of each run, one line a run."""
+        lines = [
+            {"run": one.name, "held_out": one.held_out, "error": float(one.errors[0])}
+            for one in self.records
+        ]
+        return pd.DataFrame(lines)
+
+    def equation(self) -> Equation:
+        """Return the fitted law with its modes and solvent, for exports.
+
+        Raises
+        ------
+        InputError
+            If the law cannot be written out.
+        """
+        if self.written is None:
+            raise InputError(f"{LAWS[self.law].title} cannot be written out as an equation.")
+        return replace(self.written, solvent_viscosity=float(self.fluid.solvent_viscosity))
+
+    @property
+    def use(self) -> dict[str, Any]:
+        """What a simulation needs: the law, its constants, modes, range and expected error."""
+        rates = [float(np.max(np.abs(one.rate))) for one in self.records]
+        strains = [float(np.nanmax(np.abs(one.strain))) for one in self.records]
+        modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
+        ends = self.conf_int()
+        return {
+            "law": self.law,
+            "constants": {
+                constant.name: {
+                    "value": constant.value,
+                    "ci95": [float(end) for end in ends.loc[constant.name]],
+                    "unit": constant.unit,
+                }
+                for constant in self.constants
+            },
+            "modes": [
+                {"modulus_Pa": float(modulus), "relaxation_time_s": float(time)}
+                for modulus, time in zip(*modes, strict=True)
+            ],
+            "solvent_viscosity_Pa_s": float(self.fluid.solvent_viscosity),
+            "range": {
+                "weissenberg": max(rates) * mean_relaxation_time(*modes),
+                "strain": max(strains) if np.isfinite(strains).all() else None,
+                "rate_1_s": max(rates),
+            },
+            "expected_error": {
+                "sigma12": self.error if self.held_out_error is None else self.held_out_error
+            },
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fit as ``fit.json`` holds it."""
+        return {
+            "law": self.law,
+            "use": self.use,
+            "adequate_to_the_noise": self.fits_to_the_noise,
+            "error": {"fit": self.error, "held_out": self.held_out_error},
+            "noise": self.misfit.noise,
+            "effects": {name: list(values) for name, values in self.effects.items()},
+            "correlation": self.correlation.to_dict(),
+            "runs": self.to_dataframe().to_dict("records"),
+        }
+
+    @cached_property
+    def text(self) -> str:
+        """The fit in a few sentences."""
+        ends = self.conf_int()
+        constants = [
+            one.estimate(*map(float, interval))
+            for one, interval in zip(self.constants, ends.to_numpy(), strict=True)
+        ]
+        said = [f"{', '.join([LAWS[self.law].title, *constants])}."]
+        noise = percent_of(self.misfit.noise)
+        if self.fits_to_the_noise:
+            said.append(f"Fits to the noise ({noise}).")
+        else:
+            said.append(
+                f"Describes the fitted runs to {percent_of(self.error)}; the rest is systematic "
+                f"(noise: {noise}), so intervals hold the noise only."
+            )
+        if self.held_out_error is not None:
+            said.append(f"Held-out runs: {percent_of(self.held_out_error)}.")
+        bound = [one.name for one in self.constants if one.at_bound]
+        if bound:
+            said.append(f"At an end of its range: {', '.join(bound)}.")
+        return " ".join(said)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.text}>"
+
+    def _shown(self):
+        yield self.text
+        yield self.summary().reset_index()
+        yield self.to_dataframe()
+
+    def plot(self):
+        """Return a matplotlib figure: every run, measured and fitted."""
+        from importlib import import_module
+
+        return import_module("discover.report.fit").fit_figure(self)

@@ -1,0 +1,167 @@
+"""Fits of one named law, to start-ups by scipy and closed forms."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
+
+import discover as dc
+from discover.cli.app import app
+
+MODULUS, TIME, MOBILITY = 80.0, 1.7, 0.3
+NOISE = 0.01
+
+
+def giesekus_start_up(rate, times):
+    """σ12 in Pa by scipy, of σ' + σ/λ + α σ·σ/(Gλ) = G γ̇ + convection."""
+
+    def change(_, s):
+        first, second, shear = s
+        extra = MOBILITY / (MODULUS * TIME)
+        return [
+            2 * rate * shear - first / TIME - extra * (first**2 + shear**2),
+            -second / TIME - extra * (second**2 + shear**2),
+            rate * (MODULUS + second) - shear / TIME - extra * shear * (first + second),
+        ]
+
+    found = solve_ivp(change, (0, times[-1]), [0, 0, 0], t_eval=times, rtol=1e-9, atol=1e-9)
+    return found.y[2]
+
+
+def data_of(stress_of, rates, seed=0):
+    generator = np.random.default_rng(seed)
+    times = np.linspace(0.05, 8.0, 80)
+    frames = []
+    for rate in rates:
+        stress = stress_of(rate, times)
+        size = np.sqrt(np.mean(stress**2))
+        frames.append(
+            pd.DataFrame(
+                {
+                    "run": f"{rate:g}",
+                    "time_s": times,
+                    "shear_rate_1_s": rate,
+                    "stress_Pa": stress + NOISE * size * generator.normal(size=times.size),
+                }
+            )
+        )
+    return dc.from_dataframe(pd.concat(frames))
+
+
+@pytest.fixture(scope="module")
+def data():
+    return data_of(giesekus_start_up, (0.5, 1.5, 3.0, 6.0))
+
+
+@pytest.fixture(scope="module")
+def fitted(data):
+    return dc.fit("giesekus", data, held_out=["6"])
+
+
+def test_the_true_constants_lie_in_the_intervals_and_the_misfit_is_the_noise(fitted):
+    ends = fitted.conf_int()
+    truth = {"modulus_Pa": MODULUS, "relaxation_time_s": TIME, "alpha": MOBILITY}
+    # three true constants at 99.9 %: one run of a hundred seeds may fail
+    wide = fitted.conf_int(0.999)
+    for name, value in truth.items():
+        assert wide.loc[name, "low"] < value < wide.loc[name, "high"]
+        # 240 samples of 1 % noise: tighter than 5 % for each of three constants
+        assert ends.loc[name, "high"] - ends.loc[name, "low"] < 0.05 * value
+    assert fitted.fits_to_the_noise
+    # the error of a mean over 240 samples of noise is 5 % of it
+    assert fitted.error == pytest.approx(NOISE, rel=0.2)
+    assert fitted.held_out_error == pytest.approx(NOISE, rel=0.3)
+
+
+def test_intervals_hold_the_truth_as_often_as_they_say():
+    held = []
+    for seed in range(12):
+        ends = dc.fit(
+            "giesekus",
+            data_of(giesekus_start_up, (0.5, 1.5, 3.0), seed),
+            start={"modulus_Pa": 70.0, "relaxation_time_s": 2.0, "alpha": 0.2},
+        ).conf_int(0.9)
+        for name, value in zip(ends.index, (MODULUS, TIME, MOBILITY), strict=True):
+            held.append(ends.loc[name, "low"] < value < ends.loc[name, "high"])
+    # 36 of which 90 % should hold; fewer than 26 happens by chance in 1 of 500 such tests
+    assert sum(held) >= 26
+
+
+def test_a_wrong_law_is_said_to_leave_a_systematic_misfit(data):
+    wrong = dc.fit("ucm", data, held_out=["6"])
+    assert not wrong.fits_to_the_noise
+    assert "systematic" in wrong.text
+
+
+def test_a_solvent_is_found_beside_a_maxwell_mode():
+    viscosity, modulus, time = 12.0, 50.0, 1.2
+
+    def oldroyd_b(rate, times):  # closed form of the upper convected Maxwell start-up
+        return rate * (modulus * time * (1.0 - np.exp(-times / time)) + viscosity)
+
+    found = dc.fit("ucm", data_of(oldroyd_b, (0.3, 1.0)), effects={"solvent_viscosity": "fit"})
+    name = next(name for name in found.summary().index if name.startswith("solvent_viscosity"))
+    low, high = found.conf_int(0.999).loc[name]
+    assert low < viscosity < high
+    assert found.use["solvent_viscosity_Pa_s"] == pytest.approx(viscosity, rel=0.1)
+
+
+def test_what_lies_at_the_end_of_its_range_is_marked(data):
+    found = dc.fit("giesekus", data, bounds={"alpha": (0.0, 0.1)})
+    assert found.summary().loc["alpha", "at_bound"]
+    assert "end of its range: alpha" in found.text
+
+
+def test_correlations_are_those_of_the_covariance(fitted):
+    matrix = fitted.correlation.to_numpy()
+    # exact by construction but for rounding
+    np.testing.assert_allclose(np.diag(matrix), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(matrix, matrix.T, atol=1e-12)
+    assert np.all(np.abs(matrix) <= 1.0 + 1e-12)
+    # modulus and time of start-ups trade against each other
+    assert fitted.correlation.loc["modulus_Pa", "relaxation_time_s"] < -0.3
+
+
+def test_a_fixed_constant_stays_and_is_not_fitted(data):
+    found = dc.fit("giesekus", data, fixed={"alpha": 0.25})
+    assert list(found.summary().index) == ["modulus_Pa", "relaxation_time_s"]
+
+
+@pytest.mark.parametrize(
+    ("law", "options", "said"),
+    [
+        ("gisekus", {}, "Did you mean 'giesekus'"),
+        ("giesekus", {"bounds": {"alfa": (0.0, 1.0)}}, "Did you mean 'alpha'"),
+        ("giesekus", {"bounds": {"alpha": (1.0, 0.0)}}, "increasing"),
+        ("giesekus", {"start": {"alpha": "0.1"}}, "finite number"),
+        ("giesekus", {"start": {"alpha": 0.1}, "fixed": {"alpha": 0.1}}, "Choose one"),
+        ("giesekus", {"held_out": "each"}, "close_loop"),
+    ],
+)
+def test_a_wrong_argument_is_refused_with_the_remedy(data, law, options, said):
+    with pytest.raises(dc.InputError, match=said):
+        dc.fit(law, data, **options)
+
+
+def test_the_command_writes_page_json_and_equation(data, tmp_path):
+    folder = tmp_path / "data"
+    folder.mkdir()
+    for run in data.runs:
+        table = {"time_s": run.time, "shear_rate_1_s": run.rate, "stress_Pa": run.stress}
+        pd.DataFrame(table).to_csv(folder / f"{run.name}.csv", index=False)
+    (folder / "runs.csv").write_text("file\n" + "".join(f"{r.name}.csv\n" for r in data.runs))
+    out = tmp_path / "out"
+    command = ["fit", "giesekus", str(folder), "--held-out", "6.csv", "--out", str(out)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    written = json.loads((out / "fit.json").read_text())
+    assert set(written["use"]) >= {
+        "law", "constants", "modes", "solvent_viscosity_Pa_s", "range", "expected_error",
+    }  # fmt: skip
+    assert written["use"]["constants"]["alpha"]["value"] == pytest.approx(MOBILITY, rel=0.05)
+    assert "Fits to the noise" in (out / "report.html").read_text()
+    assert (out / "equations.tex").exists()
+    assert (out / "figures" / "runs.svg").exists()
