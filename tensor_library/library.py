@@ -201,7 +201,7 @@ def build_library(
     >>> len(build_library(degree=0)), len(build_library(degree=1, closed_forms=["exp"]))
     (8, 65)
     """
-    if not isinstance(degree, int) or not 0 <= degree <= 4:
+    if isinstance(degree, bool) or not isinstance(degree, int) or not 0 <= degree <= 4:
         raise ValueError(f"degree must be 0 to 4; got {degree!r}. Higher ones are not separable.")
     if invariants is None:
         invariants = [
@@ -213,6 +213,8 @@ def build_library(
         (invariants, INVARIANT_NAMES, "invariant"),
         (closed_forms, tuple(CLOSED_FORMS), "closed form"),
     ):
+        if isinstance(given, str | bytes) or not isinstance(given, Iterable):
+            raise ValueError(f"Give a list of names for each {what}; got {given!r}.")
         unknown = [name for name in given if name not in known]
         if unknown:
             raise ValueError(f"Unknown {what} {unknown[0]!r}; known are {', '.join(known)}.")

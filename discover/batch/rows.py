@@ -8,6 +8,8 @@ from typing import Any
 
 import pandas as pd
 
+from discover.dataset.tables.table import read_bytes
+
 QUANTITIES = ("sigma12", "N1", "N2")
 
 
@@ -78,7 +80,7 @@ def read_row(folder: Path) -> StudyRow:
     try:
         for name, reader in (("comparison.json", _comparison), ("loop.json", _loop)):
             if (folder / name).is_file():
-                return reader(json.loads((folder / name).read_text("utf-8")))
+                return reader(json.loads(read_bytes(folder / name, name)))
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass  # a table over thousands of studies does not fall over one of them
     return StudyRow()

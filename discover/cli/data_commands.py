@@ -24,6 +24,7 @@ FolderArgument = Annotated[
 def list_data(as_json: JsonOption = False) -> None:
     """List the data sets under DISCOVER_DATA."""
     from discover.dataset.load import DATA_VARIABLE, INDEX_FILE
+    from discover.dataset.tables.table import read_bytes
 
     root = os.environ.get(DATA_VARIABLE)
     if not root:
@@ -37,7 +38,7 @@ def list_data(as_json: JsonOption = False) -> None:
     for folder in sorted(Path(root).iterdir()):
         index = folder / INDEX_FILE
         if index.is_file():
-            lines = index.read_text("utf-8", "replace").splitlines()
+            lines = read_bytes(index, str(index)).decode("utf-8", "replace").splitlines()
             runs = sum(1 for line in lines[1:] if line.strip())
             rows.append({"name": folder.name, "runs": runs, "lve": (folder / "lve.csv").is_file()})
     if as_json:

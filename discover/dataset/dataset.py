@@ -14,6 +14,7 @@ from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
 from discover.errors import InputError
 from discover.notebook_view import NotebookView
+from discover.plain_numbers import short
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ class Dataset(NotebookView):
     material_functions: Mapping[str, Run] = field(default_factory=dict)
 
     def __post_init__(self):
+        if not isinstance(self.name, str):
+            raise InputError(f"The name of a data set must be text; got {short(self.name)}.")
         if isinstance(self.runs, Run | str) or not isinstance(self.runs, Iterable):
             raise InputError(
                 f"A data set takes a sequence of Run; got a {type(self.runs).__name__}. Put a "
@@ -195,6 +198,9 @@ class Dataset(NotebookView):
         InputError
             If a run does not exist.
         """
+        listed = isinstance(names, Iterable) and not isinstance(names, str)
+        if not listed or not all(isinstance(name, str) for name in names):
+            raise InputError(f"Runs are named in a list; got {short(names)}.")
         return replace(self, runs=tuple(self._named(name) for name in names))
 
     def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":

@@ -11,8 +11,12 @@ import pandas as pd
 from discover.dataset.dataset import Dataset
 from discover.dataset.load import DATA_FILES, INDEX_FILE, load_dataset
 from discover.errors import InputError
+from discover.plain_numbers import short
 
 _KINDS = tuple(name.removesuffix(".csv") for name in DATA_FILES if name != INDEX_FILE)
+
+_LONGEST_NAME = 200
+"""Bytes of a run's name; file systems take 255, and endings are put behind it."""
 
 
 def from_dataframe(
@@ -58,9 +62,19 @@ def from_dataframe(
     >>> dc.from_dataframe(samples.assign(run="slow"))
     <Dataset 'data in memory': 1 runs, 3 samples>
     """
+    if not (tables is None or isinstance(tables, Mapping)):
+        raise InputError(f"tables must be a mapping of names to tables; got {short(tables)}.")
+    if not isinstance(name, str):
+        raise InputError(f"The name of a data set must be text; got {short(name)}.")
     for label, table in [("samples", samples), ("runs", runs), *(tables or {}).items()]:
         if not (table is None or isinstance(table, pd.DataFrame)):
             raise InputError(f"{label} must be a pandas DataFrame; got a {type(table).__name__}.")
+        odd = [] if table is None else [one for one in table.columns if not isinstance(one, str)]
+        if odd:
+            raise InputError(
+                f"The columns of {label} must have text for names, on one level; got "
+                f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
+            )
     unknown = [kind for kind in tables or {} if kind not in _KINDS]
     if unknown:
         raise InputError(f"There is no table {unknown[0]!r}; it may be {', '.join(_KINDS)}.")
@@ -78,19 +92,34 @@ def from_dataframe(
         return replace(load_dataset(folder, **options), name=name)
 
 
+def _can_name_a_run(name: object) -> bool:
+    """Return whether a name can be one of a run, whose samples pass through a file of that name."""
+    if not isinstance(name, str) or name in DATA_FILES or name.strip(". ") == "":
+        return False
+    try:
+        size = len(name.encode("utf-8"))
+    except UnicodeEncodeError:  # half a character
+        return False
+    return size <= _LONGEST_NAME and not {"/", "\\"} & {*name} and name.isprintable()
+
+
 def _by_run(samples: pd.DataFrame | None, name: str) -> dict[str, pd.DataFrame]:
     """Return the samples of each run, in the order of the table, without columns it lacks."""
     if samples is None or not len(samples):
         return {}
     if "run" not in samples:
         samples = samples.assign(run=name)
+    if samples.columns.duplicated().any():
+        twice = samples.columns[samples.columns.duplicated()][0]
+        raise InputError(f"samples has the column {short(twice)} twice. Leave one of them out.")
+    wrong = [run for run in samples["run"] if not _can_name_a_run(run)]
+    if wrong:
+        raise InputError(
+            f"The column run must hold names of runs: text of at most {_LONGEST_NAME} characters "
+            f"that can name a file, and not that of a table; got {short(wrong[0])}."
+        )
     found = {}
-    for run, table in samples.groupby("run", sort=False, dropna=False):
-        if not isinstance(run, str) or not run or {"/", "\\"} & {*run} or run in DATA_FILES:
-            raise InputError(
-                f"The column run must hold names of runs, and none that a path or a table has; got "
-                f"{run!r}."
-            )
+    for run, table in samples.groupby("run", sort=False):
         # a quantity that this run did not record
         found[run] = table.drop(columns="run").dropna(axis="columns", how="all")
     return found

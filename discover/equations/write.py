@@ -50,7 +50,7 @@ def write_equation(
         raise InputError(f"Unknown format {form!r}; write one of {', '.join(FORMATS)}.")
     if form != "json":  # which holds what was found, and no more
         said = in_a_solver(equation)
-        notes = () if said is None else (said.text,)
+        notes = () if said is None else (said if isinstance(said, str) else said.text,)
         equation = replace(equation, notes=(*equation.notes, *notes))
     options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
     given = {name: value for name, value in options.items() if value is not None}

@@ -22,6 +22,7 @@ from discover.laws import LAWS
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law, starting_values
 from discover.linear_algebra_threads import in_one_thread
+from discover.plain_numbers import as_number, as_whole_number
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
@@ -106,6 +107,9 @@ def fit(
     both = sorted(fixed.keys() & (bounds.keys() | start.keys()))
     if both:
         raise InputError(f"{both[0]!r} is fixed, and has a range or a start. Choose one.")
+    if noise is not None and not 0.0 <= (noise := as_number("noise", noise)) <= 10.0:
+        raise InputError(f"noise must be a fraction from 0 to 10; got {noise:g}. 0.01 means 1 %.")
+    most_samples = as_whole_number("most_samples", most_samples, 10)
     divided = data_in_memory(data, held_out)
     whole = divided.dataset
     fitted, held, _ = split_runs(

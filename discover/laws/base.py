@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
+from discover.plain_numbers import as_numbers
 from tensor_library.algebra import Symmetric, identity_like, trace
 from tensor_library.kinematics import (
     VelocityGradient,
@@ -203,4 +204,6 @@ def as_state(stress: Symmetric, like: State) -> State:
 
 def as_parameter(value: ArrayLike) -> Float[Array, ""]:
     """Return a law's parameter as an array, so that gradients and `vmap` reach it."""
+    if not isinstance(value, jax.Array):  # what is traced is one
+        value = as_numbers("A parameter of a law or a fluid", value, finite=False)
     return jnp.asarray(value, dtype=jnp.result_type(float))

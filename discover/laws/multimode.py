@@ -14,6 +14,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.plain_numbers import as_numbers
 from discover.words import counted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
 
@@ -28,18 +29,21 @@ class HasSpectrum(Protocol):
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
-    dtype = jnp.result_type(float)
-    try:
-        if isinstance(value, int | float | np.ndarray):  # without a program for each shape
-            value = np.atleast_1d(np.asarray(value, dtype=dtype))
-        modes = jnp.asarray(value, dtype=dtype)
-        return modes if modes.ndim else jnp.atleast_1d(modes)
-    except (TypeError, ValueError):
-        raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
+    if _holds_traced(value):
+        return jnp.atleast_1d(jnp.asarray(value, dtype=jnp.result_type(float)))
+    # with NumPy, without a program for each shape
+    modes = np.atleast_1d(as_numbers("The modes of a fluid, in Pa and s,", value, finite=False))
+    return jnp.asarray(modes, dtype=jnp.result_type(float))
+
+
+def _holds_traced(value: Any) -> bool:
+    return isinstance(value, Tracer) or (
+        isinstance(value, list | tuple) and any(isinstance(one, Tracer) for one in value)
+    )
 
 
 def _as_covariance(value: ArrayLike | None) -> Float[Array, "k k"] | None:
-    return None if value is None else jnp.asarray(value, dtype=jnp.result_type(float))
+    return None if value is None else as_parameter(value)
 
 
 class Fluid(eqx.Module):
@@ -85,6 +89,15 @@ class Fluid(eqx.Module):
                 f"got {self.law!r}."
             )
         shape = self.relaxation_time.shape
+        covariance = self.modulus_covariance
+        if self.solvent_viscosity.ndim or (
+            covariance is not None and covariance.shape != (*shape, *shape)
+        ):
+            raise InputError(
+                "The solvent viscosity of a fluid must be one number, and the covariance of its "
+                f"moduli a matrix of {len(shape) and shape[0]} rows; got the shapes "
+                f"{self.solvent_viscosity.shape} and {getattr(covariance, 'shape', None)}."
+            )
         if self.modulus.shape != shape or len(shape) != 1 or not shape[0]:
             raise InputError(
                 "modulus and relaxation_time of a fluid must have one value for each mode; got the "

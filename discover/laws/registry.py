@@ -20,6 +20,7 @@ from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from discover.new_names import require_new_name
+from discover.plain_numbers import as_number
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.registry import Registry
 
@@ -242,16 +243,11 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
             raise InputError(
                 f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to {high:g}."
             )
-        value = parameters[key]
-        if (
-            isinstance(value, bool)  # an int to Python
-            or not isinstance(value, int | float)
-            or not math.isfinite(value)
-            or not low <= value <= high
-        ):
+        value = as_number(f"The parameter {key!r} of the law {name!r}", parameters[key])
+        if not low <= value <= high:
             raise InputError(
                 f"The parameter {key!r} of the law {name!r} must be a number from {low:g} to "
-                f"{high:g}; got {value!r}."
+                f"{high:g}; got {value:g}."
             )
-        values.append(float(value))
+        values.append(value)
     return entry.build(*values)

@@ -1,15 +1,15 @@
 """What was done to the fluid before the first sample, as the beginning of its protocol."""
 
 from dataclasses import replace
-from numbers import Real
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.plain_numbers import as_number, as_numbers, short
 from discover.programs import on_device
-from discover.protocols.protocol import FlowProtocol, shear_rates
+from discover.protocols.protocol import FlowProtocol, require_flow, shear_rates
 
 STEADY_LENGTH = 20.0
 """A steady flow before a run is computed over this multiple of the run's length, at most: what
@@ -57,8 +57,9 @@ def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowPr
     >>> bool(stopped.begins < 0)
     True
     """
-    _require_positive("end", end)
-    if not (isinstance(rate, Real) and np.isfinite(rate) and rate != 0.0):
+    require_flow(protocol, "after_steady_flow")
+    end, rate = _positive("end", end), as_number("rate", rate)
+    if rate == 0.0:
         raise InputError(f"The rate of the flow before must not be 0; got {rate}. Rest needs none.")
     length = min(STEADY_LENGTH * end, STEADY_STRAIN / abs(rate))
     return _begun(protocol, np.array([-length, 0.0]), np.array([rate, rate]))
@@ -94,9 +95,10 @@ def after_step_strain(
     >>> bool(relaxation.begins < 0)
     True
     """
-    _require_positive("first", first)
-    numbers = isinstance(strain, Real) and isinstance(duration, Real)
-    if not numbers or not np.isfinite(strain) or duration < 0.0:
+    require_flow(protocol, "after_step_strain")
+    first = _positive("first", first)
+    strain, duration = as_number("strain", strain), as_number("duration", duration)
+    if duration < 0.0:
         raise InputError(
             f"A step needs a strain and a duration from 0 on; got {strain}, {duration}."
         )
@@ -133,7 +135,10 @@ def after_alternation(
     >>> bool(dc.after_alternation(wave, 2 * np.pi, times).begins < 0)
     True
     """
-    _require_positive("period", period)
+    require_flow(protocol, "after_alternation")
+    period, times = _positive("period", period), np.atleast_1d(as_numbers("times", times))
+    if times.ndim != 1 or not times.size:
+        raise InputError(f"times must be a list of times in s; got {short(times)}.")
     if np.any(np.asarray(protocol.amplitudes)):
         # a cosine has gone on for ever: begin where its rate is largest
         turn = -CYCLES * period + np.arange(_PER_CYCLE) / _PER_CYCLE * period
@@ -202,9 +207,11 @@ def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
     )
 
 
-def _require_positive(name: str, value: float) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} must be a positive time in s; got {value}.")
+def _positive(name: str, value: float) -> float:
+    number = as_number(name, value)
+    if number <= 0.0:
+        raise InputError(f"{name} must be a positive time in s; got {number:g}.")
+    return number
 
 
 def _begun(

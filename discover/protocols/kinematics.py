@@ -137,7 +137,7 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
     quantity
         What is recorded; by default σ12 in shear and the tensile stress in extension.
     """
-    if kind not in _GRADIENT:
+    if not isinstance(kind, str) or kind not in _GRADIENT:
         raise InputError(f"Unknown flow {kind!r}; the flows are {', '.join(KINDS)}.")
     gradient = np.array(_GRADIENT[kind])
     rate = gradient * np.array([2.0, 2.0, 2.0, 1.0])  # γ̇ = L + Lᵀ

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.errors import InputError
+from discover.plain_numbers import as_numbers, short
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import (
     MODULI,
@@ -144,13 +145,18 @@ def _interpolate(
 
 
 def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    try:
-        array = np.atleast_1d(np.asarray(values, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers; got {values!r}.") from None
-    if array.ndim != 1 or array.size == 0 or not np.all(np.isfinite(array)):
-        raise InputError(f"{name} must be a non-empty list of finite numbers; got {values!r}.")
+    array = np.atleast_1d(as_numbers(name, values))
+    if array.ndim != 1 or array.size == 0:
+        raise InputError(f"{name} must be a non-empty list of numbers; got {short(values)}.")
     return array
+
+
+def require_flow(protocol: object, name: str) -> None:
+    """Refuse what is no flow, as an argument of a function of this name."""
+    if not isinstance(protocol, FlowProtocol):
+        raise InputError(
+            f"{name} takes a flow, such as start_up(0.3); got a {type(protocol).__name__}."
+        )
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
@@ -278,10 +284,7 @@ def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     >>> dc.in_flow(dc.start_up(0.3), "uniaxial").flow
     'uniaxial'
     """
-    if not isinstance(protocol, FlowProtocol):
-        raise InputError(
-            f"in_flow takes a flow, such as start_up(0.3); got a {type(protocol).__name__}."
-        )
+    require_flow(protocol, "in_flow")
     found = kinematics_of(kind)
     return replace(protocol, kinematics=None if kind == "shear" else found)
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -13,9 +12,10 @@ from discover.errors import InputError
 from discover.laws.each_mode import of_each_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
+from discover.plain_numbers import as_number, as_whole_number, short
 from discover.programs import compiled
 from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
+from discover.protocols.protocol import FlowProtocol, recorded_at, require_flow, shear_rates
 from discover.simulate.solve import ShearStress, simulate
 from discover.statistics.projection import rms
 
@@ -77,25 +77,25 @@ def synthetic_dataset(
     >>> len(data), data[0].stress.shape
     (8, (51,))
     """
-    if protocol == "paper":
+    if isinstance(protocol, str) and protocol == "paper":
         protocols: Mapping[str, FlowProtocol] = paper_training_protocols()
-    elif isinstance(protocol, Mapping):
+    elif isinstance(protocol, Mapping) and protocol:
         protocols = protocol
+        for flow in protocols.values():
+            require_flow(flow, "synthetic_dataset")
     else:
-        raise InputError(f"Unknown synthetic protocol {protocol!r}; write 'paper'.")
-    if not (_is_number(noise) and 0.0 <= noise <= 10.0):
-        raise InputError(f"noise must be a fraction from 0 to 10; got {noise!r}. 0.01 means 1 %.")
-    whole = isinstance(n_samples, int | np.integer) and not isinstance(n_samples, bool)
-    if not (whole and 2 <= n_samples <= 1_000_000):
         raise InputError(
-            f"n_samples must be a whole number from 2 to a million; got {n_samples!r}."
+            f"Unknown synthetic protocol {short(protocol)}; write 'paper', or flows by name."
         )
-    if not (_is_number(duration) and duration > 0):
+    noise, duration = as_number("noise", noise), as_number("duration", duration)
+    n_samples = as_whole_number("n_samples", n_samples, 2, 1_000_000)
+    seed = as_whole_number("seed", seed)
+    if not 0.0 <= noise <= 10.0:
+        raise InputError(f"noise must be a fraction from 0 to 10; got {noise:g}. 0.01 means 1 %.")
+    if duration <= 0.0:
         raise InputError(
-            f"duration must be a positive number of relaxation times; got {duration!r}."
+            f"duration must be a positive number of relaxation times; got {duration:g}."
         )
-    if isinstance(seed, bool):
-        raise InputError(f"seed must be a whole number; got {seed!r}. Write 0 or 1.")
     fluid = Fluid.dimensionless(make_law(law, parameters))
     times = np.linspace(0.0, duration, n_samples)
     generator = np.random.default_rng(seed)
@@ -123,12 +123,6 @@ def synthetic_dataset(
         exact=exact,
         noise=float(noise),
     )
-
-
-def _is_number(value: Any) -> bool:
-    # a truth value is an int to Python, and none to the reader of a study
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    return number and bool(np.isfinite(value))
 
 
 def linear_sweep(fluid: Fluid) -> LinearSweep:

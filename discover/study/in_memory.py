@@ -170,7 +170,7 @@ def with_known(
             f"{unknown[0]!r} cannot be fitted: the base has {', '.join(possible)}. A law without a "
             "name has no constant that could; register it with register_law."
         )
-    known = known_effects(effects or {}, "known_effects")
+    known = known_effects({} if effects is None else effects, "known_effects")
     return replace(declared, effects=known, free=tuple(dict.fromkeys(free)), by_mode=tuple(by_mode))
 
 

@@ -53,3 +53,23 @@ def test_a_law_that_loses_its_conformation_and_one_that_runs_away_say_so():
     assert "smallest eigenvalue" in text
     assert "conformation any" not in text
     assert "smallest eigenvalue" not in write_equation(Equation(()), "python")
+
+
+@pytest.mark.parametrize(
+    ("terms", "modulus", "times", "wi"),
+    [
+        ((LawTerm("sigma.sigma", -1e300),), (1.0,), (1.0,), 3.0),
+        ((), (1.0,) * 1000, tuple(np.geomspace(1e-9, 1e9, 1000)), 3.0),
+        ((LawTerm("sigma.sigma", 0.3),), (1.0,), (1.0,), 1e308),
+    ],
+    ids=["coefficient", "modes", "rate"],
+)
+def test_a_check_that_would_not_end_is_given_up_and_the_export_says_so(
+    terms, modulus, times, wi, monkeypatch
+):
+    # the same limit as in use, reached sooner
+    monkeypatch.setattr("discover.equations.formats.in_a_solver._MOST_EVALUATIONS", 3000)
+    tested = Where(Box((0.5, wi), (20.0, 20.0)))
+    equation = Equation(terms, modulus, times, tested=tested)
+    text = write_equation(equation, "python")
+    assert "not checked" in text or "runs away" in text

@@ -30,7 +30,7 @@ def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
         given = np.asarray(values)
         # pandas marks what is missing in columns of objects
         numbers = given.astype(float) if given.dtype.kind in "iufO" else None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = None
     if numbers is None or numbers.ndim != 1:
         raise InputError(f"{label} must be a list or an array of numbers; got {_shown(values)}.")

@@ -13,6 +13,7 @@ from discover.equations.equation import Equation
 from discover.laws.base import AbstractConstitutiveLaw
 
 _PERIODS, _SAMPLES = 3.0, 200
+_MOST_EVALUATIONS = 40_000  # some five seconds; a law of ten modes takes about 20,000
 _TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits a step
 
 
@@ -53,8 +54,32 @@ class InASolver:
         )
 
 
-def in_a_solver(equation: Equation) -> InASolver | None:
+NOT_CHECKED = (
+    "How long the steps of a solver may be, and whether the conformation stays positive, was not "
+    f"checked: more than {_MOST_EVALUATIONS} evaluations of the law would have been needed."
+)
+
+
+class _Spent(Exception):
+    """The evaluations that a check may take are used up."""
+
+
+class _Budget:
+    """Evaluations that are left."""
+
+    def __init__(self, left: int):
+        self._left = left
+
+    def take(self) -> None:
+        self._left -= 1
+        if self._left < 0:
+            raise _Spent
+
+
+def in_a_solver(equation: Equation) -> InASolver | str | None:
     """Return how a law behaves at the edge of the box in which it was learned; None without one.
+
+    A sentence where finding out would take too long.
 
     None too where the whole fluid has a state, which no flow of one mode brings about.
 
@@ -66,6 +91,7 @@ def in_a_solver(equation: Equation) -> InASolver | None:
         return None
     mean, box = equation.mean_relaxation_time, equation.tested.learned_in
     amplitude = box.weissenberg[1] / mean
+    budget = _Budget(_MOST_EVALUATIONS)
     eigenvalues, steps = [], []
     for k, time in enumerate(equation.relaxation_time):
         law = equation.mode(k).law()
@@ -73,7 +99,11 @@ def in_a_solver(equation: Equation) -> InASolver | None:
         for deborah in dict.fromkeys(box.deborah):
             frequency = deborah / mean * time
             flows.append((frequency, _PERIODS * 2.0 * np.pi / frequency))
-        lowest, longest = np.transpose([_extremes(law, time * amplitude, *flow) for flow in flows])
+        try:
+            found = [_extremes(law, time * amplitude, *flow, budget) for flow in flows]
+        except _Spent:
+            return NOT_CHECKED
+        lowest, longest = np.transpose(found)
         eigenvalues.append(lowest.min())
         steps.append(time * longest.min())
     worst = int(np.argmin(eigenvalues))  # a NaN counts as the least
@@ -99,7 +129,7 @@ _jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(N
 
 
 def _extremes(
-    law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float
+    law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float, budget: _Budget
 ) -> tuple[float, float]:
     """Return the smallest eigenvalue of A and the longest step; NaN if σ runs away."""
     times = np.linspace(0.0, end, _SAMPLES)
@@ -107,16 +137,22 @@ def _extremes(
     def rate_at(t):
         return jnp.asarray(amplitude * np.cos(frequency * t))
 
+    def change(t, y):
+        budget.take()
+        return np.asarray(_rate(law, jnp.asarray(y), rate_at(t)))
+
     found = solve_ivp(
-        lambda t, y: np.asarray(_rate(law, jnp.asarray(y), rate_at(t))),
-        (0.0, end), np.asarray(law.rest()), "LSODA", times, rtol=1e-6, atol=1e-9,
+        change, (0.0, end), np.asarray(law.rest()), "LSODA", times, rtol=1e-6, atol=1e-9,
     )  # fmt: skip
     if not found.success or not np.all(np.isfinite(found.y)):
         return np.nan, np.inf
     a11, a22, a33, a12 = np.asarray(_conformations(law, jnp.asarray(found.y[:4].T))).T
     in_plane = 0.5 * (a11 + a22) - np.hypot(0.5 * (a11 - a22), a12)
     rates = rate_at(times)
-    mu = np.linalg.eigvals(np.asarray(_jacobians(law, jnp.asarray(found.y.T), rates)))
+    jacobians = np.asarray(_jacobians(law, jnp.asarray(found.y.T), rates))
+    if not np.all(np.isfinite(jacobians)):
+        return np.nan, np.inf
+    mu = np.linalg.eigvals(jacobians)
     decaying = mu[mu.real < -_TRUE_RATE]
     steps = -2.0 * decaying.real / np.abs(decaying) ** 2
     return float(min(in_plane.min(), a33.min())), float(steps.min(initial=np.inf))

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import os
 import zipfile
 import zlib
@@ -12,13 +13,16 @@ from typing import Any
 import numpy as np
 
 from discover._version import __version__
+from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.learners.files.plain_values import PlainReader, PlainWriter
 
 FORMAT, VERSION = "discover estimator", 1
 _HEADER = "estimator.json"
-_LARGEST = 2**30
-"""No part of a file is larger than this, in bytes: an estimator of megabytes is a large one."""
+_LARGEST = 2**28
+"""Bytes that all parts of a file unpack to, at most: an estimator of megabytes is a large one."""
+
+_MOST_MEMBERS = 10_000
 
 
 def write_estimator(
@@ -72,21 +76,20 @@ class EstimatorFile:
 
     def __init__(self, path: str | Path):
         self._path = Path(path)
+        # a pipe or a device has no end, and is refused here
+        packed = read_bytes(self._path, str(self._path), "Check the path.", largest=_LARGEST)
         try:
-            with zipfile.ZipFile(self._path) as file:
+            with zipfile.ZipFile(io.BytesIO(packed)) as file:
+                _require_small(file)
                 self._header = self._read_header(file)
                 self._arrays = {
                     info.filename.removesuffix(".npy"): _read_array(file, info)
                     for info in file.infolist()
                     if info.filename.endswith(".npy")
                 }
-        except OSError as error:
-            raise InputError(
-                f"The file {self._path} cannot be read: {error.strerror or error}."
-            ) from None
         except zipfile.BadZipFile:
             raise self._other() from None
-        except (ValueError, EOFError, zlib.error, RecursionError, NotImplementedError) as error:
+        except _UNREADABLE as error:
             if isinstance(error, InputError):
                 raise
             raise self.damaged(error) from None
@@ -135,9 +138,26 @@ class EstimatorFile:
         )
 
 
+_UNREADABLE = (
+    ValueError, EOFError, OSError, zlib.error, RecursionError, NotImplementedError,
+    RuntimeError,  # of a member that is encrypted
+)  # fmt: skip
+
+
+def _require_small(file: zipfile.ZipFile) -> None:
+    """Refuse what would fill the memory, by what the file says of itself, before it is unpacked.
+
+    The reader of a member stops at the size that is said there.
+    """
+    members = file.infolist()
+    size = sum(info.file_size for info in members)
+    if len(members) > _MOST_MEMBERS or size > _LARGEST:
+        raise ValueError(
+            f"{len(members)} parts of {size / 1e6:.0f} MB in all, more than an estimator has"
+        )
+
+
 def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
-    if info.file_size > _LARGEST:
-        raise ValueError(f"{info.filename} is too large")
     try:
         return file.read(info)
     except zipfile.BadZipFile as error:  # a checksum that does not fit: ours, but damaged
@@ -145,4 +165,13 @@ def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
 
 
 def _read_array(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
-    return np.lib.format.read_array(io.BytesIO(_read(file, info)), allow_pickle=False)
+    content = io.BytesIO(_read(file, info))
+    version = np.lib.format.read_magic(content)
+    if version != (1, 0):
+        raise ValueError(f"{info.filename} is in a form of NumPy that no estimator has")
+    shape, _, dtype = np.lib.format.read_array_header_1_0(content)
+    # memory is asked for by the shape, so it has to be that of the content
+    if math.prod(shape) * dtype.itemsize != len(content.getvalue()) - content.tell():
+        raise ValueError(f"{info.filename} has another size than its shape {shape}")
+    content.seek(0)
+    return np.lib.format.read_array(content, allow_pickle=False)

@@ -1,0 +1,67 @@
+"""Real numbers that a caller gives: text, truth values and complex numbers are none."""
+
+from typing import Any
+
+import numpy as np
+
+from discover.errors import InputError
+
+
+def as_numbers(name: str, value: Any, finite: bool = True) -> np.ndarray:
+    """Return real numbers as an array of any shape.
+
+    Parameters
+    ----------
+    name
+        Of the argument, for the message.
+    value
+        A number, an array, or sequences of numbers.
+    finite
+        Whether they have to be finite.
+
+    Raises
+    ------
+    InputError
+        If it, or something in it, is no such number.
+    """
+    try:
+        given = np.asarray(value)
+        # NumPy reads "1" and True as numbers when it is asked for floats, and so hides a slip
+        mixed = isinstance(value, list | tuple) and any(isinstance(one, bool) for one in value)
+        kind = "" if mixed else given.dtype.kind
+        real = kind in ("i", "u", "f") or (kind == "O" and _are_integers(given))
+        numbers = given.astype(float) if real else None
+    except (TypeError, ValueError, OverflowError):
+        numbers = None
+    if numbers is None or (finite and not np.all(np.isfinite(numbers))):
+        kind = "finite numbers" if finite else "numbers"
+        raise InputError(f"{name} must be {kind}; got {short(value)}.")
+    return numbers
+
+
+def as_number(name: str, value: Any) -> float:
+    """Return one finite real number; raises `InputError` as `as_numbers` does."""
+    numbers = as_numbers(name, value)
+    if numbers.ndim:
+        raise InputError(f"{name} must be one number; got {short(value)}.")
+    return float(numbers)
+
+
+def as_whole_number(name: str, value: Any, low: int = 0, high: int = 2**32 - 1) -> int:
+    """Return one whole number within bounds; raises `InputError` for anything else."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (whole and low <= value <= high):
+        raise InputError(f"{name} must be a whole number from {low} to {high}; got {short(value)}.")
+    return int(value)
+
+
+def short(value: Any) -> str:
+    """Return a value as a message can show it, in one short printable line."""
+    text = ascii(value) if isinstance(value, str | bytes) else repr(value)
+    text = " ".join(text.encode("utf-8", "backslashreplace").decode().split())
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _are_integers(given: np.ndarray) -> bool:
+    """Return whether all are integers, which NumPy keeps as objects where they are huge."""
+    return all(isinstance(one, int) and not isinstance(one, bool) for one in given.ravel())
