@@ -62,8 +62,6 @@ def export(
         # half a character in a title, which no terminal can show
         typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)
         return
-    if os.path.isdir(out):
-        raise InputError(f"{out} is a folder; give the name of a file.")
     if os.path.lexists(out) and not overwrite:
         raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
     make_folder(out.parent)

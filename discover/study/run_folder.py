@@ -140,7 +140,7 @@ def _refuse_link(folder: Path) -> None:
 def _digest(path: Path) -> str:
     """Return the hash of a file; empty if it cannot be read."""
     try:
-        return hashlib.sha256(read_bytes(path, path.name)).hexdigest()
+        return hashlib.sha256(read_bytes(path, path.name, is_input=False)).hexdigest()
     except InputError:
         return ""
 
@@ -164,7 +164,7 @@ def _sweep_up(folder: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        content = json.loads(read_bytes(path, path.name))
+        content = json.loads(read_bytes(path, path.name, is_input=False))
     except (OSError, ValueError, RecursionError):
         return None  # absent or damaged: computed again
     return content if isinstance(content, dict) else None
