@@ -1,6 +1,6 @@
 """Studies on a dask scheduler that exists."""
 
-import logging
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from ipaddress import ip_address
@@ -13,8 +13,6 @@ from discover.batch.progress import now_and_then
 from discover.batch.status import StudyStatus
 from discover.batch.workers import Job
 from discover.errors import InputError
-
-_log = logging.getLogger(__name__)
 
 
 def run_on_cluster(
@@ -52,10 +50,11 @@ def run_on_cluster(
             "--scheduler needs dask: install discover-rheology[batch], or use --workers."
         ) from None
     if not _is_protected(scheduler):
-        _log.warning(
-            "The connection to %s is not encrypted, and whoever can reach it can run programs "
-            "under your name. Start the scheduler with TLS and give its tls:// address.",
-            scheduler[:100],
+        warnings.warn(
+            f"The connection to {scheduler[:100]} is not encrypted, and whoever can reach it can "
+            "run programs under your name. Start the scheduler with TLS and give its tls:// "
+            "address.",
+            stacklevel=2,
         )
     with _client_of(scheduler) as client:
         topic = f"discover-{uuid4()}"

@@ -9,13 +9,13 @@ from time import perf_counter
 from discover.batch.cluster import run_on_cluster
 from discover.batch.progress import BatchProgress
 from discover.batch.status import BatchResult, StudyStatus
-from discover.batch.summary import SUMMARY_FILES, Summary
+from discover.batch.summary import STATES, SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, nothing_to_note, run_close_loop, run_compare
 from discover.batch.workers import run_in_workers
 from discover.errors import InputError, plain_os_error
 from discover.progress import Progress
 from discover.stop_callbacks import on_stop
-from discover.study.atomic import make_folder
+from discover.study.atomic import make_folder, require_ours
 from discover.study.read import read_study
 
 _TASKS = {"compare": run_compare, "close-loop": run_close_loop}
@@ -55,6 +55,8 @@ def run_batch(
         If two studies would write to one folder, or `out` cannot be written to.
     """
     make_folder(out)
+    if not overwrite:
+        require_ours(out, SUMMARY_FILES, STATES)
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)

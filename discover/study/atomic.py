@@ -4,6 +4,7 @@ import contextlib
 import os
 import secrets
 import stat
+from collections.abc import Sequence
 from pathlib import Path
 
 from discover.errors import InputError
@@ -34,7 +35,7 @@ def write_text(path: str | Path, text: str) -> Path:
         If the disk is full, say; names the file. What the file held before is still there.
     """
     path = Path(path)
-    before = _replaceable(path)
+    before = replaceable(path)
     mode = 0o666 if before is None else stat.S_IMODE(before.st_mode) & 0o777
     temporary = path.parent / f".{path.name[:50]}.{secrets.token_hex(4)}{PART_SUFFIX}"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0)
@@ -47,7 +48,7 @@ def write_text(path: str | Path, text: str) -> Path:
             stream.write(text)
             stream.flush()
             os.fsync(stream.fileno())
-        _replaceable(path)  # a disk may take its time, and others theirs
+        replaceable(path)  # a disk may take its time, and others theirs
         os.replace(temporary, path)
     except BaseException as error:
         with contextlib.suppress(OSError):
@@ -61,12 +62,18 @@ def write_text(path: str | Path, text: str) -> Path:
 
 def remove_file(path: str | Path) -> None:
     """Remove a file, if there is one, under the conditions of `write_text`."""
-    if _replaceable(Path(path)) is not None:
+    if replaceable(Path(path)) is not None:
         os.unlink(path)
 
 
-def _replaceable(path: Path) -> os.stat_result | None:
-    """Return what the system says of a file that may be replaced; None if there is none."""
+def replaceable(path: Path) -> os.stat_result | None:
+    """Return what the system says of a file that may be replaced; None if there is none.
+
+    Raises
+    ------
+    InputError
+        If what has the name is no plain file, or a file that this command has read.
+    """
     try:
         found = os.lstat(path)
     except OSError:
@@ -83,6 +90,31 @@ def _replaceable(path: Path) -> os.stat_result | None:
         )
     require_not_read(path, found)
     return found
+
+
+def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
+    """Refuse a folder that holds files of these names, where nothing shows that they are ours.
+
+    Parameters
+    ----------
+    names
+        Of results that are about to be written there.
+    mark
+        Name of what is always written first, and shows that the rest is ours.
+
+    Raises
+    ------
+    InputError
+        If one of them would be written over.
+    """
+    if os.path.lexists(folder / mark):
+        return
+    there = next((name for name in names if os.path.lexists(folder / name)), None)
+    if there is not None:
+        raise InputError(
+            f"{folder} holds a {there} that is no result of this command. Use --overwrite to "
+            "replace it, or another --out."
+        )
 
 
 def make_folder(path: str | Path) -> Path:

@@ -11,11 +11,12 @@ from typing import Any
 
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.study.atomic import PART_SUFFIX, make_folder, write_text
+from discover.study.atomic import PART_SUFFIX, make_folder, require_ours, write_text
 from discover.study.lock import lock_folder
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"
+_RESULTS = ("report.html", "comparison.json", "loop.json")
 
 
 class RunFolder:
@@ -51,6 +52,8 @@ class RunFolder:
         figures = self.path / "figures"
         for folder in (self._state, figures):
             _refuse_link(folder)
+        if not overwrite:
+            require_ours(self.path, _RESULTS, STATE_FOLDER)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home
