@@ -1,4 +1,4 @@
-"""How a Python process of our own is started: nothing that lies in the working directory runs in it."""
+"""How Python processes are started: nothing that lies in the working directory runs in them."""
 
 import sys
 

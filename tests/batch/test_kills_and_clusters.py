@@ -299,7 +299,8 @@ def test_workers_killed_while_they_start_do_not_end_the_batch(
     count = tmp_path / "starts.txt"
     count.touch()
     fatal = (
-        f"import os, signal; stream = open({str(count)!r}, 'a+'); stream.write('x'); stream.flush()\n"
+        "import os, signal\n"
+        f"stream = open({str(count)!r}, 'a+'); stream.write('x'); stream.flush()\n"
         f"stream.seek(0); len(stream.read()) > {deaths} or os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     *python, code = worker_with_stand_in(tmp_path)
@@ -311,7 +312,7 @@ def test_workers_killed_while_they_start_do_not_end_the_batch(
 
 
 def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
-    studies, calm, tmp_path, monkeypatch
+    studies, tmp_path, monkeypatch
 ):
     fatal = (
         "import os, signal\nfrom discover.batch import run\nwhole = run._TASKS['compare']\n"
@@ -323,8 +324,8 @@ def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
     python, safe, option, code = worker_with_stand_in(tmp_path)
     code = code.replace("from discover.batch.worker", fatal + "from discover.batch.worker")
     monkeypatch.setattr(workers, "_COMMAND", [python, safe, option, code])
-    result = batch.run_batch(studies, tmp_path / "out", workers=2)
-    assert [s.status for s in result.studies] == ["done", "failed", "done", "failed"]
+    result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
+    assert [s.status for s in result.studies] == ["done", "failed"]
     assert result.studies[1].text.startswith("Several workers died")
     assert not result.studies[1].input_error
 
@@ -353,17 +354,17 @@ def test_workers_open_no_port(studies, tmp_path):
         assert len(listening(psutil, psutil.Process())) == 1
 
 
-@pytest.mark.parametrize("name", ["multiprocessing.py", "jax.py", "discover.py"])
-def test_nothing_that_lies_in_the_working_directory_is_run_by_a_worker(tmp_path, monkeypatch, name):
-    trap, sprung = tmp_path / name, tmp_path / "sprung"
-    trap.write_text(f"open({str(sprung)!r}, 'w')\nraise SystemExit\n")
+def test_nothing_that_lies_in_the_working_directory_is_run_by_a_worker(tmp_path, monkeypatch):
+    sprung = tmp_path / "sprung"
+    for name in ("multiprocessing.py", "jax.py", "pandas.py", "discover.py", "sitecustomize.py"):
+        (tmp_path / name).write_text(f"open({str(sprung)!r}, 'w')\nraise SystemExit\n")
     (tmp_path / "a.toml").write_text("[data\n")
     monkeypatch.chdir(tmp_path)
     result = batch.run_batch([tmp_path / "a.toml"], tmp_path / "out", workers=2)
     assert result.studies[0].input_error  # the worker ran, and read the study
     assert not sprung.exists()
     # the control: this is how a child would have been caught
-    subprocess.run([sys.executable, "-m", trap.stem], cwd=tmp_path)
+    subprocess.run([sys.executable, "-c", "import pandas"], cwd=tmp_path)
     assert sprung.exists()
 
 
@@ -437,8 +438,8 @@ def test_a_scheduler_with_tls_takes_the_certificates_of_dasks_settings(studies, 
         [openssl, *words, "-keyout", key, "-out", certificate], check=True, capture_output=True
     )
     pair = {"cert": certificate, "key": key}
-    roles = {"client": pair, "scheduler": pair, "worker": pair}
-    settings = {"distributed.comm.tls": {"ca-file": certificate, **roles}}
+    roles = {f"distributed.comm.tls.{role}": pair for role in ("client", "scheduler", "worker")}
+    settings = {"distributed.comm.tls.ca-file": certificate, **roles}
     options = {"n_workers": 1, "processes": False, "protocol": "tls://", "dashboard_address": None}
     with dask.config.set(settings):
         security = distributed.Security()
@@ -447,7 +448,7 @@ def test_a_scheduler_with_tls_takes_the_certificates_of_dasks_settings(studies, 
             assert address.startswith("tls://127.0.0.1")
             batch.run_batch(studies, tmp_path / "out", scheduler=address)
             with (
-                dask.config.set({"distributed.comm.tls": {}}),
+                dask.config.set({"distributed.comm.tls.ca-file": None}),
                 pytest.raises(InputError, match=r"distributed\.comm\.tls"),
             ):
                 batch.run_batch(studies, tmp_path / "other", scheduler=address)
