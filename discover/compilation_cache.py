@@ -42,7 +42,7 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
 
     Returns
     -------
-    The folder, or None where nothing can be kept.
+    The folder, or None where nothing can be kept, or others can write: see `is_ours_alone`.
     """
     import jax
 
@@ -52,12 +52,9 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
     given = folder is None and bool(chosen)  # by the user, or by an earlier call
     if "://" in str(chosen):
         return None  # a place that is no folder of this machine: JAX's business
-    if given:
-        folder = chosen
-    elif folder is None:
-        folder = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "discover" / "compiled"
+    default = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "discover" / "compiled"
     try:
-        folder = Path(folder).expanduser()
+        folder = Path(folder or chosen or default).expanduser()
         folder.parent.mkdir(parents=True, exist_ok=True)
         folder.mkdir(mode=0o700, exist_ok=True)
     except (OSError, RuntimeError):
