@@ -1,8 +1,12 @@
 """Keep compiled programs between runs of the software."""
 
 import os
+import re
+import stat
+import warnings
 import zlib
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 # Diffrax and Optimistix report errors inside a program through a call back to Python, and a program
@@ -18,6 +22,9 @@ os.environ.setdefault("EQX_ON_ERROR", "nan")
 _WHOLE_LOOPS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
 if "xla_backend_extra_options" not in (_flags := os.environ.get("XLA_FLAGS", "")):
     os.environ["XLA_FLAGS"] = f"{_flags} {_WHOLE_LOOPS}".strip()
+
+_ENTRY = re.compile(r".*-[0-9a-f]{64}-cache")
+"""Names that JAX gives: that of the function, and a digest."""
 
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
@@ -35,27 +42,58 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
 
     Returns
     -------
-    The folder, or None where nothing can be kept.
+    The folder, or None where nothing can be kept, or others can write: see `is_ours_alone`.
     """
     import jax
 
     if os.environ.get("DISCOVER_NO_CACHE"):
         return None
     chosen = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-    if folder is None and chosen:
-        return Path(chosen)  # by the user, or by an earlier call
-    if folder is None:
-        folder = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "discover" / "compiled"
+    given = folder is None and bool(chosen)  # by the user, or by an earlier call
+    if "://" in str(chosen):
+        return None  # a place that is no folder of this machine: JAX's business
+    default = Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache") / "discover" / "compiled"
     try:
-        folder = Path(folder).expanduser()
-        folder.mkdir(parents=True, exist_ok=True)
+        folder = Path(folder or chosen or default).expanduser()
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
     except (OSError, RuntimeError):
         return None  # a home that cannot be found or written to costs time, not the run
+    if not is_ours_alone(folder):
+        if given:
+            jax.config.update("jax_enable_compilation_cache", False)
+        return None
+    if given:
+        return folder
     with suppress(OSError):
         remove_cut_short(folder)
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
     return folder
+
+
+@cache
+def is_ours_alone(folder: Path) -> bool:
+    """Return whether only this user can write to a folder; says so, once, where others can.
+
+    What lies in a cache is machine code, and is run: whoever can write there acts as this user.
+    """
+    if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's own
+        return True
+    found = os.stat(folder)
+    if found.st_uid != os.geteuid():
+        reason, remedy = "belongs to another user", "Name one of your own"
+    elif found.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        reason = "can be written to by other users"
+        remedy = "Remove it, or run chmod go-w on it if you trust what it holds, or name another"
+    else:
+        return True
+    warnings.warn(
+        f"Compiled programs are not kept: the folder {folder} {reason}. {remedy} with "
+        "JAX_COMPILATION_CACHE_DIR.",
+        stacklevel=2,
+    )
+    return False
 
 
 def remove_cut_short(folder: Path) -> None:
@@ -66,7 +104,8 @@ def remove_cut_short(folder: Path) -> None:
     """
     stamp = folder / "checked"
     since = stamp.stat().st_mtime - 1.0 if stamp.is_file() else 0.0
-    new = [entry for entry in folder.glob("*-cache") if entry.stat().st_mtime > since]
+    entries = (entry for entry in folder.glob("*-cache") if _ENTRY.fullmatch(entry.name))
+    new = [entry for entry in entries if entry.stat().st_mtime > since]
     stamp.touch()
     for entry in new:
         if not _is_whole(entry.read_bytes()):

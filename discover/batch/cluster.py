@@ -1,38 +1,24 @@
-"""Studies on dask: workers on this machine, or a scheduler that exists."""
+"""Studies on a dask scheduler that exists."""
 
-import logging
-import multiprocessing
-import os
-import signal
-from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
-from functools import partial
-from multiprocessing import resource_tracker
-from multiprocessing.process import BaseProcess
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from ipaddress import ip_address
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+from urllib.parse import urlsplit
 from uuid import uuid4
 
 from discover.batch.progress import now_and_then
 from discover.batch.status import StudyStatus
+from discover.batch.workers import Job
 from discover.errors import InputError
-from discover.stop_callbacks import on_stop
-
-if TYPE_CHECKING:  # dask is optional
-    from distributed import LocalCluster
-
-_log = logging.getLogger(__name__)
-_TRIES = 3  # starts of the workers; what kills them once, such as a short lack of memory, passes
-
-Job = tuple[str, str, str, str, int | None, bool]
-"""Study file, name, task, folder, seed, overwrite: what `discover.batch.run.run_one` takes."""
 
 
 def run_on_cluster(
     run: Callable[..., StudyStatus],
     jobs: Sequence[Job],
-    workers: int,
-    scheduler: str | None,
+    scheduler: str,
     say: Callable[[int, str, float], None],
     end: Callable[[int, StudyStatus], None],
 ) -> None:
@@ -44,10 +30,9 @@ def run_on_cluster(
         What a worker calls with a job, and with a function for its progress.
     jobs
         Paths in them must mean the same in the workers as here.
-    workers
-        Processes to start on this machine.
     scheduler
-        Address of a dask scheduler to use instead.
+        Address of the scheduler. For ``tls://`` the certificates are those that dask's own settings
+        name, ``distributed.comm.tls``.
     say
         Called with the position of a job, what is going on in it, and the fraction done.
     end
@@ -62,13 +47,16 @@ def run_on_cluster(
         from distributed import as_completed
     except ImportError:
         raise InputError(
-            "Several workers need dask: install discover-rheology[batch], or leave --workers out."
+            "--scheduler needs dask: install discover-rheology[batch], or use --workers."
         ) from None
-    with _local_client(workers) if scheduler is None else _client_of(scheduler) as client:
-        if client is None:
-            for i, job in enumerate(jobs):
-                end(i, run(*job, progress=partial(say, i)))
-            return
+    if not _is_protected(scheduler):
+        warnings.warn(
+            f"The connection to {scheduler[:100]} is not encrypted, and whoever can reach it can "
+            "run programs under your name. Start the scheduler with TLS and give its tls:// "
+            "address.",
+            stacklevel=2,
+        )
+    with _client_of(scheduler) as client:
         topic = f"discover-{uuid4()}"
         client.subscribe_topic(topic, lambda event: say(*event[1]))
         futures = {}
@@ -83,6 +71,22 @@ def run_on_cluster(
             end(i, _status_of(future, jobs[i]))
 
 
+def _is_protected(scheduler: str) -> bool:
+    """Return whether others are kept from a connection: by TLS, or as it never leaves here.
+
+    On a loopback address other users of the machine are not; but whoever started a scheduler there
+    has let them in already, and no certificate here keeps them out.
+    """
+    address = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
+    if address.scheme in ("tls", "wss", "inproc"):
+        return True
+    host = address.hostname or ""
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
 @contextmanager
 def _client_of(scheduler: str) -> Iterator[Any]:
     from distributed import Client
@@ -91,112 +95,14 @@ def _client_of(scheduler: str) -> Iterator[Any]:
         client = Client(scheduler, timeout="20s")
     except Exception as error:  # each kind of address fails in its own way
         reason = (str(error).splitlines() or [type(error).__name__])[0]
+        if scheduler.startswith("tls://"):
+            reason += "; its certificates are those of dask's settings distributed.comm.tls"
         raise InputError(
             f"No dask scheduler answers at {scheduler[:100]!r} ({reason}). Give the address that "
             "it prints when it starts, such as tcp://10.0.0.1:8786, and check that it runs."
         ) from None
     with client:
         yield client
-
-
-@contextmanager
-def _local_client(workers: int) -> Iterator[Any]:
-    """Yield a client of workers on this machine, which all end with the context.
-
-    Yields None, with a word in the log, if no workers can be started.
-    """
-    import dask
-    from distributed import Client
-
-    others = set(multiprocessing.active_children())
-    started: list[LocalCluster] = []
-
-    def kill_workers() -> None:
-        """End the workers at once; what they had finished is in their folders, whole."""
-        logging.disable(logging.CRITICAL)  # dask has much to say of workers that die
-        for nanny in (nanny for cluster in started for nanny in cluster.workers.values()):
-            nanny.close_gracefully()  # or it starts another, for which nobody has work
-        for process in set(multiprocessing.active_children()) - others:
-            process.kill()
-
-    # looking at every thread's stack a hundred times a second is paid for by the work
-    with on_stop(kill_workers), dask.config.set({"distributed.worker.profile.enabled": False}):
-        # the cluster's threads start every worker, so what they cannot hear no worker hears
-        with _deaf_to_interrupts():
-            cluster = _start(workers, others)
-        if cluster is None:
-            yield None
-            return
-        started.append(cluster)
-        try:
-            with Client(cluster) as client:
-                yield client
-        finally:
-            # nothing is left for them to do; dask would ask them to end and wait for some seconds
-            level = logging.root.manager.disable
-            kill_workers()
-            with suppress(Exception):
-                cluster.close()
-            logging.disable(level)
-
-
-def _start(workers: int, others: Collection[BaseProcess]) -> "LocalCluster | None":
-    """Return workers on this machine; a start in which one of them is killed is tried again."""
-    from distributed import LocalCluster
-
-    reason: Exception | None = None
-    for _ in range(_TRIES):
-        try:
-            return LocalCluster(
-                n_workers=workers,
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",  # on this machine alone
-            )
-        except (RuntimeError, OSError, TimeoutError) as error:
-            reason = error
-            for process in set(multiprocessing.active_children()) - set(others):
-                process.kill()
-    _log.warning(
-        "No workers could be started (%s); the studies run one after the other instead.", reason
-    )
-    return None
-
-
-@contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
-    """Keep Ctrl-C from threads and processes that start within, and all that start from them.
-
-    A terminal sends it to every process of a command. Workers that hear it end in tracebacks of
-    their own; it is this process that tells them to stop.
-    """
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    _start_resource_tracker()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _start_resource_tracker() -> None:
-    """Start multiprocessing's cleaner now.
-
-    It starts with the first process otherwise, and opens the ears of the thread that starts it. A
-    command that ends at once leaves it things to clean up, of which it need not tell.
-    """
-    name = "PYTHONWARNINGS"
-    before = os.environ.get(name)
-    os.environ[name] = ",".join(filter(None, (before, "ignore:resource_tracker:UserWarning")))
-    try:
-        resource_tracker.ensure_running()
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
 
 
 def _run_on_worker(

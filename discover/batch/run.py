@@ -1,4 +1,4 @@
-"""Many studies, one after the other or on a dask cluster."""
+"""Many studies, one after the other, side by side, or on a dask cluster."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -9,12 +9,13 @@ from time import perf_counter
 from discover.batch.cluster import run_on_cluster
 from discover.batch.progress import BatchProgress
 from discover.batch.status import BatchResult, StudyStatus
-from discover.batch.summary import SUMMARY_FILES, Summary
+from discover.batch.summary import STATES, SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, nothing_to_note, run_close_loop, run_compare
+from discover.batch.workers import run_in_workers
 from discover.errors import InputError, plain_os_error
 from discover.progress import Progress
 from discover.stop_callbacks import on_stop
-from discover.study.atomic import make_folder
+from discover.study.atomic import make_folder, require_ours
 from discover.study.read import read_study
 
 _TASKS = {"compare": run_compare, "close-loop": run_close_loop}
@@ -40,7 +41,7 @@ def run_batch(
     workers
         Processes on this machine; with 1, everything happens in this one.
     scheduler
-        Address of a dask scheduler to use instead.
+        Address of a dask scheduler to use instead; see `discover.batch.cluster`.
     seed, overwrite
         As in `discover.batch.tasks.run_compare`.
     progress
@@ -54,6 +55,8 @@ def run_batch(
         If two studies would write to one folder, or `out` cannot be written to.
     """
     make_folder(out)
+    if not overwrite:
+        require_ours(out, SUMMARY_FILES, STATES)
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
@@ -74,7 +77,10 @@ def run_batch(
                     end(i, run_one(*job, progress=partial(so_far.say, i)))
             else:
                 summary.write_soon()  # once it was written, it takes no time on Ctrl-C
-                run_on_cluster(run_one, jobs, min(workers, len(jobs)), scheduler, so_far.say, end)
+                if scheduler is None:
+                    run_in_workers(run_one, jobs, min(workers, len(jobs)), so_far.say, end)
+                else:
+                    run_on_cluster(run_one, jobs, scheduler, so_far.say, end)
     finally:
         result = summary.write()  # what had ended before Ctrl-C is on the page too
     return result

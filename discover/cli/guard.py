@@ -12,6 +12,7 @@ import typer
 from discover.cli.console import say_error
 from discover.cli.interruption import INTERRUPTED, INTERRUPTED_CODE
 from discover.errors import InputError, plain_os_error
+from discover.inputs_kept import inputs_kept
 
 DEBUG_VARIABLE = "DISCOVER_DEBUG"
 """Environment variable that lets tracebacks through, for those who mend the software."""
@@ -23,7 +24,8 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def run(*args, **kwargs) -> None:
         try:
-            command(*args, **kwargs)
+            with inputs_kept():
+                command(*args, **kwargs)
         except (typer.Exit, typer.Abort):
             raise
         except InputError as error:

@@ -62,7 +62,8 @@ def batch(
         int, typer.Option("--workers", min=1, max=1024, help="Number of processes on this machine.")
     ] = 1,
     scheduler: Annotated[
-        str | None, typer.Option("--scheduler", help="Address of a dask scheduler, host:port.")
+        str | None,
+        typer.Option("--scheduler", help="Address of a dask scheduler, tls://host:port."),
     ] = None,
     seed: SeedOption = None,
     quiet: QuietOption = False,

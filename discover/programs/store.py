@@ -15,9 +15,17 @@ from typing import Any
 
 import jax
 
+from discover.compilation_cache import is_ours_alone
+
 _LIBRARIES = ("jax", "jaxlib", "equinox", "diffrax", "optimistix", "lineax", "numpy", "scipy")
 _MAGIC = b"discover-program-1\n"
 _STAMPS_KEPT = 3
+
+FOLDER = "discover-programs"
+"""Under JAX's folder, which may be one that others keep things in as well."""
+
+STAMP_FILE = ".discover-programs"
+"""Lies in every folder that this module made, and may therefore remove."""
 
 
 def program_folder() -> Path | None:
@@ -26,7 +34,7 @@ def program_folder() -> Path | None:
     plain = jax.config.jax_disable_jit or jax.config.jax_debug_nans  # pyright: ignore
     if not folder or plain or os.environ.get("DISCOVER_NO_CACHE"):
         return None
-    return _prepared(Path(folder) / "programs", _stamp(_circumstances()))
+    return _prepared(Path(folder) / FOLDER, _stamp(_circumstances()))
 
 
 def _circumstances() -> str:
@@ -58,13 +66,20 @@ def _prepared(parent: Path, stamp: str) -> Path | None:
     """Make the folder of a stamp, and remove those of code that is no longer used."""
     folder = parent / stamp
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        for part in (parent, folder):
+            if not is_ours_alone(part.parent):
+                return None
+            part.mkdir(mode=0o700, exist_ok=True)
+        if not is_ours_alone(folder):
+            return None
+        (folder / STAMP_FILE).touch()
         os.utime(folder)
-        old = sorted(parent.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        old = [path for path in parent.iterdir() if (path / STAMP_FILE).is_file()]
+        old.sort(key=lambda path: path.stat().st_mtime, reverse=True)
     except OSError:
         return None
     for path in old[_STAMPS_KEPT:]:
-        shutil.rmtree(path, ignore_errors=True)
+        shutil.rmtree(path, ignore_errors=True)  # of a link it makes nothing
     return folder
 
 

@@ -4,10 +4,9 @@ import html
 import io
 import re
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from discover.report.plots.style import INK, Picture
+from discover.report.plots.style import INK, Picture, only_settings
 
 _REPLACEMENTS = (
     (r"\mathrel{+}=", r"\,+\!=\,"),
@@ -38,11 +37,11 @@ def formula(latex: str, name: str) -> str:
     text = latex.strip().strip("$")
     for old, new in _REPLACEMENTS:
         text = text.replace(old, new)
-    drawing = Figure(figsize=(0.01, 0.01))
+    buffer = io.StringIO()
     try:
-        drawing.text(0, 0, f"${text}$", fontsize=12, color=INK)
-        buffer = io.StringIO()
-        with mpl.rc_context({"svg.fonttype": "path", "svg.hashsalt": "discover"}):
+        with only_settings({"svg.fonttype": "path", "svg.hashsalt": "discover"}):
+            drawing = Figure(figsize=(0.01, 0.01))
+            drawing.text(0, 0, f"${text}$", fontsize=12, color=INK)
             drawing.savefig(
                 buffer,
                 format="svg",

@@ -11,11 +11,12 @@ from typing import Any
 
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.study.atomic import PART_SUFFIX, make_folder, write_text
+from discover.study.atomic import PART_SUFFIX, make_folder, require_ours, write_text
 from discover.study.lock import lock_folder
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"
+_RESULTS = ("report.html", "comparison.json", "loop.json")
 
 
 class RunFolder:
@@ -51,6 +52,8 @@ class RunFolder:
         figures = self.path / "figures"
         for folder in (self._state, figures):
             _refuse_link(folder)
+        if not overwrite:
+            require_ours(self.path, _RESULTS, STATE_FOLDER)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home
@@ -140,7 +143,7 @@ def _refuse_link(folder: Path) -> None:
 def _digest(path: Path) -> str:
     """Return the hash of a file; empty if it cannot be read."""
     try:
-        return hashlib.sha256(read_bytes(path, path.name)).hexdigest()
+        return hashlib.sha256(read_bytes(path, path.name, is_input=False)).hexdigest()
     except InputError:
         return ""
 
@@ -164,7 +167,7 @@ def _sweep_up(folder: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        content = json.loads(read_bytes(path, path.name))
+        content = json.loads(read_bytes(path, path.name, is_input=False))
     except (OSError, ValueError, RecursionError):
         return None  # absent or damaged: computed again
     return content if isinstance(content, dict) else None

@@ -1,4 +1,4 @@
-"""Batches that are killed, and batches on a real dask cluster on the loopback interface.
+"""Batches that are killed, batches side by side, and on a real dask cluster on this machine.
 
 The studies run a stand-in that writes real parts into real result folders, so that what is tested
 is the machinery of the batch and not the learners. ``benchmarks/batch_kills.py`` does the same with
@@ -11,7 +11,9 @@ import os
 import random
 import re
 import runpy
+import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -20,7 +22,7 @@ from collections import Counter
 
 import pytest
 
-from discover.batch import cluster
+from discover.batch import cluster, workers
 from discover.batch import run as batch
 from discover.errors import InputError
 from discover.study.lock import LOCK_FILE
@@ -78,8 +80,15 @@ def studies(tmp_path, monkeypatch):
     monkeypatch.setenv("COUNTS", str(tmp_path / "counts.txt"))
     (tmp_path / "counts.txt").touch()
     monkeypatch.setattr(batch, "_TASKS", dict(batch._TASKS))
+    monkeypatch.setattr(workers, "_COMMAND", worker_with_stand_in(tmp_path))
     runpy.run_path(str(tmp_path / "stand_in.py"))
     return paths
+
+
+def worker_with_stand_in(folder):
+    """The command line of a worker that runs the stand-in."""
+    code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
+    return [sys.executable, "-P", "-c", code + "from discover.batch.worker import main; main()"]
 
 
 def computed(folder):
@@ -90,7 +99,8 @@ def computed(folder):
 def command(folder, pause=5.0):
     """The command line with the stand-in, to be completed by arguments."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
-    code += f"from discover.batch import summary; summary._PAUSE = {pause}\n"
+    code += f"from discover.batch import summary, workers; summary._PAUSE = {pause}\n"
+    code += f"workers._COMMAND = {worker_with_stand_in(folder)!r}\n"
     # whoever started the tests may ignore the signal, as a shell's & does, or block it
     code += "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     code += "signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})\n"
@@ -158,19 +168,47 @@ def test_what_ended_before_an_interruption_is_on_the_page(studies, calm, tmp_pat
     ]  # fmt: skip
 
 
+def at_work(out):
+    """Processes that hold the folder of a study."""
+    pids = set()
+    for lock in out.glob(f"*/{LOCK_FILE}"):
+        with contextlib.suppress(OSError, ValueError):
+            pids.add(json.loads(lock.read_text())["pid"])
+    return pids
+
+
+def is_running(pid):
+    with contextlib.suppress(OSError):
+        os.kill(pid, 0)
+        return True
+    return False
+
+
+@pytest.mark.slow
+def test_workers_end_with_a_command_that_is_killed_and_leave_no_folder_locked(
+    studies, calm, tmp_path
+):
+    out = tmp_path / "out"
+    arguments = ["batch", *map(str, studies), "--out", str(out), "--workers", "2", "--quiet"]
+    process = subprocess.Popen(
+        [*command(tmp_path), *arguments], env=os.environ | {"SECONDS_A_PART": "3"}
+    )
+    wait_for(lambda: len(at_work(out)) == 2)
+    pids = at_work(out)
+    process.kill()
+    process.wait()
+    wait_for(lambda: not any(map(is_running, pids)), 2.5)  # no part of a study is waited for
+    batch.run_batch(studies, out)
+    assert results(out) == calm
+
+
 @pytest.mark.slow
 def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp_path):
-    pytest.importorskip("distributed")
-    psutil = pytest.importorskip("psutil")
     out = tmp_path / "out"
-    settings = {
-        "DASK_DISTRIBUTED__WORKER__PRELOAD": repr([str(tmp_path / "stand_in.py")]),
-        "SECONDS_A_PART": "3",  # so that the batch is at work when the signal comes
-    }
     arguments = ["batch", *map(str, studies[::-1]), "--out", str(out), "--workers", "2"]
     process = subprocess.Popen(
         [*command(tmp_path, pause=0.1), *arguments],
-        env=os.environ | settings,
+        env=os.environ | {"SECONDS_A_PART": "3"},  # it is at work when the signal comes
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -178,16 +216,13 @@ def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp
     )
     table = out / "table.csv"
     wait_for(lambda: table.is_file() and "fails,compare,failed" in table.read_text())
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does, workers and all
+    pids = at_work(out)
+    assert process.pid not in pids
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     said, error = process.communicate(timeout=60)
     assert (said, process.returncode) == ("", 130)
     assert re.fullmatch(".*run the same command again.\n", error)
-
-    def at_work(other):
-        with contextlib.suppress(OSError, psutil.Error):
-            return os.getpgid(other.pid) == process.pid and other.status() != "zombie"
-
-    wait_for(lambda: not any(map(at_work, psutil.process_iter())), 10)
+    wait_for(lambda: not any(map(is_running, pids)), 10)
     assert computed(tmp_path).total() < 18  # it had not ended
     batch.run_batch(studies, out)
     assert results(out) == calm
@@ -196,29 +231,23 @@ def test_ctrl_c_ends_workers_at_once_without_a_word_of_theirs(studies, calm, tmp
 
 @pytest.mark.slow
 def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp_path, monkeypatch):
-    dask = pytest.importorskip("dask")
-    pytest.importorskip("distributed")
     out, killed = tmp_path / "out", []
     monkeypatch.setenv("SECONDS_A_PART", "0.08")  # so that there is somebody to kill
 
     def kill_one():
         wait_for(lambda: computed(tmp_path).total() >= 1)
         while not killed:
-            for lock in out.glob(f"*/{LOCK_FILE}"):
-                with contextlib.suppress(OSError, ValueError):
-                    pid = json.loads(lock.read_text())["pid"]
-                    if pid != os.getpid() and not killed:
-                        os.kill(pid, signal.SIGKILL)
-                        killed.append(pid)
+            for pid in list(at_work(out) - {os.getpid()})[:1]:
+                os.kill(pid, signal.SIGKILL)
+                killed.append(pid)
             time.sleep(0.005)
 
     said = []
     thread = threading.Thread(target=kill_one, daemon=True)
-    with dask.config.set({"distributed.worker.preload": [str(tmp_path / "stand_in.py")]}):
-        thread.start()
-        result = batch.run_batch(
-            studies, out, workers=2, progress=lambda text, fraction: said.append(fraction)
-        )
+    thread.start()
+    result = batch.run_batch(
+        studies, out, workers=2, progress=lambda text, fraction: said.append(fraction)
+    )
     thread.join(10)
     assert killed
     assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
@@ -248,18 +277,14 @@ def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
     assert results(tmp_path / "out") == calm
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_name_that_is_no_utf_8_costs_no_study_its_place(studies, tmp_path, monkeypatch, workers):
-    distributed = pytest.importorskip("distributed")
-    start = distributed.LocalCluster
-    in_threads = {"processes": False, "protocol": "tcp://"}
-    monkeypatch.setattr(distributed, "LocalCluster", lambda **given: start(**given | in_threads))
+@pytest.mark.parametrize("n_workers", [1, 2])
+def test_a_name_that_is_no_utf_8_costs_no_study_its_place(studies, tmp_path, n_workers):
     odd = tmp_path / os.fsdecode(b"m\xe9lange.toml")
     odd.write_text(STUDY.format(0.04))
     broken = tmp_path / os.fsdecode(b"\xff.toml")
     broken.write_text("[data")
     out = tmp_path / "out"
-    result = batch.run_batch([*studies[:1], odd, broken], out, workers=workers)
+    result = batch.run_batch([*studies[:1], odd, broken], out, workers=n_workers)
     assert [s.status for s in result.studies] == ["done", "done", "failed"]
     assert result.failed[0].input_error
     assert "m\\udce9lange" in (out / "index.html").read_text("utf-8")
@@ -271,41 +296,81 @@ def test_a_name_that_is_no_utf_8_costs_no_study_its_place(studies, tmp_path, mon
 def test_workers_killed_while_they_start_do_not_end_the_batch(
     studies, calm, tmp_path, monkeypatch, caplog, deaths
 ):
-    distributed = pytest.importorskip("distributed")
-    starts = []
-    workers = distributed.LocalCluster
-
-    def start(**options):
-        starts.append(options)
-        if len(starts) <= deaths:
-            raise RuntimeError("Nanny failed to start.")  # as it does when its worker is killed
-        return workers(**options | {"processes": False, "protocol": "tcp://"})
-
-    monkeypatch.setattr(distributed, "LocalCluster", start)
+    count = tmp_path / "starts.txt"
+    count.touch()
+    fatal = (
+        "import os, signal\n"
+        f"stream = open({str(count)!r}, 'a+'); stream.write('x'); stream.flush()\n"
+        f"stream.seek(0); len(stream.read()) > {deaths} or os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    *python, code = worker_with_stand_in(tmp_path)
+    monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
     result = batch.run_batch(studies, tmp_path / "out", workers=2)
     assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
     assert results(tmp_path / "out") == calm
-    assert len(starts) == min(deaths + 1, 3)
     assert ("one after the other" in caplog.text) == (deaths > 2)
 
 
-def test_nobody_on_the_network_can_reach_the_workers():
+def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
+    studies, tmp_path, monkeypatch
+):
+    fatal = (
+        "import os, signal\nfrom discover.batch import run\nwhole = run._TASKS['compare']\n"
+        "def compare(path, *rest):\n"
+        "    path.stem == 'two' and os.kill(os.getpid(), signal.SIGKILL)\n"
+        "    return whole(path, *rest)\n"
+        "run._TASKS['compare'] = compare\n"
+    )
+    python, safe, option, code = worker_with_stand_in(tmp_path)
+    code = code.replace("from discover.batch.worker", fatal + "from discover.batch.worker")
+    monkeypatch.setattr(workers, "_COMMAND", [python, safe, option, code])
+    result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
+    assert [s.status for s in result.studies] == ["done", "failed"]
+    assert result.studies[1].text.startswith("Several workers died")
+    assert not result.studies[1].input_error
+
+
+def listening(psutil, process):
+    everybody = [process, *process.children(recursive=True)]
+    return [
+        connection
+        for one in everybody
+        for connection in one.net_connections("inet")
+        if connection.status == psutil.CONN_LISTEN
+    ]
+
+
+def test_workers_open_no_port(studies, tmp_path):
     psutil = pytest.importorskip("psutil")
-    with cluster._local_client(1):
-        processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
-        ports = [
-            connection.laddr.ip
-            for process in processes
-            for connection in process.net_connections("tcp")
-            if connection.status == psutil.CONN_LISTEN
-        ]
-    assert len(ports) >= 3  # scheduler, worker, the worker's nanny, their pages
-    assert set(ports) == {"127.0.0.1"}
+    seen = []
+
+    def look(label, fraction):
+        seen.append((len(psutil.Process().children()), listening(psutil, psutil.Process())))
+
+    batch.run_batch(studies, tmp_path / "out", workers=2, progress=look)
+    assert max(count for count, _ in seen) == 2
+    assert all(ports == [] for _, ports in seen)
+    with socket.create_server(("127.0.0.1", 0)):  # the control: a port would be seen
+        assert len(listening(psutil, psutil.Process())) == 1
+
+
+def test_nothing_that_lies_in_the_working_directory_is_run_by_a_worker(tmp_path, monkeypatch):
+    sprung = tmp_path / "sprung"
+    for name in ("multiprocessing.py", "jax.py", "pandas.py", "discover.py", "sitecustomize.py"):
+        (tmp_path / name).write_text(f"open({str(sprung)!r}, 'w')\nraise SystemExit\n")
+    (tmp_path / "a.toml").write_text("[data\n")
+    monkeypatch.chdir(tmp_path)
+    result = batch.run_batch([tmp_path / "a.toml"], tmp_path / "out", workers=2)
+    assert result.studies[0].input_error  # the worker ran, and read the study
+    assert not sprung.exists()
+    # the control: this is how a child would have been caught
+    subprocess.run([sys.executable, "-c", "import pandas"], cwd=tmp_path)
+    assert sprung.exists()
 
 
 def test_no_more_workers_start_than_there_are_studies(studies, tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(batch, "run_on_cluster", lambda run, jobs, n, *rest: asked.append(n))
+    monkeypatch.setattr(batch, "run_in_workers", lambda run, jobs, n, *rest: asked.append(n))
     batch.run_batch(studies, tmp_path / "out", workers=1000)
     assert asked == [len(studies)]
 
@@ -333,3 +398,58 @@ def test_a_scheduler_that_does_not_answer_is_the_users_mistake(studies, tmp_path
     monkeypatch.setattr(distributed, "Client", no_answer)
     with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9"):
         batch.run_batch(studies, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
+
+
+@pytest.mark.parametrize(
+    ("address", "protected"),
+    [
+        ("tls://10.0.0.1:8786", True),
+        ("tcp://127.0.0.1:8786", True),
+        ("localhost:8786", True),
+        ("tcp://[::1]:8786", True),
+        ("tcp://10.0.0.1:8786", False),
+        ("head-node:8786", False),
+        ("ucx://10.0.0.1:8786", False),
+    ],
+)
+def test_a_connection_that_others_can_use_is_warned_of(
+    studies, tmp_path, monkeypatch, address, protected
+):
+    distributed = pytest.importorskip("distributed")
+
+    def no_answer(address, timeout):
+        raise OSError("Timed out")
+
+    monkeypatch.setattr(distributed, "Client", no_answer)
+    said = (
+        contextlib.nullcontext() if protected else pytest.warns(UserWarning, match="not encrypted")
+    )
+    with said, pytest.raises(InputError):
+        batch.run_batch(studies, tmp_path / "out", scheduler=address)
+
+
+def test_a_scheduler_with_tls_takes_the_certificates_of_dasks_settings(studies, calm, tmp_path):
+    dask = pytest.importorskip("dask")
+    distributed = pytest.importorskip("distributed")
+    openssl = shutil.which("openssl") or pytest.skip("there is no openssl to make a certificate")
+    key, certificate = str(tmp_path / "key.pem"), str(tmp_path / "certificate.pem")
+    words = ["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=dask"]
+    subprocess.run(
+        [openssl, *words, "-keyout", key, "-out", certificate], check=True, capture_output=True
+    )
+    pair = {"cert": certificate, "key": key}
+    roles = {f"distributed.comm.tls.{role}": pair for role in ("client", "scheduler", "worker")}
+    settings = {"distributed.comm.tls.ca-file": certificate, **roles}
+    options = {"n_workers": 1, "processes": False, "protocol": "tls://", "dashboard_address": None}
+    with dask.config.set(settings):
+        security = distributed.Security()
+        with distributed.LocalCluster(**options, host="127.0.0.1", security=security) as cluster:
+            address = cluster.scheduler_address
+            assert address.startswith("tls://127.0.0.1")
+            batch.run_batch(studies, tmp_path / "out", scheduler=address)
+            with (
+                dask.config.set({"distributed.comm.tls.ca-file": None}),
+                pytest.raises(InputError, match=r"distributed\.comm\.tls"),
+            ):
+                batch.run_batch(studies, tmp_path / "other", scheduler=address)
+    assert results(tmp_path / "out") == calm

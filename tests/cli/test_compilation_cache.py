@@ -39,8 +39,10 @@ def test_a_program_with_a_solver_in_it_is_kept_and_one_cut_short_is_made_again(t
 
 def test_whole_programs_are_left_and_broken_ones_go(tmp_path):
     whole = zlib.compress(b"program " * 1000)
-    entries = {"a-cache": whole, "b-cache": whole[:-3], "c-cache": b"", "d-cache": b"nonsense"}
-    for name, content in entries.items():
-        (tmp_path / name).write_bytes(content)
+    contents = {"jit_a": whole, "jit_b": whole[:-3], "jit_c": b"", "jit_d": b"nonsense"}
+    for name, content in contents.items():
+        (tmp_path / f"{name}-{'0f' * 32}-cache").write_bytes(content)
+    (tmp_path / "web-cache").write_bytes(b"no program, and somebody else's")
     remove_cut_short(tmp_path)
-    assert [path.name for path in tmp_path.glob("*-cache")] == ["a-cache"]
+    left = sorted(path.name.partition("-")[0] for path in tmp_path.glob("*-cache"))
+    assert left == ["jit_a", "web"]

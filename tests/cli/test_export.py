@@ -274,3 +274,23 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     refused = invoke("export", tmp_path, "--format", "rheotool")
     assert refused.exit_code == 2
     assert "rheoTool has it not" in refused.stderr
+
+
+def test_an_export_does_not_write_over_the_result_that_it_reads(results):
+    before = (results / "comparison.json").read_bytes()
+    done = invoke("export", results, "--out", results / "comparison.json", "--overwrite")
+    assert done.exit_code == 2
+    assert "not written over" in done.stderr
+    assert (results / "comparison.json").read_bytes() == before
+    assert invoke("export", results, "--out", results / "law.py", "--overwrite").exit_code == 0
+
+
+def test_an_export_replaces_no_link_even_where_it_is_asked_to(results, tmp_path):
+    target = tmp_path / "thesis.tex"
+    target.write_text("years")
+    (tmp_path / "law.tex").symlink_to(target)
+    done = invoke("export", results, "--out", tmp_path / "law.tex", "--overwrite")
+    assert done.exit_code == 2
+    assert "is a link" in done.stderr
+    assert (tmp_path / "law.tex").is_symlink()
+    assert target.read_text() == "years"

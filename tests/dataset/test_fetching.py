@@ -58,7 +58,7 @@ def invoke(*arguments):
 
 def test_a_set_is_fetched_by_the_installer_and_loads(package, tmp_path, monkeypatch):
     def pip(command, **options):
-        assert command[1:4] == ["-m", "pip", "download"]
+        assert command[1:5] == ["-P", "-m", "pip", "download"]  # no pip.py lying about
         assert command[-1] == "made-up==1.0"
         folder = command[command.index("--dest") + 1]
         package.rename(f"{folder}/{package.name}")

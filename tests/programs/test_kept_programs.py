@@ -12,13 +12,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
 from discover.programs.fingerprint import NotDescribable, fingerprint
-from discover.programs.store import load_program, program_folder, save_program
+from discover.programs.store import (
+    FOLDER,
+    STAMP_FILE,
+    _prepared,
+    load_program,
+    program_folder,
+    save_program,
+)
 from discover.programs.structure import put_together, take_apart
 from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.simulate.solve import simulate, solve_batch
@@ -53,7 +61,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def programs(folder):
-    return sorted(path for path in folder.glob("programs/*/*") if not path.name.startswith("."))
+    return sorted(path for path in folder.glob(f"{FOLDER}/*/*") if not path.name.startswith("."))
 
 
 @pytest.mark.slow
@@ -97,11 +105,61 @@ def test_a_folder_that_cannot_be_written_to_costs_nothing_but_time(folder):
 
 def test_programs_of_other_code_are_removed_but_for_the_latest(folder):
     for age in range(6):
-        old = folder / "programs" / f"stamp{age}"
+        old = folder / FOLDER / f"stamp{age}"
         old.mkdir(parents=True)
+        (old / STAMP_FILE).touch()
         os.utime(old, (age, age))
     assert program_folder() is not None
-    assert len(list((folder / "programs").iterdir())) == 3
+    assert len(list((folder / FOLDER).iterdir())) == 3
+
+
+def test_folders_without_our_stamp_are_somebody_elses_and_stay(folder):
+    elsewhere = folder / "elsewhere"
+    for name in ("programs", FOLDER):  # an earlier name of ours, and theirs under the present one
+        for i in range(6):
+            theirs = folder / name / f"work{i}"
+            theirs.mkdir(parents=True)
+            (theirs / "thesis.txt").write_text("years")
+    elsewhere.mkdir()
+    (elsewhere / STAMP_FILE).touch()
+    (folder / FOLDER / "link").symlink_to(elsewhere)
+    assert program_folder() is not None
+    assert len(list(folder.glob("*/work*/thesis.txt"))) == 12
+    assert (elsewhere / STAMP_FILE).exists()
+
+
+@pytest.mark.parametrize("mode", [0o770, 0o707, 0o1777])
+@pytest.mark.parametrize("within", ["", FOLDER])
+def test_a_cache_that_others_can_write_to_is_not_opened(folder, mode, within):
+    place = folder / within
+    place.mkdir(exist_ok=True)
+    place.chmod(mode)
+    with pytest.warns(UserWarning, match="can be written to by other users"):
+        assert program_folder() is None
+    place.chmod(0o700)
+    _prepared.cache_clear(), is_ours_alone.cache_clear()
+    assert program_folder() is not None  # the control
+
+
+def test_a_cache_of_another_user_is_not_opened(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "geteuid", lambda: tmp_path.stat().st_uid + 1)
+    with pytest.warns(UserWarning, match="belongs to another user"):
+        assert enable_compilation_cache(tmp_path) is None
+
+
+def test_a_new_cache_is_its_users_alone_whatever_the_umask(tmp_path):
+    command = [sys.executable, "-c", "import os, sys; os.umask(0)\n" + ENABLE, str(tmp_path / "x")]
+    subprocess.run(command, check=True)
+    for place in (tmp_path / "x", tmp_path / "x" / FOLDER, *(tmp_path / "x" / FOLDER).iterdir()):
+        assert place.stat().st_mode & 0o777 == 0o700
+
+
+ENABLE = """
+from discover.compilation_cache import enable_compilation_cache
+assert enable_compilation_cache(sys.argv[1]) is not None
+from discover.programs.store import program_folder
+assert program_folder() is not None
+"""
 
 
 def _double(x):

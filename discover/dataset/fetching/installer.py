@@ -1,8 +1,9 @@
 """Packages by way of the installer that the user already has, with its index and settings."""
 
 import subprocess
-import sys
 from pathlib import Path
+
+from discover.python_child import python_command
 
 _LONGEST = 600.0  # seconds
 
@@ -24,7 +25,7 @@ def download_with_pip(package: str, version: str, folder: Path) -> Path:
     OSError
         If pip is not there or cannot get the package; says what pip said last.
     """
-    command = [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps"]
+    command = python_command("-m", "pip", "download", "--quiet", "--no-deps")
     command += ["--disable-pip-version-check", "--only-binary", ":all:"]
     command += ["--dest", str(folder), f"{package}=={version}"]
     try:

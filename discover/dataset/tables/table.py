@@ -15,6 +15,7 @@ from jaxtyping import Float
 
 from discover.dataset.tables.units import Quantity, find_column
 from discover.errors import InputError
+from discover.inputs_kept import note_input
 
 LARGEST_FILE = 300_000_000
 """Bytes; some five million samples. More cannot be looked at, let alone fitted."""
@@ -139,6 +140,7 @@ def read_bytes(
     if_missing: str = "Check its path.",
     largest: int = LARGEST_FILE,
     too_large: str = "Keep fewer samples of it.",
+    is_input: bool = True,
 ) -> bytes:
     """Return the content of a regular file of reasonable size.
 
@@ -150,6 +152,8 @@ def read_bytes(
         Remedy where there is no such file.
     largest, too_large
         Bytes that it may have, and the remedy where it has more.
+    is_input
+        Whether a command that reads it must not write over it; see `discover.inputs_kept`.
 
     Raises
     ------
@@ -168,6 +172,8 @@ def read_bytes(
                 f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. "
                 f"{too_large}"
             )
+        if is_input:
+            note_input(path, status)
         return Path(path).read_bytes()
     except InputError:
         raise

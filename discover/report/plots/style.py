@@ -4,7 +4,7 @@ import html
 import io
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -190,6 +190,18 @@ def _without_height(text: str) -> str:
 
 
 @contextmanager
+def only_settings(settings: Mapping[str, Any]) -> Iterator[None]:
+    """Draw with these settings and matplotlib's defaults, whatever the session or a file asked for.
+
+    A ``matplotlibrc`` of the working directory may be anybody's, and a page is the same everywhere.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(settings)  # pyright: ignore[reportArgumentType, reportCallIssue]
+        yield
+
+
+@contextmanager
 def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> Iterator[tuple]:
     """Yield a figure and its axes, shape (rows, columns).
 
@@ -202,7 +214,7 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
     width, height
         Of the whole figure and of one row, in inches.
     """
-    with mpl.rc_context(_SETTINGS):  # pyright: ignore[reportArgumentType]
+    with only_settings(_SETTINGS):
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
         yield drawing, drawing.subplots(rows, columns, squeeze=False)
 
