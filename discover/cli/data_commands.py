@@ -215,6 +215,14 @@ def import_data(
     unit: Annotated[
         list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
     ] = None,
+    names: Annotated[
+        Path | None,
+        typer.Option(
+            "--names",
+            envvar="DISCOVER_NAMES",
+            help='TOML file of further names of quantities: stress = ["Sigma corr."].',
+        ),
+    ] = None,
     geometry: Annotated[
         str | None,
         typer.Option(
@@ -277,6 +285,7 @@ def import_data(
         mapping,
         columns=column,
         units=unit,
+        names=names,
         geometry=geometry,
         blocks=block,
         start_time_s=start_time,

@@ -15,6 +15,7 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
+from discover.dataset.importing.names import read_names
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
 from discover.dataset.tables.table import read_bytes
@@ -32,6 +33,7 @@ def merge_mapping(
     layout: AnyMapping[str, object] | None = None,
     tests: Sequence[str] | None = None,
     temperature_C: float | None = None,
+    names: Path | None = None,
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
@@ -45,6 +47,8 @@ def merge_mapping(
         Such as ``cone_plate:radius_mm=25,angle_deg=1``.
     tests
         Of the form ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``.
+    names
+        File of further names of quantities, as ``names.toml``.
     blocks, start_time_s, layout, temperature_C
         As in `discover.dataset.importing.Mapping`.
 
@@ -59,6 +63,8 @@ def merge_mapping(
         ("units", units, "stress=kPa"),
     ):
         content[key] = {**content.get(key, {}), **_pairs(options or (), example)}
+    if names is not None:
+        content["names"] = {**content.get("names", {}), **read_names(names)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
         numbers = {

@@ -10,12 +10,13 @@ import numpy as np
 
 from discover.dataset.importing.folder_files import NamedRecord, files_of
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
-from discover.dataset.importing.readings import INSTRUMENT, Readings
+from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
 from discover.dataset.importing.registry import blocks_of_importer
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
+from discover.dataset.importing.unsaid_units import UnsaidUnits
 from discover.dataset.importing.waveforms import waves_of, without_names
 from discover.dataset.tables.table import read_bytes, shown
 from discover.errors import InputError
@@ -48,6 +49,19 @@ class _Import:
     found: list[NamedRecord] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     seen: dict[str, set[str]] = field(default_factory=dict)
+    named: set[str] = field(default_factory=set)
+    asked_for: set[str] = field(default_factory=set)
+    units: UnsaidUnits = field(default_factory=UnsaidUnits)
+
+    def note(self, readings: Readings, made: Record) -> None:
+        """Keep what a test that is imported says of names and units."""
+        for quantity, at in readings.columns.items():
+            if quantity in readings.used:
+                self.seen.setdefault(quantity, set()).add(readings.block.columns[at][0])
+        parts = ((key, one) for key, one in readings.unsaid.items() if _is_part(key, made))
+        self.units.add(readings.name, parts)
+        self.asked_for |= readings.used.keys() | {SAME[k] for k in readings.used if k in SAME}
+
     tests: dict[str, TestName] = field(default_factory=dict)
 
 
@@ -94,6 +108,23 @@ def import_files(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
+    unused = sorted(set(map(str, mapping.units)) - state.named)
+    if unused:
+        raise InputError(
+            f"--unit {unused[0]} changes nothing: no column or line of these files is known as "
+            f"{unused[0]}. Known are {', '.join(sorted(state.named))}; name another with "
+            f'--column {unused[0]}="its name", or leave the unit out.'
+        )
+    state.units.require()
+    idle = sorted(set(map(str, mapping.units)) - state.asked_for - _WAVES)
+    state.said = [
+        *state.units.warning(),
+        *(
+            f"warning: --unit {key} changes nothing: no test that was read needs {key}."
+            for key in idle
+        ),
+        *state.said,
+    ]
     files, notes = files_of(state.found)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
@@ -121,6 +152,7 @@ def _read(path: Path, state: _Import) -> None:
         where = f"{path.name}, block {number} {block.name}".strip()
         stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
         readings = Readings.of(block, state.mapping, path.name)
+        state.named |= readings.named()
         readings.begins, clock = clock_before(readings, clock)
         chosen = state.mapping.test_of(path.name, number)
         state.tests[key] = chosen or "none"
@@ -150,9 +182,7 @@ def _read(path: Path, state: _Import) -> None:
             name = stem + (f"-{part}" if len(taken) > 1 else "")
             state.found.append(NamedRecord(name, made, path.name, block.name))
             state.tests[key] = made.kind
-            for quantity, at in readings.columns.items():
-                if quantity in readings.used:
-                    state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+            state.note(readings, made)
             state.said.append(_summary(where, readings, one, made, columns))
             before, used = made, used + 1
         if chosen != "none":
@@ -217,8 +247,8 @@ def _read_sweep(path: Path, state: _Import) -> None:
         one = next((o for o in recognise(readings) if o.kind == "frequency_sweep"), None)
         one = one or Recognised("frequency_sweep", np.ones(len(readings), bool), "as asked")
         made = record(readings, one, None)
-        for quantity, at in readings.columns.items():
-            state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+        state.named |= readings.named()
+        state.note(readings, made)
         state.found.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
         state.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
         return
@@ -227,6 +257,8 @@ def _read_sweep(path: Path, state: _Import) -> None:
         'needed. Name its columns with --column omega="…" --column Gp="…" --column Gpp="…".'
     )
 
+
+_WAVES = {"strain_wave", "stress_wave", "wave_time"}
 
 _WORDS = {
     "frequency_sweep": "a frequency sweep at small strain",
@@ -265,7 +297,9 @@ def _is_part(key: str, made: Record) -> bool:
     sources = {INSTRUMENT.get(name, name) for name in made.table} | set(made.table)
     # these are read only where they have to stand for another
     through = {"viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor"}
-    through |= {"strain_amplitude", "stress_amplitude", "temperature"}
+    through |= {"stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2"}
+    if key == "strain_amplitude":
+        return made.kind == "amplitude_sweep"
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
     return key in sources or (key in through)

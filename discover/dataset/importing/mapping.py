@@ -8,6 +8,7 @@ from urllib.parse import quote, unquote_to_bytes
 
 from pydantic import Field, model_validator
 
+from discover.dataset.importing.names import check_names
 from discover.dataset.tables.toml_file import read_toml, toml_string
 from discover.validation import Section, validated
 
@@ -40,6 +41,17 @@ QuantityName = Literal[
     "phase_angle",
     "loss_factor",
     "temperature",
+    "psi1",
+    "psi2",
+    "extensional_viscosity",
+    "radius",
+    "diameter",
+    "gap",
+    "cone_angle",
+    "strain_wave",
+    "stress_wave",
+    "wave_time",
+    "point",
 ]
 
 TestName = Literal[
@@ -133,11 +145,13 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised.
+    Keys of `names` are the tables of ``names.toml``, keys of `tests` ``FILE:BLOCK``, ``FILE`` or
+    `EVERY_BLOCK`; the rest is recognised.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
+    names: dict[str, tuple[str, ...]] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
@@ -145,6 +159,11 @@ class Mapping(Section):
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _known(self):
+        check_names(self.names, "names")
+        return self
 
     def test_of(self, file: str, block: int) -> TestName | None:
         """Return what the user says that a block of a file is; None if nothing.
@@ -204,7 +223,7 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "layout", "geometry", "tests"):
+    for name in ("columns", "units", "names", "layout", "geometry", "tests"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
@@ -232,4 +251,6 @@ def _key(name: str) -> str:
 
 
 def _toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
     return toml_string(value) if isinstance(value, str) else repr(value)

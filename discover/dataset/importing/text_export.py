@@ -17,9 +17,10 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import ArrayLike
 
-from discover.dataset.importing.header_constants import Constant, constants_of, name_and_unit
+from discover.dataset.importing.clock_times import is_clock
+from discover.dataset.importing.header_constants import Constant, constants_of
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.tables.unit_text import read_unit
+from discover.dataset.tables.unit_text import name_and_unit, read_unit
 from discover.errors import InputError
 
 Rows = Sequence[Sequence[str]]
@@ -83,7 +84,7 @@ class Block:
             raise InputError(
                 f"The columns of a block must have one length; got {shapes or 'none'}."
             )
-        heads = tuple((str(key), str(unit)) for key, (unit, _) in columns.items())
+        heads = tuple((str(key), str(unit) or "-") for key, (unit, _) in columns.items())
         rows = np.stack(values, axis=1).tolist()
         cells = tuple(tuple("" if x != x else repr(x) for x in row) for row in rows)
         return cls(name, heads, cells, 1)
@@ -161,7 +162,7 @@ def _by_label(
 def _label(row: Sequence[str]) -> str:
     """Return the word that a line of numbers begins with; empty if there is none."""
     first = row[0]
-    if not first or is_number(first) or _INVALID.search(first):
+    if not first or is_number(first) or is_clock(first) or _INVALID.search(first):
         return ""
     if first.lower() == _DATA_POINT:
         return _DATA_POINT
@@ -172,8 +173,8 @@ def _label(row: Sequence[str]) -> str:
 def _is_numbers(row: Sequence[str]) -> bool:
     """Return whether a row is data: most of it numbers (not a status), after a word or none."""
     filled = [cell for cell in row if cell]
-    numbers = [is_number(cell) for cell in filled]
-    if len(filled) < 2 or 2 * sum(numbers) <= len(filled):
+    numbers = [is_number(cell) or is_clock(cell) for cell in filled]
+    if not any(map(is_number, filled)) or len(filled) < 2 or 2 * sum(numbers) <= len(filled):
         return False
     return numbers[0] or (sum(numbers) > 1 and not filled[0].endswith(":"))
 

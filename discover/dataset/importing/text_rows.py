@@ -7,6 +7,8 @@ import re
 from pathlib import Path
 from typing import Literal
 
+from discover.dataset.importing.clock_times import is_clock
+from discover.dataset.importing.names import code_page_of
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
@@ -106,8 +108,9 @@ def _decode(content: bytes, name: str, encoding: str | None) -> str:
     try:
         text = content.decode(encoding)
     except UnicodeError:
-        # instruments on Windows write µ, ° and · so; every byte has a meaning in latin-1
-        text = content.decode("cp1252", "replace") if encoding == "utf-8-sig" else None
+        # instruments on Windows write µ, ° and · so; and the letters of the country
+        known = encoding == "utf-8-sig"
+        text = content.decode(code_page_of(content), "replace") if known else None
     if text is None:
         raise InputError(f"{name} is not text in {encoding}. Try another --encoding.")
     if "\0" in text:
@@ -135,7 +138,9 @@ def _delimiter(lines: list[str]) -> str:
         if sum(mark in line for line in filled) > 0.3 * len(filled):
             return mark
     apart = [[cell.replace(",", ".", 1) for cell in line.split()] for line in filled]
-    numbers = sum(len(cells) > 1 and all(map(is_number, cells)) for cells in apart)
+    numbers = sum(
+        len(cells) > 1 and all(is_number(c) or is_clock(c) for c in cells) for cells in apart
+    )
     return " " if numbers > 0.5 * len(filled) else ","
 
 
