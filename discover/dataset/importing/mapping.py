@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import quote, unquote_to_bytes
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from discover.dataset.importing.names import check_names
 from discover.dataset.tables.toml_file import read_toml, toml_string
@@ -151,7 +151,7 @@ class Mapping(Section):
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
-    names: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    names: dict[str, Annotated[tuple[str, ...], Strict(False)]] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0

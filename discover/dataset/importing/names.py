@@ -27,7 +27,12 @@ _GREEK = {
 }  # fmt: skip
 _LOOK_ALIKE = str.maketrans({"ɣ": "γ", "ɛ": "ε", "ł": "l", "ø": "o", "ı": "i", "đ": "d"})
 _PRIMES = str.maketrans(
-    {**dict.fromkeys("′‘’´`ʹʼ＇", "'"), **dict.fromkeys('″“”"˝ʺ＂', "''"), "‴": "'''"}
+    {
+        **dict.fromkeys("′‘’´`ʹʼ＇", "'"),
+        **dict.fromkeys('″“”"˝ʺ＂', "''"),
+        "‴": "'''",
+        **dict.fromkeys("∗⁎﹡✱", "*"),
+    }
 )
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue"})
 
@@ -39,6 +44,7 @@ _DOTTED_EPSILON = re.compile(rf"[εe]{_DOT}|(?<![^\W\d_])(?:epsilon|eps|ε|e)[\s
 _DOT_BEFORE = re.compile(r"\bdot\W*(gamma|γ|epsilon|ε)")
 _WORD = re.compile(rf"(?:[^\W_]|[{_DOT}'*+])+\.?")
 _SPELLED = re.compile(rf"({'|'.join(_GREEK)})([0-9'*+]*)")
+_LONG = " " * 1000
 _SHORTEST = 3
 """Letters that a word cut short without a dot has at least."""
 
@@ -122,12 +128,12 @@ class NameTable:
             both = {key: min(rank, second[key]) for key, rank in first.items() if key in second}
             if both:
                 return both
-        cut: dict[str, int] = {}
+        cut: dict[str, str] = {}
         for section, whole in self._words:
             if len(whole) == len(words) and all(map(_stands_for, words, whole)):
-                rank = self._rank[section]["".join(whole)]
-                cut[section] = min(rank, cut.get(section, rank))
-        best = {section: rank for section, rank in cut.items() if rank == min(cut.values())}
+                cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
+        least = min(map(len, cut.values()), default=0)
+        best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
         return best if len(best) == 1 else {}  # Shear str. may be either
 
     def _exact(self, joined: str) -> dict[str, int]:

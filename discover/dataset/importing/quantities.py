@@ -113,7 +113,7 @@ def unit_in_name(key: str, name: str, table: NameTable) -> str:
 
     It has to be a unit of the quantity, and what stands before it a name of that.
     """
-    inside = None if table.rank(key, name) is not None else _split(key, name, table)
+    inside = _split(key, name, table)
     return "" if inside is None else inside[1]
 
 
@@ -168,7 +168,8 @@ _SHORT = 3
 
 def to_celsius(value: float, unit: str) -> float | None:
     """Return a temperature in °C, or None if the unit is none of temperature."""
-    scale = tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip().upper()
+    scale = tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip()
+    scale = scale.upper().translate({0x421: "C", 0x41A: "K"})  # as a Russian keyboard writes them
     if scale in ("", "-", "1") and "°" not in unit and "deg" not in unit:
         return None if not unit else value  # a program's table says a pure number
     if scale in ("C", "CELSIUS"):

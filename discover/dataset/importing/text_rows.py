@@ -4,6 +4,7 @@ import codecs
 import csv
 import io
 import re
+import unicodedata
 from pathlib import Path
 from typing import Literal
 
@@ -62,7 +63,7 @@ def read_rows(
             "rheometer, and check --delimiter."
         ) from None
     if mark == ",":
-        return [[cell.strip() for cell in row] for row in rows]
+        decimal = "."
     return with_points(rows, path.name, decimal)
 
 
@@ -85,12 +86,27 @@ def with_points(
     InputError
         If the decimal sign cannot be told from the thousands separator.
     """
-    rows = [[cell.strip() for cell in row] for row in rows]
-    if (decimal or _decimal(rows, name)) == ".":
-        return rows
-    return [
-        [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
-    ]
+    rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
+    sign = decimal or _decimal(rows, name)
+    thousands = "," if sign == "." else "."
+    grouped = re.compile(rf"[+-]?[1-9][0-9]{{0,2}}(?:[{thousands}][0-9]{{3}})+(?:[{sign}][0-9]+)?")
+
+    def pointed(cell: str) -> str:
+        if grouped.fullmatch(cell):
+            cell = cell.replace(thousands, "")
+        return cell.replace(",", ".") if sign == "," and _COMMA.fullmatch(cell) else cell
+
+    return [[pointed(cell) for cell in row] for row in rows]
+
+
+def _tidy(cell: str) -> str:
+    """Return a number without spaces and apostrophes between thousands and with a plain minus."""
+    if len(cell) > 40 or not any(c.isdigit() for c in cell):
+        return cell
+    plain = unicodedata.normalize("NFKC", cell).replace("\u2212", "-").replace("’", "'")
+    if re.fullmatch(r"[+-]?[0-9]{1,3}(?:[ '][0-9]{3})+(?:[.,][0-9]+)?", plain):
+        plain = re.sub("[ ']", "", plain)
+    return plain if is_number(plain) or _COMMA.fullmatch(plain) else cell
 
 
 def _decode(content: bytes, name: str, encoding: str | None) -> str:
@@ -146,6 +162,10 @@ def _delimiter(lines: list[str]) -> str:
 
 def _decimal(rows: list[list[str]], name: str) -> Decimal:
     cells = [cell for row in rows for cell in row]
+    if any(re.fullmatch(r"[+-]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]+", cell) for cell in cells):
+        return ","
+    if any(re.fullmatch(r"[+-]?[0-9]{1,3}(?:,[0-9]{3})+\.[0-9]+", cell) for cell in cells):
+        return "."
     points = sum(_POINT.fullmatch(cell) is not None for cell in cells)
     commas = [cell for cell in cells if "," in cell and _COMMA.fullmatch(cell)]
     grouped = all(re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", cell) for cell in commas)

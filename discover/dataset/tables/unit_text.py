@@ -14,6 +14,12 @@ _LONGEST = 40  # characters
 
 _SPELLINGS = {
     "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
+    "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
+    "pa": "Pa", "PA": "Pa", "kpa": "kPa",
+    "KPa": "kPa", "Mpa": "MPa", "cp": "cP", "CP": "cP", "hz": "Hz", "HZ": "Hz",
+    "Sekunden": "s", "Minuten": "min", "Stunden": "hour", "Prozent": "percent",
+    "secondes": "s", "heures": "hour", "segundos": "s", "minutos": "min", "secondi": "s",
+    "seconden": "s", "sekundy": "s", "секунды": "s", "минуты": "min", "проценты": "percent",
     "Sek": "s", "sek": "s", "seg": "s", "Std": "hour", "Dyn": "dyn",
     "Па": "Pa", "мПа": "mPa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "П": "P", "сП": "cP",
     "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "hour", "рад": "rad", "мрад": "mrad",
@@ -160,7 +166,7 @@ def _last_bracket(name: str) -> tuple[str, str]:
         if not depth:
             head, inside = name[:at], name[at + 1 : -1].strip()
             # G(t) is a function, and Time (t) in tons
-            return ("", "") if inside == "t" else (head.strip(), inside)
+            return ("", "") if inside == "t" else (head.rstrip(" /,"), inside)
     return "", ""
 
 
@@ -172,6 +178,8 @@ def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
     """Return the unit that the tokens begin with, and the tokens after it."""
     found, sign = Unit(), 1
     expected = True  # a word, not an operator
+    if len(tokens) > 1 and tokens[0] == "/":  # the 1 of 1/s is left out
+        sign, tokens = -1, tokens[1:]
     while tokens and tokens[0] != ")":
         token, tokens = tokens[0], tokens[1:]
         if token in "/*." and not expected:
@@ -205,7 +213,7 @@ def _word(text: str) -> Unit | None:
     """Return a single word, such as kPa or seconds, from pint."""
     word = _SPELLINGS.get(text, text)
     # whole words may begin with a capital; of short symbols the case has a meaning
-    for name in (word, word.lower()) if len(word) > 3 else (word,):
+    for name in (word, word.lower()) if len(word) > 2 else (word,):
         parsed = _registry().parse_unit_name(name)
         if not parsed or _is_short_plural(name):
             continue
