@@ -100,6 +100,22 @@ def test_complex_viscosity_tells_hertz_from_radians(tmp_path):
     np.testing.assert_allclose(got["omega_rad_s"], 2.0 * np.pi * frequency)
 
 
+def test_a_viscosity_without_a_unit_is_asked_for_only_where_it_stands_for_the_stress(tmp_path):
+    rate = np.geomspace(1.0, 100.0, 6)
+    thin = {"Shear rate (1/s)": rate, "Viscosity": STRESS / rate}
+    with pytest.raises(InputError, match="--unit viscosity=mPa\\*s or --unit viscosity=Pa\\*s"):
+        read(tmp_path, table(**thin))
+    got = columns(read(tmp_path, table(**thin, Stress=STRESS)).files["flow_curve.csv"])
+    np.testing.assert_allclose(got["stress_Pa"], STRESS)
+
+
+def test_a_capital_T_without_a_unit_is_a_temperature_and_no_time(tmp_path):
+    rate = np.geomspace(1.0, 100.0, 6)
+    text = table(T=np.full(6, 25.0), **{"Shear rate": rate, "Stress": STRESS})
+    assert "flow_curve.csv" in read(tmp_path, text).files
+    assert "a.csv" in read(tmp_path, start_up("t")).files
+
+
 def test_a_table_of_this_projects_own_needs_no_unit_of_strain(tmp_path):
     text = table(time_s=TIME, strain=2.0 * TIME, stress_Pa=STRESS)
     np.testing.assert_allclose(columns(read(tmp_path, text).files["a.csv"])["strain"], 2.0 * TIME)

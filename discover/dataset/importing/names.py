@@ -221,13 +221,14 @@ def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
                 )
 
 
-_CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250")
+_CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")
 
 
 def code_page_of(content: bytes) -> str:
     """Return the encoding of a text that is no Unicode: the one in which most names are known.
 
-    Instruments on Windows write the code page of the country; every byte has a meaning in each.
+    Instruments on Windows write the code page of the country. UTF-8 is one of them for a file of
+    which a byte is damaged.
     """
     sample, table = content[:20_000], name_table()
 

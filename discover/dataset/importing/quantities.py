@@ -149,6 +149,8 @@ def fits(key: str, name: str, unit: str) -> bool:
     name, unit
         Of the column; a longer name fits whatever its unit is, so that a wrong one is said.
     """
+    if name.strip() == "T" and not unit:
+        return key == "temperature"
     name = plain(name)
     if len(name) > _SHORT or any(letter > "\u2e80" for letter in name):
         return True

@@ -138,7 +138,7 @@ class Readings:
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit else "")
         if key == "time" and any(map(is_clock, cells)):
             self.used[key] = f"{shown(column)} [clock, in s]"
-            return seconds(cells, unit)
+            return seconds(cells, self._unit_given(key) or unit)
         raw = np.array([float(cell) if is_number(cell) else math.nan for cell in cells])
         unit = self._unit_given(key) or unit or unit_in_name(key, column, self.names)
         if key == "temperature":
@@ -163,10 +163,13 @@ class Readings:
         if column == QUANTITIES[key].column and own & {name for name, _ in self.block.columns}:
             return "1"  # a table of this project's own
         if key not in self.unsaid:
-            alone = {k: self._column for k in self.columns}
-            self.unsaid[key] = unsaid_unit(
+            used, unsaid = dict(self.used), dict(self.unsaid)
+            alone = {k: self._column for k in self.columns if k != key}
+            found = unsaid_unit(
                 key, column, raw, lambda k: alone[k](k) if k in alone else None, self.names
             )
+            # what tells a unit is not thereby part of the test
+            self.used, self.unsaid = used, {**unsaid, key: found}
         return self.unsaid[key].unit
 
     def _is_unit_line(self, constant: Constant, key: str) -> bool:

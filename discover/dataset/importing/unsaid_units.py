@@ -25,6 +25,8 @@ _CHOICES = {
     "strain_wave": ("%", "1"),
     "omega": ("Hz", "rad/s"),
     "phase_angle": ("deg", "rad"),
+    "viscosity": ("mPa*s", "Pa*s"),
+    "complex_viscosity": ("mPa*s", "Pa*s"),
     "torque": ("mN*m", "N*m"),
     "angular_velocity": ("1/min", "rad/s"),
     "angle": ("deg", "rad"),
