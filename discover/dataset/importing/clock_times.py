@@ -12,7 +12,7 @@ _DATE = (
     r"|(?P<first>\d{1,2})(?P<mark>[-/.])(?P<second>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2}))[T ,]+"
 )
 _CLOCK = re.compile(
-    rf"(?:{_DATE}|(?P<days>\d{1, 5})(?:\.| ?d(?:ays?)?,? +))?"
+    rf"(?:{_DATE}|(?P<days>\d{{1,5}})(?:\.| ?d(?:ays?)?,? +))?"
     r"(?:(?P<hours>\d{1,4}):)?(?P<minutes>\d{1,4}):(?P<seconds>\d{1,2}(?:[.,]\d*)?)"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?:Z|[+-]\d{2}:?\d{2})?"
 )

@@ -92,14 +92,15 @@ class NameTable:
 
     def __init__(self, own: Mapping[str, Sequence[str]]):
         self._rank: dict[str, dict[str, int]] = {}
-        self._words: list[tuple[str, tuple[str, ...]]] = []
+        self._words: dict[tuple[int, str], list[tuple[str, tuple[str, ...]]]] = {}
         for section, names in shipped_names().items():
             ranks = self._rank.setdefault(section, {})
             for name in (*own.get(section, ()), *names):
                 for one in dict.fromkeys((name, name.translate(_UMLAUTS))):
                     words = tuple(word.rstrip(".") for word in words_of(one))
                     ranks.setdefault("".join(words), len(ranks))
-                    self._words.append((section, words))
+                    alike = self._words.setdefault((len(words), words[0][0]), [])
+                    alike.append((section, words))
         self._found: dict[str, dict[str, int]] = {}
 
     def rank(self, key: str, name: str) -> int | None:
@@ -129,8 +130,9 @@ class NameTable:
             if both:
                 return both
         cut: dict[str, str] = {}
-        for section, whole in self._words:
-            if len(whole) == len(words) and all(map(_stands_for, words, whole)):
+        alike = self._words.get((len(words), words[0][0]), ()) if words else ()
+        for section, whole in alike:
+            if all(map(_stands_for, words, whole)):
                 cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
         least = min(map(len, cut.values()), default=0)
         best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
@@ -224,6 +226,10 @@ def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")
 
 
+def _may_be_name(cell: str) -> bool:
+    return len(cell) < 80 and any(c.isalpha() for c in cell)
+
+
 def code_page_of(content: bytes) -> str:
     """Return the encoding of a text that is no Unicode: the one in which most names are known.
 
@@ -235,6 +241,6 @@ def code_page_of(content: bytes) -> str:
     def known(encoding: str) -> int:
         text = sample.decode(encoding, "replace")
         cells = set(re.split(r"[\t;,\r\n]|[\[(].*?[\])]", text))
-        return sum(bool(table.find(cell)) for cell in cells if len(cell) < 80)
+        return sum(bool(table.find(cell)) for cell in cells if _may_be_name(cell))
 
     return max(_CODE_PAGES, key=known)
