@@ -9,6 +9,11 @@ from discover.dataset.tables.unit_text import read_unit
 _VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9]).{0,19})?"
 _ALONE = re.compile(_VALUE)
 _WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
+_DEGREES = re.compile(
+    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
+    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])",
+)
+_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 _IN = re.compile(r"(.*\S) in (\S+)")
 
 
@@ -80,3 +85,23 @@ def name_and_unit(name: str, unit: str) -> tuple[str, str]:
     if words and (read_unit(words.group(2)) or words.group(2).lstrip("°") in ("C", "K", "F")):
         return words.group(1), words.group(2)
     return name, ""
+
+
+def temperature_in(text: str) -> Constant | None:
+    """Return the temperature that a title or a file's name says; None if it says none, or several.
+
+    In kelvin only where a melt or solution can be, since 95K may be a molar mass.
+    """
+    found = {}
+    text = text.replace("_", " ")
+    for match in _DEGREES.finditer(text):
+        value = match[1].replace(",", ".")
+        unit = match[2][0].upper()
+        if _TO.search(text[: match.start()]):
+            return None  # a ramp
+        if unit == "C" or 200.0 <= float(value) <= 700.0:
+            sign = "-" if match[0].startswith("-") else ""
+            found[sign + value, unit] = Constant(
+                "temperature", sign + value, "°C" if unit == "C" else "K"
+            )
+    return next(iter(found.values())) if len(found) == 1 else None

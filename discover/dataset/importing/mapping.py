@@ -49,6 +49,9 @@ TestName = Literal[
 
 EVERY_BLOCK = "*"
 
+Celsius = Annotated[float, Field(ge=-273.15, le=2000)]
+"""A temperature that can be."""
+
 
 class Geometry(Section):
     """The tool, needed where the file holds torque, angle or force instead of stress and strain.
@@ -133,7 +136,8 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised.
+    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised. Keys of
+    `temperatures` are ``FILE``; values in °C.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
@@ -141,7 +145,8 @@ class Mapping(Section):
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
-    temperature_C: Annotated[float, Field(ge=-273.15, le=2000)] | None = None
+    temperature_C: Celsius | None = None
+    temperatures: dict[str, Celsius] = Field(default_factory=dict)
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
@@ -204,7 +209,7 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "layout", "geometry", "tests"):
+    for name in ("columns", "units", "layout", "geometry", "tests", "temperatures"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
