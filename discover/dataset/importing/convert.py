@@ -159,7 +159,7 @@ def _read(path: Path, state: _Import) -> None:
         key = f"{key_of(path.name)}:{number}"
         where = f"{path.name}, block {number} {block.name}".strip()
         stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
-        readings = Readings.of(block, state.mapping, path.name)
+        readings = Readings.of(block, state.mapping.of_block(path.name, number), path.name)
         tables.append((number, readings))
         if block.apart:
             before, clock = None, 0.0

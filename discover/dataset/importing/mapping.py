@@ -137,7 +137,7 @@ class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
     Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised. Keys of
-    `temperatures` are ``FILE``; values in °C.
+    `temperatures` are ``FILE:BLOCK`` or ``FILE``; values in °C.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
@@ -162,6 +162,13 @@ class Mapping(Section):
         name = key_of(file)
         keys = f"{name}:{block}", name, EVERY_BLOCK
         return next((self.tests[key] for key in keys if key in self.tests), None)
+
+    def of_block(self, file: str, block: int) -> "Mapping":
+        """Return what holds for a block of a file, its temperature being that of the file."""
+        name = key_of(file)
+        degrees = self.temperatures.get(f"{name}:{block}")
+        of_file = {} if degrees is None else {"temperatures": {name: degrees}}
+        return self.model_copy(update=of_file)
 
 
 def key_of(file: str) -> str:

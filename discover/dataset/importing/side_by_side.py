@@ -25,10 +25,8 @@ _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _LABEL = re.compile(
     rf"(?:(?P<name>[^=:]{{1,30}}?)\s*[=:]\s*)?(?P<value>{_NUMBER})\s*(?P<unit>[^\s0-9].{{0,15}}|1/.+)?"
 )
-_LABELLED = re.compile(
-    rf"(?P<base>.*\S)[\s_,;@([]+(?:(?:at|bei|@|à)\s+)?(?P<label>(?:\w{{1,12}}\s*=\s*)?{_NUMBER}.{{0,15}}?)[)\]]?"
-)
-_COUNTED = re.compile(r"(?P<base>.*[^\W\d])[\s._#]*\(?(?P<count>[0-9]{1,3})\)?")
+_APART = re.compile(r"[\s_,;@(\[]+(?:(?:at|bei|à)\s+)?")
+_COUNTED = re.compile(r"(?P<base>.*(?:[^\W\d_]|[)\]'*]))[\s._#]*\(?(?P<count>[0-9]{1,3})\)?")
 
 
 @dataclass(frozen=True)
@@ -61,23 +59,27 @@ def _heads(block: Block) -> list[_Head]:
     heads = []
     for name, unit in block.columns:
         head = _Head(name, unit, "")
-        labelled = _LABELLED.fullmatch(name)
         inside, *label = re.split(r"\s*[,;@]\s*", unit, maxsplit=1)
-        if _quantity(head) and not label and not _LABEL.fullmatch(unit):
-            pass
-        elif labelled and _is_condition(labelled["label"]):
-            base, within = name_and_unit(labelled["base"], unit)
-            head = _Head(base, within, labelled["label"])
-        elif label:
+        if label:
             head = _Head(name, inside, label[0])
-        elif _LABEL.fullmatch(unit) and _is_condition(unit):
+        elif _is_condition(unit):
             head = _Head(name, "", unit)
+        elif _quantity(head):
+            pass
+        elif labelled := _labelled(name):
+            head = _Head(*name_and_unit(labelled[0], unit), labelled[1])
         elif counted := _COUNTED.fullmatch(name):
             base, within = name_and_unit(counted["base"], unit)
             if _quantity(_Head(base, within, "")):
                 head = _Head(base, within, f"no. {counted['count']}")
         heads.append(head)
     return heads
+
+
+def _labelled(name: str) -> tuple[str, str] | None:
+    """Return a name and the condition that stands after it, as in "G' 20 °C"; None if none does."""
+    parts = ((name[: m.start()], name[m.end() :].strip(" )]")) for m in _APART.finditer(name))
+    return next((part for part in parts if part[0] and _is_condition(part[1])), None)
 
 
 def _quantity(head: _Head) -> str | None:
@@ -105,7 +107,9 @@ def _groups(
         base = plain(heads[i].base)
         in_turn.setdefault(seen[base], []).append(i)
         seen[base] += 1
-    return [("", group) for group in in_turn.values()]
+    said = [next(filter(None, (labels[i] for i in group)), "") for group in in_turn.values()]
+    said = said if len(set(said)) == len(said) else [""] * len(said)
+    return list(zip(said, in_turn.values(), strict=True))
 
 
 def _columns(

@@ -4,7 +4,6 @@ What repeats tells them apart: a word or number in a column of its own, a temper
 a clock or a series of rates that starts again.
 """
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -12,9 +11,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from discover.dataset.importing.mapping import Mapping
-from discover.dataset.importing.names import plain
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.text_export import Block
+from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
 from discover.dataset.importing.text_rows import is_number
 from discover.errors import InputError
 
@@ -32,16 +30,6 @@ _BACK = 0.1
 
 _MOSTLY = 0.6
 """Share of steps in one direction, from which on values go that way."""
-
-_WORDS = (
-    "sample", "specimen", "material", "batch", "fluid", "run", "test", "experiment", "series",
-    "replicate", "repeat", "curve", "data ?set", "step", "segment", "seg ?index", "interval",
-    "probe", "charge", "messung", "versuch", "messreihe", "abschnitt", "intervall",
-    "échantillon", "essai", "mesure", "intervalle", "muestra", "ensayo", "campione", "prova",
-    "amostra", "样品", "试样", "批次", "試料", "サンプル", "시료", "샘플",
-)  # fmt: skip
-_OF_TESTS = re.compile(rf"({'|'.join(_WORDS)})s?( (name|id|no|nr|number|index|label))?[.#]?")
-"""Names of columns that say which test or sample a row is of."""
 
 _Rows = Int[np.ndarray, " m"]
 
@@ -107,11 +95,11 @@ def _told_by(block: Block, pieces: Sequence[_Piece]) -> list[int]:
 def _by_words(readings: Readings, piece: _Piece) -> list[_Piece]:
     """Split where a column says of which sample, run or step a row is."""
     for i, (name, _) in enumerate(readings.block.columns):
-        if _OF_TESTS.fullmatch(plain(name).replace(".", "")):
+        if found := OF_TESTS.fullmatch(plain_words(name)):
             words = np.array([readings.block.cells[int(row)][i] for row in piece.rows])
             parts = _by_value(piece, words, i)
             if len(parts) > 1:
-                return parts
+                return parts if found["sample"] else [replace(one, apart=False) for one in parts]
     return [piece]
 
 

@@ -37,6 +37,18 @@ _TITLE = re.compile(r"[^:=;]*[^\W\d_]{3}[^:=;]*")
 
 _DATA_POINT = "data point"
 _FEWEST = 3
+
+_OF_SAMPLES = (
+    "sample|specimen|material|batch|fluid|run|test|experiment|series|replicate|repeat|curve|"
+    "data ?set|probe|charge|messung|versuch|messreihe|échantillon|essai|mesure|muestra|ensayo|"
+    "campione|prova|amostra|样品|试样|批次|試料|サンプル|시료|샘플"
+)
+_OF_STEPS = "step|segment|seg ?index|interval|abschnitt|intervall|intervalle"
+OF_TESTS = re.compile(
+    rf"((?P<sample>{_OF_SAMPLES})|{_OF_STEPS})s?( (name|id|no|nr|number|index|label))?#?"
+)
+"""Names of columns that say which sample or step a row is of, as `plain_words` gives them."""
+
 _INVALID = re.compile(r"\((invalid|invalide|ungültig)\)", re.IGNORECASE)
 
 
@@ -100,6 +112,11 @@ class Block:
         rows = np.stack(values, axis=1).tolist()
         cells = tuple(tuple("" if x != x else repr(x) for x in row) for row in rows)
         return cls(name, heads, cells, 1)
+
+
+def plain_words(name: str) -> str:
+    """Return the words of a name in small letters, without signs between them."""
+    return re.sub(r"[\s._]+", " ", name).strip().lower()
 
 
 def require_blocks(blocks: list[Block], name: str) -> list[Block]:
@@ -172,6 +189,10 @@ def _by_label(
     alone = sum(bool(label) and len(lines) < 2 for label, lines in groups)
     if alone > 2 and 2 * alone > len(groups):  # a column of words or of the time of day
         groups = [("", [line for _, lines in groups for line in lines])]
+    if OF_TESTS.fullmatch(plain_words(header[0][0])) and not _POINT_OF_SEGMENT.fullmatch(
+        rows[data][0]
+    ):
+        groups = [("", [line for _, lines in groups for line in lines])]  # split as any such column
     for label, lines in groups:
         if label and label != _DATA_POINT and len(lines) < 2:
             continue  # a line about the measurement, such as the number of its points
