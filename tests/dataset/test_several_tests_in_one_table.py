@@ -231,7 +231,9 @@ def test_a_file_of_reptate_may_lack_its_first_line_and_have_more_columns(tmp_pat
     rows = ["omega=1.0;gamma=2.0;", "#Time(s)\tStrain(-)\ttau_yx(Pa)\ttau_xx-tau_yy(Pa)"]
     out, _ = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite")
     (test,) = load_dataset(out)
-    np.testing.assert_allclose(test.first_normal_stress_difference, wave[3], atol=1e-14)
+    found = test.first_normal_stress_difference
+    assert found is not None
+    np.testing.assert_allclose(found, wave[3], atol=1e-14)
     rows[1] = "#Time(s)\tStrain(-)\ttau_yx(Pa)\tIntensity"
     out, result = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite")
     assert "columns not read: Intensity" in result.stdout
