@@ -246,8 +246,12 @@ def import_data(
         ),
     ] = None,
     temperature: Annotated[
-        float | None,
-        typer.Option("--temperature", help="Temperature to import, in °C, if there are several."),
+        list[str] | None,
+        typer.Option(
+            "--temperature",
+            help="Temperature to import, in °C, if there are several, or that of a file: "
+            "melt.txt=140.",
+        ),
     ] = None,
     start_time: Annotated[
         float | None,
@@ -290,7 +294,7 @@ def import_data(
         blocks=block,
         start_time_s=start_time,
         tests=test,
-        temperature_C=temperature,
+        temperatures=temperature,
         layout={
             "format": form,
             "delimiter": delimiter,
@@ -301,7 +305,7 @@ def import_data(
     )
     paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
-    write_folder(imported, out, overwrite)
+    write_folder(imported, out, overwrite, mapping)
     # a folder of several temperatures is for one to be chosen from
     whole = any(name in imported.files for name in DATA_FILES)
     findings = check_folder(out) if whole else Findings()
@@ -313,6 +317,7 @@ def import_data(
             "folder": str(out),
             "files": sorted(imported.files),
             "said": said,
+            "unread": imported.unread,
             "errors": [str(finding) for finding in errors],
             "warnings": [str(f) for f in findings.of("warning")],
             "page": None if written is None else str(written),
@@ -323,6 +328,8 @@ def import_data(
             say(line)
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        for line in imported.unread:
+            say(f"not read: {line}", err=True)
         say(f"{out}: {len(imported.files) + 1} files written.")
         if written is not None:
             say(f"Every test drawn, to see whether each column is what its name says: {written}")

@@ -12,6 +12,11 @@ _UNIT = re.compile(
     r"[#%\s]*([^:=#%]{1,40}?)[\s_]+(?:units?|einheit|unité)\s*[:=]\s*(\S.{0,19})", re.I
 )
 _WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
+_DEGREES = re.compile(
+    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
+    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])",
+)
+_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 
 
 @dataclass(frozen=True)
@@ -62,3 +67,23 @@ def _constants(cells: Sequence[str]) -> Iterator[Constant]:
 def _constant(name: str, number: str, unit: str | None) -> Constant:
     name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
     return Constant(name, number.replace(",", "."), unit)
+
+
+def temperature_in(text: str) -> Constant | None:
+    """Return the temperature that a title or a file's name says; None if it says none, or several.
+
+    In kelvin only where a melt or solution can be, since 95K may be a molar mass.
+    """
+    found = {}
+    text = text.replace("_", " ")
+    for match in _DEGREES.finditer(text):
+        value = match[1].replace(",", ".")
+        unit = match[2][0].upper()
+        if _TO.search(text[: match.start()]):
+            return None  # a ramp
+        if unit == "C" or 200.0 <= float(value) <= 700.0:
+            sign = "-" if match[0].startswith("-") else ""
+            found[sign + value, unit] = Constant(
+                "temperature", sign + value, "°C" if unit == "C" else "K"
+            )
+    return next(iter(found.values())) if len(found) == 1 else None

@@ -61,6 +61,9 @@ TestName = Literal[
 
 EVERY_BLOCK = "*"
 
+Celsius = Annotated[float, Field(ge=-273.15, le=2000)]
+"""A temperature that can be."""
+
 
 class Geometry(Section):
     """The tool, needed where the file holds torque, angle or force instead of stress and strain.
@@ -146,7 +149,8 @@ class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
     Keys of `names` are the tables of ``names.toml``, keys of `tests` ``FILE:BLOCK``, ``FILE`` or
-    `EVERY_BLOCK`; the rest is recognised.
+    `EVERY_BLOCK`; the rest is recognised. Keys of
+    `temperatures` are ``FILE:BLOCK`` or ``FILE``; values in °C.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
@@ -155,7 +159,8 @@ class Mapping(Section):
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
-    temperature_C: Annotated[float, Field(ge=-273.15, le=2000)] | None = None
+    temperature_C: Celsius | None = None
+    temperatures: dict[str, Celsius] = Field(default_factory=dict)
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
@@ -176,6 +181,13 @@ class Mapping(Section):
         name = key_of(file)
         keys = f"{name}:{block}", name, EVERY_BLOCK
         return next((self.tests[key] for key in keys if key in self.tests), None)
+
+    def of_block(self, file: str, block: int) -> "Mapping":
+        """Return what holds for a block of a file, its temperature being that of the file."""
+        name = key_of(file)
+        degrees = self.temperatures.get(f"{name}:{block}")
+        of_file = {} if degrees is None else {"temperatures": {name: degrees}}
+        return self.model_copy(update=of_file)
 
 
 def key_of(file: str) -> str:
@@ -223,7 +235,7 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "names", "layout", "geometry", "tests"):
+    for name in ("columns", "units", "names", "layout", "geometry", "tests", "temperatures"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}

@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import dataclass, field
+from pathlib import PurePath
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.clock_times import is_clock, seconds
-from discover.dataset.importing.header_constants import Constant
-from discover.dataset.importing.mapping import Geometry, Mapping
+from discover.dataset.importing.header_constants import Constant, temperature_in
+from discover.dataset.importing.mapping import Geometry, Mapping, key_of
 from discover.dataset.importing.names import NameTable, name_table
 from discover.dataset.importing.quantities import (
     QUANTITIES,
@@ -61,6 +62,8 @@ class Readings:
         In words, where each quantity that was asked for comes from.
     unsaid
         Units of those quantities that the file does not give.
+    notes
+        In words, what it says that cannot be.
     """
 
     block: Block
@@ -71,6 +74,7 @@ class Readings:
     begins: float = 0.0
     used: dict[str, str] = field(default_factory=dict)
     unsaid: dict[str, UnsaidUnit] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
@@ -99,6 +103,8 @@ class Readings:
         InputError
             If a unit is missing, unknown or one of something else.
         """
+        if key == "temperature":
+            return self._temperature()
         if key in self.columns:
             return self._column(key)
         made = self._made(key)
@@ -131,6 +137,36 @@ class Readings:
         other = SAME.get(key, "")
         return given.get(key) or ("" if other in self.columns else given.get(other, ""))
 
+    def _temperature(self) -> Values | None:
+        """Return temperatures as the user, a column, the header, a title or the name gives them."""
+        given = self.mapping.temperatures.get(key_of(self.name))
+        if given is not None:
+            self.used["temperature"] = f"{given:g} °C as given"
+            return np.full(len(self), given)
+        if "temperature" in self.columns:
+            return self._column("temperature")
+        for found, where in (
+            (self._find_constant("temperature"), "the header"),
+            (temperature_in(self.block.name), "the title"),
+            (temperature_in(PurePath(self.name).stem), "the file's name"),
+        ):
+            if found is None:
+                continue
+            unit = str(self.mapping.units.get("temperature", found.unit)) or "°C"
+            said = f"{shown(found.name)} {found.value} {shown(unit)} of {where}"
+            degrees = to_celsius(float(found.value), unit)
+            if degrees is not None and _is_temperature(degrees):
+                self.used["temperature"] = said
+                return np.full(len(self), degrees)
+            self._no_temperature(said)
+        return None
+
+    def _no_temperature(self, said: str) -> None:
+        self.notes["temperature"] = (
+            f"{said} is no temperature (-273.15 to 2000 °C) and not used; give it, as in "
+            f"--temperature {shown(self.name)}=25"
+        )
+
     def _column(self, key: str) -> Values:
         at = self.columns[key]
         column, unit = self.block.columns[at]
@@ -145,7 +181,12 @@ class Readings:
             kelvin = to_celsius(0.0, unit or "°C")
             if kelvin is None:
                 return np.full(len(raw), math.nan)
-            return np.array([to_celsius(value, unit or "°C") for value in raw], dtype=float)
+            degrees = np.array([to_celsius(value, unit or "°C") for value in raw], dtype=float)
+            real = _is_temperature(degrees)
+            if not np.all(real | np.isnan(degrees)):
+                worst = cells[int(np.argmin(real | np.isnan(degrees)))]
+                self._no_temperature(f"{self.used[key]} {shown(worst)}")
+            return np.where(real, degrees, math.nan)
         if not unit:
             said = next((c.unit for c in self.block.constants if self._is_unit_line(c, key)), "")
             unit = said or self._unsaid(key, column, raw)
@@ -227,10 +268,12 @@ class Readings:
         found = self._find_constant(key)
         if found is None:
             return None
+        if not math.isfinite(float(found.value)):
+            raise InputError(
+                f"{self.name}: the header says {shown(found.name)} {shown(found.value)}, more than "
+                "a number can be. Correct that line."
+            )
         unit = self._unit_given(key) or found.unit
-        if key == "temperature":
-            self.used[key] = f"{shown(found.name)} {found.value} {shown(unit)} of the header"
-            return to_celsius(float(found.value), unit or "°C")
         if not unit:
             unit = self._unsaid(key, found.name, np.array([float(found.value)]))
         self.used[key] = f"{shown(found.name)} {found.value} {shown(unit)} of the header"
@@ -270,3 +313,8 @@ def _per_signal(geometry: Geometry, key: str) -> float | None:
     if key == "stress":
         return geometry.stress_per_torque
     return geometry.normal_stress_per_force if key == "N1" else geometry.strain_per_angle
+
+
+def _is_temperature(degrees):
+    """Return whether numbers in °C can be temperatures, as a `Mapping` takes them."""
+    return (degrees >= -273.15) & (degrees <= 2000.0)

@@ -17,9 +17,18 @@ Decimal = Literal[".", ","]
 
 DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
 
+LARGEST_EXPORT = 100_000_000
+"""Bytes of an export as text, of a spreadsheet's when it is unpacked."""
+
+MOST_CELLS = 10_000_000
+"""Cells of a table; more take gigabytes, and hundreds of samples are enough for a test."""
+
 _POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+_FEWER = "Export fewer samples, or one test a file."
 
 
 def is_number(cell: str) -> bool:
@@ -49,8 +58,14 @@ def read_rows(
     InputError
         If the file cannot be read, or its decimal sign cannot be told from its thousands separator.
     """
-    lines = _decode(read_bytes(path, path.name), path.name, encoding).splitlines()
+    content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
+    lines = _decode(content, path.name, encoding).splitlines()
     mark = DELIMITERS[delimiter] if delimiter else _delimiter(lines)
+    cells = len(lines) + sum(
+        len(line.split()) if mark == " " else line.count(mark) for line in lines
+    )
+    if cells > MOST_CELLS:
+        raise InputError(f"{path.name} has {cells} cells; the limit is {MOST_CELLS}. {_FEWER}")
     try:
         rows = [
             # runs of spaces are one delimiter
