@@ -220,6 +220,14 @@ def import_data(
     unit: Annotated[
         list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
     ] = None,
+    names: Annotated[
+        Path | None,
+        typer.Option(
+            "--names",
+            envvar="DISCOVER_NAMES",
+            help='TOML file of further names of quantities: stress = ["Sigma corr."].',
+        ),
+    ] = None,
     geometry: Annotated[
         str | None,
         typer.Option(
@@ -243,8 +251,12 @@ def import_data(
         ),
     ] = None,
     temperature: Annotated[
-        float | None,
-        typer.Option("--temperature", help="Temperature to import, in °C, if there are several."),
+        list[str] | None,
+        typer.Option(
+            "--temperature",
+            help="Temperature to import, in °C, if there are several, or that of a file: "
+            "melt.txt=140.",
+        ),
     ] = None,
     start_time: Annotated[
         float | None,
@@ -282,11 +294,12 @@ def import_data(
         mapping,
         columns=column,
         units=unit,
+        names=names,
         geometry=geometry,
         blocks=block,
         start_time_s=start_time,
         tests=test,
-        temperature_C=temperature,
+        temperatures=temperature,
         layout={
             "format": form,
             "delimiter": delimiter,
@@ -297,7 +310,7 @@ def import_data(
     )
     paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
-    write_folder(imported, out, overwrite)
+    write_folder(imported, out, overwrite, mapping)
     # a folder of several temperatures is for one to be chosen from
     whole = any(name in imported.files for name in DATA_FILES)
     findings = check_folder(out) if whole else Findings()
@@ -309,6 +322,7 @@ def import_data(
             "folder": str(out),
             "files": sorted(imported.files),
             "said": said,
+            "unread": imported.unread,
             "errors": [str(finding) for finding in errors],
             "warnings": [str(f) for f in findings.of("warning")],
             "page": None if written is None else str(written),
@@ -319,6 +333,8 @@ def import_data(
             say(line)
         for finding in findings:
             say(f"{finding.severity}: {finding}", err=finding.severity == "error")
+        for line in imported.unread:
+            say(f"not read: {line}", err=True)
         say(f"{out}: {len(imported.files) + 1} files written.")
         if written is not None:
             say(f"Every test drawn, to see whether each column is what its name says: {written}")

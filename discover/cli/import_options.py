@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +16,8 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
+from discover.dataset.importing.names import read_names
+from discover.dataset.importing.quantities import to_celsius
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
 from discover.dataset.tables.table import read_bytes
@@ -31,7 +34,8 @@ def merge_mapping(
     start_time_s: float | None = None,
     layout: AnyMapping[str, object] | None = None,
     tests: Sequence[str] | None = None,
-    temperature_C: float | None = None,
+    temperatures: Sequence[str] | None = None,
+    names: Path | None = None,
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
@@ -45,7 +49,12 @@ def merge_mapping(
         Such as ``cone_plate:radius_mm=25,angle_deg=1``.
     tests
         Of the form ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``.
-    blocks, start_time_s, layout, temperature_C
+    names
+        File of further names of quantities, as ``names.toml``.
+    temperatures
+        Of the form ``40``, the one to import, or ``melt.txt=40``, that of a file; in °C, or as
+        ``313K``.
+    blocks, start_time_s, layout
         As in `discover.dataset.importing.Mapping`.
 
     Raises
@@ -59,6 +68,8 @@ def merge_mapping(
         ("units", units, "stress=kPa"),
     ):
         content[key] = {**content.get(key, {}), **_pairs(options or (), example)}
+    if names is not None:
+        content["names"] = {**content.get("names", {}), **read_names(names)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
         numbers = {
@@ -70,8 +81,15 @@ def merge_mapping(
         content["blocks"] = list(blocks)
     if start_time_s is not None:
         content["start_time_s"] = start_time_s
-    if temperature_C is not None:
-        content["temperature_C"] = temperature_C
+    of_files = dict(content.get("temperatures", {}))
+    for option in temperatures or ():
+        file, equals, value = option.rpartition("=")
+        degrees = _degrees(value if equals else option)
+        if equals:
+            of_files[Path(file.strip()).name] = degrees
+        else:
+            content["temperature_C"] = degrees
+    content["temperatures"] = of_files
     spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in tests or ()]
     content["tests"] = {**content.get("tests", {}), **_pairs(spelled, "melt.txt:2=creep")}
     if any(one.startswith(f"{EVERY_BLOCK}=") for one in spelled):
@@ -90,6 +108,17 @@ def _pairs(options, example: str) -> dict[str, str]:
             raise InputError(f"Cannot read {option!r}; write it as name=value, such as {example}.")
         pairs[key.strip()] = value.strip()
     return pairs
+
+
+def _degrees(text: str) -> float:
+    found = re.fullmatch(r"\s*(\S+?)\s*°?\s*([CKF]?)\s*", text)
+    if found is None:
+        raise InputError(
+            f"--temperature must be a number; got {text!r}. Write 40, melt.txt=40 or 313K."
+        )
+    degrees = to_celsius(_number(found[1], "--temperature"), found[2] or "C")
+    assert degrees is not None
+    return round(degrees, 6)  # 313.15 - 273.15 is no 40
 
 
 def _number(text: str, where: str) -> float:
@@ -123,14 +152,30 @@ def sources_of(
     return runs, sweep, changed
 
 
-def write_folder(imported: ImportedFolder, out: Path, overwrite: bool) -> None:
+def write_folder(
+    imported: ImportedFolder, out: Path, overwrite: bool, mapping_file: Path | None = None
+) -> None:
     """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
+
+    Parameters
+    ----------
+    mapping_file
+        The mapping file that was read, if any; one that stands in the folder is left as it is.
 
     Raises
     ------
     InputError
-        If the folder holds data already and `overwrite` is not set, or cannot be written to.
+        If the folder holds data already and `overwrite` is not set, cannot be written to, or a
+        table would take the place of a file that was read.
     """
+    for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
+        read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]
+        if read:
+            raise InputError(
+                f"{out / name} is a file that this import reads, and a table of that name would "
+                "replace it. Give the data folder a place of its own, as in --out "
+                f"{out / 'imported'}."
+            )
     make_folder(out)
     if not overwrite and any(os.path.lexists(out / name) for name in (*DATA_FILES, TESTS_FILE)):
         raise InputError(
@@ -142,6 +187,14 @@ def write_folder(imported: ImportedFolder, out: Path, overwrite: bool) -> None:
         for source in imported.mapping.source
     )
     mapping = imported.mapping.model_copy(update={"source": sources})
-    write_text(out / MAPPING_FILE, write_mapping(mapping))
+    if mapping_file is None or not _same(out / MAPPING_FILE, mapping_file):
+        write_text(out / MAPPING_FILE, write_mapping(mapping))
     for name in sorted(imported.files, key=lambda name: name == INDEX_FILE):
         write_text(out / name, imported.files[name])
+
+
+def _same(first: Path, second: str | Path) -> bool:
+    try:
+        return os.path.samefile(first, second)
+    except OSError:  # one of them is not there
+        return False

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from discover.dataset.importing.file_blocks import blocks_of_file
 from discover.dataset.importing.folder_files import NamedRecord, files_of
+from discover.dataset.importing.left_out import left_out, nothing, numbered, unread_columns
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
-from discover.dataset.importing.readings import INSTRUMENT, Readings
+from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
-from discover.dataset.importing.registry import blocks_of_importer
-from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
-from discover.dataset.importing.text_rows import read_rows
-from discover.dataset.importing.waveforms import waves_of, without_names
+from discover.dataset.importing.unsaid_units import UnsaidUnits
+from discover.dataset.importing.waveforms import waves_of
 from discover.dataset.tables.table import read_bytes, shown
 from discover.errors import InputError
 
@@ -33,11 +33,14 @@ class ImportedFolder:
         Everything that was used, guesses included, so that the import can be repeated.
     said
         What was understood and done, a line each.
+    unread
+        Files and tables that could not be read, and why, a line each.
     """
 
     files: dict[str, str] = field(default_factory=dict)
     mapping: Mapping = field(default_factory=Mapping)
     said: list[str] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
 
 
 @dataclass
@@ -48,7 +51,35 @@ class _Import:
     found: list[NamedRecord] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     seen: dict[str, set[str]] = field(default_factory=dict)
+    named: set[str] = field(default_factory=set)
+    asked_for: set[str] = field(default_factory=set)
+    units: UnsaidUnits = field(default_factory=UnsaidUnits)
     tests: dict[str, TestName] = field(default_factory=dict)
+    unread: list[str] = field(default_factory=list)
+    columns: dict[str, list[str]] = field(default_factory=dict)
+
+    def note(self, readings: Readings, made: Record) -> None:
+        """Keep what a test that is imported says of names and units."""
+        for quantity, at in readings.columns.items():
+            if quantity in readings.used:
+                self.seen.setdefault(quantity, set()).add(readings.block.columns[at][0])
+        parts = ((key, one) for key, one in readings.unsaid.items() if _is_part(key, made))
+        self.units.add(readings.name, parts)
+        self.asked_for |= readings.used.keys() | {SAME[k] for k in readings.used if k in SAME}
+
+    def add(self, other: "_Import") -> None:
+        """Add what another file holds."""
+        self.found += other.found
+        self.said += other.said
+        self.unread += other.unread
+        self.tests |= other.tests
+        self.named |= other.named
+        self.asked_for |= other.asked_for
+        self.units.found = {**other.units.found, **self.units.found}
+        for key, names in other.seen.items():
+            self.seen.setdefault(key, set()).update(names)
+        for names, files in other.columns.items():
+            self.columns.setdefault(names, []).extend(files)
 
 
 def import_files(
@@ -59,7 +90,8 @@ def import_files(
     Every block of numbers is taken for the test that its quantities and their course make it:
     records in time become runs, sweeps and flow curves the tables beside them. Values are converted
     to SI units and written with all their digits. Rows in which a needed cell is empty or no number
-    are dropped, and counted in `said`.
+    are dropped, and counted in `said`. A file that cannot be understood does not keep the others
+    from being read; it is named in `unread`.
 
     Parameters
     ----------
@@ -71,13 +103,26 @@ def import_files(
     Raises
     ------
     InputError
-        If a file cannot be understood; says which columns it has.
+        If no file can be understood; says which columns it has.
     """
     state = _Import(mapping)
     sources = []
     for path in paths:
-        _read(path, state)
-        sources.append(_source(path, False))
+        one = _Import(mapping)
+        try:
+            _read(path, one)
+            sources.append(_source(path, False))
+        except InputError as error:
+            if len(paths) == 1:
+                raise
+            said = str(error)
+            state.unread.append(said if path.name in said else f"{path.name}: {said}")
+        else:
+            state.add(one)
+    if paths and len(state.unread) and not state.found and sweep is None:
+        raise InputError(
+            f"None of the {len(paths)} files can be read. {' '.join(state.unread[:6])}"
+        )
     if sweep is not None:
         _read_sweep(sweep, state)
         sources.append(_source(sweep, True))
@@ -94,6 +139,23 @@ def import_files(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
+    unused = sorted(set(map(str, mapping.units)) - state.named)
+    if unused:
+        raise InputError(
+            f"--unit {unused[0]} changes nothing: no column or line of these files is known as "
+            f"{unused[0]}. Known are {', '.join(sorted(state.named))}; name another with "
+            f'--column {unused[0]}="its name", or leave the unit out.'
+        )
+    state.units.require()
+    idle = sorted(set(map(str, mapping.units)) - state.asked_for - _WAVES)
+    state.said = [
+        *state.units.warning(),
+        *(
+            f"warning: --unit {key} changes nothing: no test that was read needs {key}."
+            for key in idle
+        ),
+        *state.said,
+    ]
     files, notes = files_of(state.found)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
@@ -105,22 +167,36 @@ def import_files(
             "tests": {**state.tests, **mapping.tests},
         }
     )
-    return ImportedFolder(files, used, [*state.said, *notes])
+    said = [*state.said, *unread_columns(state.columns), *notes]
+    return ImportedFolder(files, used, said, state.unread)
 
 
 def _read(path: Path, state: _Import) -> None:
     """Add the tests of a file."""
-    blocks = _blocks(path, state.mapping)
+    blocks = blocks_of_file(path, state.mapping)
     before: Record | None = None
     clock = 0.0
     reasons = []
     used = 0
     columns: list[str] = []
+    read: set[str] = set()
+    tables: list[tuple[int, Readings]] = []
+    there: dict[str, None] = {}
+
+    def refused(where: str, error: InputError, chosen: TestName | None) -> None:
+        if chosen is not None or state.mapping.blocks is not None:
+            raise error  # of what the user named
+        state.unread.append(f"{where}: {error}")
+
     for number, block in blocks:
         key = f"{key_of(path.name)}:{number}"
         where = f"{path.name}, block {number} {block.name}".strip()
         stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
-        readings = Readings.of(block, state.mapping, path.name)
+        readings = Readings.of(block, state.mapping.of_block(path.name, number), path.name)
+        state.named |= readings.named()
+        tables.append((number, readings))
+        if block.apart:
+            before, clock = None, 0.0
         readings.begins, clock = clock_before(readings, clock)
         chosen = state.mapping.test_of(path.name, number)
         state.tests[key] = chosen or "none"
@@ -135,26 +211,42 @@ def _read(path: Path, state: _Import) -> None:
             )
             before = None
             continue
-        taken = _taken(readings, chosen)
         previous, before = before, None
+        taken: list[Recognised] = []
+        try:
+            if chosen is None and _CALIBRATION.search(block.name):
+                taken = [
+                    Recognised("none", np.ones(len(readings), bool), _A_CALIBRATION.format(key))
+                ]
+            else:
+                taken = _taken(readings, chosen)
+        except InputError as error:
+            refused(where, error, chosen)
         for part, one in enumerate(taken, start=1):
-            made = None if one.kind == "none" else record(readings, one, previous)
-            if made is not None and not _at_temperature(made, state.mapping):
-                one = replace(one, why=f"at {made.temperature} °C, not the temperature asked for")
-                made = None
+            try:
+                made = None if one.kind == "none" else record(readings, one, previous)
+            except InputError as error:
+                refused(where, error, chosen)
+                continue
+            why = one.why
+            if made is not None and made.kind != "none":
+                why = _not_at(made, readings, one, state.mapping) if chosen is None else ""
+                made = None if why else made
             if made is None or made.kind == "none":
-                reason = one.why if made is None else made.notes[0]
+                reason = why if made is None else made.notes[0]
                 reasons.append(f"block {number} is {reason}" if reason else "")
-                state.said.append(_left_out(where, block, reason))
+                state.said.append(left_out(where, block, reason))
                 continue
             name = stem + (f"-{part}" if len(taken) > 1 else "")
             state.found.append(NamedRecord(name, made, path.name, block.name))
             state.tests[key] = made.kind
-            for quantity, at in readings.columns.items():
-                if quantity in readings.used:
-                    state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+            state.note(readings, made)
+            made.notes += readings.notes.values()
             state.said.append(_summary(where, readings, one, made, columns))
             before, used = made, used + 1
+            read |= {block.columns[readings.columns[k]][0] for k in readings.used
+                     if k in readings.columns} | set(block.told_by)  # fmt: skip
+            there |= dict.fromkeys(numbered(readings))
         if chosen != "none":
             for wave in waves_of(block, state.mapping, path.name):
                 used += 1
@@ -166,13 +258,46 @@ def _read(path: Path, state: _Import) -> None:
                 found = NamedRecord(f"{stem}-point-{point}", made, path.name, wave.name)
                 state.found.append(found)
                 state.said.append(_summary(f"{path.name}, {wave.name}", readings, one, made))
+    unread = [shown(name) for name in there if name not in read]
+    if unread:
+        state.columns.setdefault(", ".join(unread), []).append(path.name)
+    if not used and state.unread:
+        raise InputError(" ".join(state.unread))
     if not used:
-        raise InputError(_nothing(path, blocks, [reason for reason in reasons if reason], state))
+        raise InputError(nothing(path, tables, [reason for reason in reasons if reason]))
 
 
-def _at_temperature(made: Record, mapping: Mapping) -> bool:
-    wanted, has = mapping.temperature_C, made.temperature
-    return wanted is None or has is None or abs(has - wanted) <= 1.0
+_CALIBRATION = re.compile(
+    r"calibra|kalibri|étalon|taratura|verification|(reference|standard|référence) (oil|fluid)"
+    r"|viscosity standard|prüföl|referenzöl|air check|self-?test|校正|校准|標準液|較正|보정|교정",
+    re.IGNORECASE,
+)
+_A_CALIBRATION = (
+    "a calibration or check of the instrument by its title, no test of the sample; to take it "
+    "nevertheless, say what it is, as in --test {}=flow_curve"
+)
+
+_ISOTHERMAL = 5.0
+"""Width in °C of the middle nine tenths of the temperatures of a test at one temperature."""
+
+
+def _not_at(made: Record, readings: Readings, one: Recognised, mapping: Mapping) -> str:
+    """Return why a test is at no temperature, or not at that which the user wants; else nothing."""
+    temperature = readings.get("temperature")
+    if temperature is not None and np.isfinite(temperature[one.rows]).any():
+        low, high = np.nanpercentile(temperature[one.rows], [5.0, 95.0])
+        if high - low > _ISOTHERMAL:
+            return f"at no one temperature, but from {low:.4g} to {high:.4g} °C"
+    wanted = mapping.temperature_C
+    if wanted is None:
+        return ""
+    if made.temperature is None:
+        made.temperature = wanted
+        made.notes.append(
+            f"nothing says its temperature: taken to be at the {wanted:g} °C asked for"
+        )
+    return "" if abs(made.temperature - wanted) <= 1.0 else (
+        f"at {made.temperature:g} °C, not the temperature asked for")  # fmt: skip
 
 
 def _taken(readings: Readings, chosen: TestName | None) -> list[Recognised]:
@@ -186,39 +311,17 @@ def _taken(readings: Readings, chosen: TestName | None) -> list[Recognised]:
     return alike or [Recognised(chosen, every, "as asked")]
 
 
-def _blocks(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
-    layout = mapping.layout
-    found = blocks_of_importer(path, layout.format)
-    if found is None:
-        rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
-        found = blocks_of_rows(rows, layout.header_row)
-        if not any(Readings.of(block, mapping, path.name).columns for block in found):
-            wave = without_names(rows)
-            found = found if wave is None else [wave]
-        require_blocks(found, path.name)
-    blocks = list(enumerate(found, start=1))
-    if mapping.blocks is None:
-        return blocks
-    chosen = [pair for pair in blocks if pair[0] in mapping.blocks]
-    if not chosen:
-        raise InputError(
-            f"{path.name} has {len(blocks)} blocks of numbers; none of those asked for "
-            f"({', '.join(map(str, mapping.blocks))}). Correct --block."
-        )
-    return chosen
-
-
 def _read_sweep(path: Path, state: _Import) -> None:
     """Add the first frequency sweep of a file as the linear sweep."""
-    for _, block in _blocks(path, state.mapping.model_copy(update={"blocks": None})):
+    for _, block in blocks_of_file(path, state.mapping.model_copy(update={"blocks": None})):
         readings = Readings.of(block, state.mapping, path.name)
         if not readings.has("omega", "Gp", "Gpp"):
             continue
         one = next((o for o in recognise(readings) if o.kind == "frequency_sweep"), None)
         one = one or Recognised("frequency_sweep", np.ones(len(readings), bool), "as asked")
         made = record(readings, one, None)
-        for quantity, at in readings.columns.items():
-            state.seen.setdefault(quantity, set()).add(block.columns[at][0])
+        state.named |= readings.named()
+        state.note(readings, made)
         state.found.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
         state.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
         return
@@ -227,6 +330,8 @@ def _read_sweep(path: Path, state: _Import) -> None:
         'needed. Name its columns with --column omega="…" --column Gp="…" --column Gpp="…".'
     )
 
+
+_WAVES = {"strain_wave", "stress_wave", "wave_time"}
 
 _WORDS = {
     "frequency_sweep": "a frequency sweep at small strain",
@@ -265,60 +370,12 @@ def _is_part(key: str, made: Record) -> bool:
     sources = {INSTRUMENT.get(name, name) for name in made.table} | set(made.table)
     # these are read only where they have to stand for another
     through = {"viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor"}
-    through |= {"strain_amplitude", "stress_amplitude", "temperature"}
+    through |= {"stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2"}
+    if key == "strain_amplitude":
+        return made.kind == "amplitude_sweep"
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
     return key in sources or (key in through)
-
-
-def _left_out(where: str, block: Block, reason: str) -> str:
-    if reason:
-        return f"{where}: left out, {reason}."
-    names = ", ".join(shown(n) for n, _ in block.columns[:15] if n)
-    return f"{where}: not a run, and no table that is known (columns {names}); left out."
-
-
-def _nothing(
-    path: Path, blocks: list[tuple[int, Block]], reasons: list[str], state: _Import
-) -> str:
-    """Say what the block that is nearest to a test has, what it lacks, and what to do."""
-    if reasons:
-        more = f" and {len(reasons) - 6} more" if len(reasons) > 6 else ""
-        return (
-            f"{path.name} holds nothing that is fitted here: {'; '.join(reasons[:6])}{more}. Say "
-            "what it is if this is wrong, as in --test frequency_sweep, or give another file."
-        )
-    all_readings = [(n, Readings.of(block, state.mapping, path.name)) for n, block in blocks]
-    number, best = max(all_readings, key=lambda pair: len(pair[1].columns))
-    several = len(blocks) > 1
-    where = f"block {number} (numbers from line {best.block.line})" if several else "its block"
-    wanted = (
-        _OSCILLATION if {"omega", "Gp", "Gpp"} & set(best.columns) and not best.has("time")
-        else _FLOW
-    )  # fmt: skip
-    lacks = [keys for keys in wanted if not any(best.has(key) for key in keys)]
-    names = list(dict.fromkeys(shown(name) for name, _ in best.block.columns if name))
-    text = (
-        f"{path.name} holds no test that is known: {where} has no column of numbers known as "
-        f"{', nor as '.join(' or '.join(keys) for keys in lacks)}. Its columns are "
-        f"{', '.join(names[:15])}."
-    )
-    raw = [
-        f"{best.block.columns[best.columns[key]][0]} is {key}"
-        for key in INSTRUMENT.values()
-        if key in best.columns
-    ]
-    if raw and best.geometry is None:
-        return (
-            f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
-            "in --geometry cone_plate:radius_mm=25,angle_deg=1."
-        )
-    key = lacks[0][0] if lacks else "stress"
-    return f'{text} Name the right one, as in --column {key}="name of the column".'
-
-
-_FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
-_OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
 
 
 def _source(path: Path, sweep: bool) -> Source:

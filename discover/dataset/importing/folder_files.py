@@ -2,14 +2,13 @@
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from discover.dataset.importing.records import Record
 from discover.dataset.load import INDEX_FILE, TESTS_FILE
-from discover.errors import InputError
 
 TABLES = {
     "frequency_sweep": "lve",
@@ -24,6 +23,11 @@ _TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values())
 
 _SAME = 1.5
 """Difference in °C up to which two temperatures are one."""
+
+_NO_TEMPERATURE = (
+    "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
+    "FILE:2=60 for a block. To exchange the two, rename them."
+)
 
 _CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "step_time_s")
 
@@ -50,13 +54,7 @@ class NamedRecord:
 
 
 def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
-    """Return the text of every file of a folder by name, and what is to be said of them.
-
-    Raises
-    ------
-    InputError
-        If two runs would have one name.
-    """
+    """Return the text of every file of a folder by name, and what is to be said of them."""
     files: dict[str, str] = {}
     notes: list[str] = []
     # a file called creep.txt is no table of compliances
@@ -65,11 +63,9 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
         for one in found
         if one.record.is_run
     ]
+    runs = list(_with_own_names(runs))
     for one in runs:
-        name = f"{one.name}.csv"
-        if name in files:
-            raise InputError(f"Two runs would be named {name}; rename one of the files.")
-        files[name] = _csv(one.record)
+        files[f"{one.name}.csv"] = _csv(one.record)
     by_temperature: list[tuple[str, str, str]] = []
     of_runs = {one.record.temperature for one in runs}
     for kind, table in TABLES.items():
@@ -81,6 +77,17 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     if runs:
         files[INDEX_FILE] = _index(runs)
     return files, notes
+
+
+def _with_own_names(runs: Sequence[NamedRecord]) -> Iterator[NamedRecord]:
+    """Yield runs, with a number in the names of those that would have the name of one before."""
+    taken: set[str] = set()
+    for one in runs:
+        names = (f"{one.name}{end}" for end in ("", *(f"_{k}" for k in range(2, len(runs) + 2))))
+        # two names that differ in capitals are one file on some disks
+        name = next(name for name in names if name.lower() not in taken)
+        taken.add(name.lower())
+        yield replace(one, name=name)
 
 
 def _tables(
@@ -110,9 +117,12 @@ def _tables(
             name = f"{base}.csv" if number == 1 else f"{base}-{number}.csv"
             files[name] = _csv(one.record)
             if number > 1:
+                known = one.record.temperature is not None
+                at = "at the same temperature, " if known else ""
                 notes.append(
-                    f"{name} is another {table.replace('_', ' ')} at the same temperature, from "
-                    f"{one.source} {one.block}: nothing reads it. To exchange the two, rename them."
+                    f"{name} is another {table.replace('_', ' ')}, {at}from "
+                    f"{f'{one.source} {one.block}'.strip()}: nothing reads it. "
+                    + ("To exchange the two, rename them." if known else _NO_TEMPERATURE)
                 )
     if len(groups) > 1 and not groups[0][0].chosen:
         first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))

@@ -4,12 +4,19 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from discover.dataset.tables.unit_text import read_unit
+from discover.dataset.tables.unit_text import name_and_unit
 
-_VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9]).{0,19})?"
+_VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9:]).{0,19})?"
 _ALONE = re.compile(_VALUE)
+_UNIT = re.compile(
+    r"[#%\s]*([^:=#%]{1,40}?)[\s_]+(?:units?|einheit|unité)\s*[:=]\s*(\S.{0,19})", re.I
+)
 _WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
-_IN = re.compile(r"(.*\S) in (\S+)")
+_DEGREES = re.compile(
+    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
+    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])",
+)
+_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 
 
 @dataclass(frozen=True)
@@ -21,7 +28,7 @@ class Constant:
     name
         As the file writes it.
     value
-        With a decimal point.
+        With a decimal point; empty where the line gives a unit alone, as "Rate Unit: 1/s".
     unit
         Empty where the file gives none.
     """
@@ -33,11 +40,11 @@ class Constant:
 
 def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
     """Return what lines say as a name, a number and a unit; the last of a name counts."""
-    found: dict[str, Constant] = {}
+    found: dict[tuple[str, bool], Constant] = {}
     for row in rows:
         for constant in _constants([cell for cell in row if cell]):
             if constant.name[:1].isalpha():
-                found[constant.name.lower()] = constant
+                found[constant.name.lower(), bool(constant.value)] = constant
     return tuple(found.values())
 
 
@@ -49,6 +56,9 @@ def _constants(cells: Sequence[str]) -> Iterator[Constant]:
         yield _constant(cells[0], *value.groups())
         return
     for part in " ".join(cells).split(";"):
+        if unit := _UNIT.fullmatch(part.strip()):
+            yield Constant(unit[1], "", unit[2])
+            continue
         match = _WITH_KEY.fullmatch(part.strip())
         if match:
             yield _constant(*match.groups())
@@ -59,24 +69,21 @@ def _constant(name: str, number: str, unit: str | None) -> Constant:
     return Constant(name, number.replace(",", "."), unit)
 
 
-def name_and_unit(name: str, unit: str) -> tuple[str, str]:
-    """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
+def temperature_in(text: str) -> Constant | None:
+    """Return the temperature that a title or a file's name says; None if it says none, or several.
 
-    Parameters
-    ----------
-    name
-        Of a column or a constant.
-    unit
-        As it stands beside or below the name; empty if it does not.
+    In kelvin only where a melt or solution can be, since 95K may be a molar mass.
     """
-    bracket = re.fullmatch(r"[\[(](.*)[\])]", unit)
-    unit = (bracket.group(1) if bracket else unit).strip()
-    if unit:
-        return name, unit
-    inside = re.search(r"\s*[\[(]([^\[\]()]*)[\])]\s*$", name)
-    if inside:
-        return name[: inside.start()].strip(), inside.group(1).strip()
-    words = _IN.fullmatch(name)
-    if words and (read_unit(words.group(2)) or words.group(2).lstrip("°") in ("C", "K", "F")):
-        return words.group(1), words.group(2)
-    return name, ""
+    found = {}
+    text = text.replace("_", " ")
+    for match in _DEGREES.finditer(text):
+        value = match[1].replace(",", ".")
+        unit = match[2][0].upper()
+        if _TO.search(text[: match.start()]):
+            return None  # a ramp
+        if unit == "C" or 200.0 <= float(value) <= 700.0:
+            sign = "-" if match[0].startswith("-") else ""
+            found[sign + value, unit] = Constant(
+                "temperature", sign + value, "°C" if unit == "C" else "K"
+            )
+    return next(iter(found.values())) if len(found) == 1 else None

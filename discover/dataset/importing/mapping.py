@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import quote, unquote_to_bytes
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
+from discover.dataset.importing.names import check_names
 from discover.dataset.tables.toml_file import read_toml, toml_string
 from discover.validation import Section, validated
 
@@ -40,6 +41,17 @@ QuantityName = Literal[
     "phase_angle",
     "loss_factor",
     "temperature",
+    "psi1",
+    "psi2",
+    "extensional_viscosity",
+    "radius",
+    "diameter",
+    "gap",
+    "cone_angle",
+    "strain_wave",
+    "stress_wave",
+    "wave_time",
+    "point",
 ]
 
 TestName = Literal[
@@ -48,6 +60,9 @@ TestName = Literal[
 """What a block may be taken for: ``run`` is a record in time at a given rate, ``none`` nothing."""
 
 EVERY_BLOCK = "*"
+
+Celsius = Annotated[float, Field(ge=-273.15, le=2000)]
+"""A temperature that can be."""
 
 
 class Geometry(Section):
@@ -133,18 +148,27 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`; the rest is recognised.
+    Keys of `names` are the tables of ``names.toml``, keys of `tests` ``FILE:BLOCK``, ``FILE`` or
+    `EVERY_BLOCK`; the rest is recognised. Keys of
+    `temperatures` are ``FILE:BLOCK`` or ``FILE``; values in °C.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
+    names: dict[str, Annotated[tuple[str, ...], Strict(False)]] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
-    temperature_C: Annotated[float, Field(ge=-273.15, le=2000)] | None = None
+    temperature_C: Celsius | None = None
+    temperatures: dict[str, Celsius] = Field(default_factory=dict)
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _known(self):
+        check_names(self.names, "names")
+        return self
 
     def test_of(self, file: str, block: int) -> TestName | None:
         """Return what the user says that a block of a file is; None if nothing.
@@ -157,6 +181,13 @@ class Mapping(Section):
         name = key_of(file)
         keys = f"{name}:{block}", name, EVERY_BLOCK
         return next((self.tests[key] for key in keys if key in self.tests), None)
+
+    def of_block(self, file: str, block: int) -> "Mapping":
+        """Return what holds for a block of a file, its temperature being that of the file."""
+        name = key_of(file)
+        degrees = self.temperatures.get(f"{name}:{block}")
+        of_file = {} if degrees is None else {"temperatures": {name: degrees}}
+        return self.model_copy(update=of_file)
 
 
 def key_of(file: str) -> str:
@@ -204,7 +235,7 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "layout", "geometry", "tests"):
+    for name in ("columns", "units", "names", "layout", "geometry", "tests", "temperatures"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
@@ -232,4 +263,6 @@ def _key(name: str) -> str:
 
 
 def _toml(value: object) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(map(_toml, value))}]"
     return toml_string(value) if isinstance(value, str) else repr(value)

@@ -1,116 +1,246 @@
-"""What rheometers call the columns of their exports, in English, German and French.
+"""What exports call each quantity: names in many languages, and a user's own.
 
-Names are compared without regard to capitals, spaces, underscores and primes of another form. The
-best stand first: a step's own clock before that of the whole test, the strain of the sample before
-an average. Of a name of up to three letters the unit has to fit as well.
+Names are compared word by word, without regard to capitals (``ShearRate``), accents, separators,
+forms of primes and Greek letters that are spelled or written with a look-alike. A name may be
+followed by its symbol, and words may be cut short.
 """
 
 import re
+import tomllib
 import unicodedata
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import cache
+from importlib.resources import files
+from itertools import pairwise
+from pathlib import Path
 
-NAMES: dict[str, tuple[str, ...]] = {
-    "time": (
-        "step time", "interval time", "time (action)", "segment time", "t seg", "time", "t",
-        "test time", "run time", "time (sequence)", "intervallzeit", "abschnittszeit", "zeit",
-        "messzeit", "intervalle temps", "temps d'intervalle", "temps", "durée",
-    ),
-    "shear_rate": (
-        "shear rate", "rate", "gammadot", "gamma dot", "gdot", "γ̇", "ẏ", "gp",
-        "scherrate", "schergeschwindigkeit", "schergefälle", "taux de cisaillement",
-        "vitesse de cisaillement", "gradient de cisaillement", "gradient de vitesse",
-    ),
-    "stress": (
-        "shear stress", "stress", "tau", "sigma", "τ", "σ", "sigma xy", "σ12", "tau yx",
-        "schubspannung", "scherspannung", "contrainte de cisaillement", "contrainte",
-    ),
-    "strain": (
-        "shear strain", "strain", "gamma", "γ", "deformation", "scherdeformation", "scherung",
-        "verformung", "déformation de cisaillement", "déformation",
-    ),
-    "N1": (
-        "n1", "first normal stress difference", "1st normal stress difference",
-        "normal stress difference", "erste normalspannungsdifferenz", "1. normalspannungsdifferenz",
-        "première différence de contraintes normales", "tau xx-tau yy",
-    ),
-    "N2": (
-        "n2", "second normal stress difference", "zweite normalspannungsdifferenz",
-        "deuxième différence de contraintes normales",
-    ),
-    "torque": ("torque", "drehmoment", "moment", "couple"),
-    "angular_velocity": (
-        "angular velocity", "velocity", "rotational speed", "speed", "winkelgeschwindigkeit",
-        "drehzahl", "vitesse angulaire", "vitesse de rotation",
-    ),
-    "angle": (
-        "displacement", "angular displacement", "deflection angle", "rotation angle",
-        "auslenkwinkel", "drehwinkel", "déplacement angulaire", "angle de déviation",
-    ),
-    "normal_force": ("normal force", "axial force", "normalkraft", "force normale", "fn"),
-    "omega": (
-        "angular frequency", "omega", "ω", "w", "frequency", "f", "kreisfrequenz", "frequenz",
-        "winkelfrequenz", "pulsation", "fréquence angulaire", "fréquence",
-    ),
-    "Gp": (
-        "storage modulus", "g'", "gp", "g1", "shear modulus (elastic component)", "elastic modulus",
-        "speichermodul", "module de stockage", "module de conservation", "module élastique",
-    ),
-    "Gpp": (
-        "loss modulus", "g''", "gpp", "g2", "shear modulus (viscous component)", "viscous modulus",
-        "verlustmodul", "module de perte", "module visqueux",
-    ),
-    "hencky_rate": ("hencky rate", "extension rate", "extensional rate", "elongation rate",
-                    "hencky strain rate", "dehnrate", "taux d'élongation"),
-    "tensile_stress": ("tensile stress", "extensional stress", "elongational stress",
-                       "zugspannung", "contrainte d'élongation"),
-    "hencky_strain": ("hencky strain", "hencky-dehnung", "déformation de hencky"),
-    "relaxation_modulus": ("relaxation modulus", "g(t)", "gt", "relaxationsmodul",
-                           "module de relaxation"),
-    "compliance": ("creep compliance", "compliance", "j(t)", "j", "kriechnachgiebigkeit",
-                   "nachgiebigkeit", "komplianz", "complaisance"),
-    "viscosity": ("shear viscosity", "viscosity", "eta", "η", "viskosität", "scherviskosität",
-                  "viscosité", "viscosité de cisaillement"),
-    "strain_amplitude": (
-        "oscillation strain", "complex shear strain", "strain amplitude", "γ0", "gamma0",
-        "oscillation strain (cmd)", "deformationsamplitude", "amplitude de déformation",
-    ),
-    "stress_amplitude": (
-        "oscillation stress", "complex shear stress", "stress amplitude", "schubspannungsamplitude",
-        "amplitude de contrainte",
-    ),
-    "complex_modulus": ("complex modulus", "complex shear modulus", "g*",
-                        "shear modulus (complex component)", "komplexer schubmodul",
-                        "module complexe"),
-    "complex_viscosity": ("complex viscosity", "η*", "eta*", "komplexe viskosität",
-                          "viscosité complexe"),
-    "phase_angle": ("phase angle", "delta", "δ", "phase shift angle", "phasenwinkel",
-                    "phasenverschiebungswinkel", "angle de phase", "déphasage"),
-    "loss_factor": ("tan(delta)", "tan delta", "tan(δ)", "tan δ", "loss factor", "damping factor",
-                    "verlustfaktor", "dämpfungsfaktor", "facteur de perte",
-                    "facteur d'amortissement"),
-    "temperature": ("temperature", "temp", "t", "temperatur", "température"),
-    "radius": ("radius", "plate radius", "cone radius", "r", "rayon"),
-    "diameter": ("diameter", "plate diameter", "durchmesser", "diamètre"),
-    "gap": ("gap", "measuring gap", "gap width", "h", "spalt", "messspalt", "spaltabstand",
-            "entrefer"),
-    "cone_angle": ("cone angle", "kegelwinkel", "angle du cône", "angle de cône"),
-    "strain_wave": (
-        "shear strain waveform", "strain waveform", "raw shear strain", "raw strain",
-        "shear strain (for sinusoidal strain)", "scherdeformation (rohdaten)",
-        "déformation de cisaillement (pour déformation sinusoïdale)",
-    ),
-    "stress_wave": (
-        "shear stress waveform", "stress waveform", "raw shear stress", "raw stress",
-        "shear stress (for sinusoidal strain)", "schubspannung (rohdaten)",
-        "contrainte de cisaillement (pour déformation sinusoïdale)",
-    ),
-    "wave_time": ("waveform time", "raw time", "zeit (rohdaten)"),
-    "point": ("point no.", "point", "messpkt.", "messpunkt", "meas. pts.", "pt no.", "point n°"),
+from discover.dataset.tables.toml_file import read_toml
+from discover.errors import InputError
+
+_PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
+"""Tables of ``names.toml`` that name one quantity, the better first."""
+
+_GREEK = {
+    "gamma": "γ", "tau": "τ", "sigma": "σ", "omega": "ω", "eta": "η", "delta": "δ",
+    "epsilon": "ε", "psi": "ψ", "theta": "θ", "phi": "φ",
 }  # fmt: skip
-"""Names of each quantity, the best first."""
+_LOOK_ALIKE = str.maketrans({"ɣ": "γ", "ɛ": "ε", "ł": "l", "ø": "o", "ı": "i", "đ": "d"})
+_PRIMES = str.maketrans(
+    {
+        **dict.fromkeys("′‘’´`ʹʼ＇", "'"),
+        **dict.fromkeys('″“”"˝ʺ＂', "''"),
+        "‴": "'''",
+        **dict.fromkeys("∗⁎﹡✱", "*"),
+    }
+)
+_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue"})
+
+_DOT = "\u0307"
+_DOTTED = re.compile(
+    rf"[γgy]{_DOT}|(?<![^\W\d_])(?:gamma|γ|g)[\s_-]*(?:dot\b|point\b|punkt\b|[·•∙⋅])"
+)
+_DOTTED_EPSILON = re.compile(rf"[εe]{_DOT}|(?<![^\W\d_])(?:epsilon|eps|ε|e)[\s_-]*(?:dot\b|[·•∙⋅])")
+_DOT_BEFORE = re.compile(r"\bdot\W*(gamma|γ|epsilon|ε)")
+_WORD = re.compile(rf"(?:[^\W_]|[{_DOT}'*+])+\.?")
+_SPELLED = re.compile(rf"({'|'.join(_GREEK)})([0-9'*+]*)")
+_LONG = " " * 1000
+_SHORTEST = 3
+"""Letters that a word cut short without a dot has at least."""
+
+
+def words_of(name: str) -> tuple[str, ...]:
+    """Return the words of a name as they are compared; one cut short by a dot keeps the dot."""
+    text = unicodedata.normalize("NFKC", name.translate(_PRIMES))
+    text = re.sub(rf"\s+{_DOT}", _DOT, text)
+    apart = "".join(a + " " * _is_border(a, b) for a, b in pairwise(f"{text} "))
+    text = unicodedata.normalize("NFD", apart.casefold().translate(_LOOK_ALIKE))
+    # accents of Latin, Greek and Cyrillic; the signs of Japanese lie elsewhere
+    text = "".join(c for c in text if c == _DOT or not "\u0300" <= c <= "\u036f")
+    text = unicodedata.normalize("NFC", text.replace(f"g{_DOT}", f"γ{_DOT}"))
+    text = _DOT_BEFORE.sub(lambda m: f"{m[1]} dot", text).replace("ġ", f"γ{_DOT}")
+    text = text.replace("ẏ", f"γ{_DOT}").replace("ė", f"ε{_DOT}")
+    text = _DOTTED_EPSILON.sub(f"ε{_DOT}", _DOTTED.sub(f"γ{_DOT}", text))
+    return tuple(_SPELLED.sub(_letter, word) if _SPELLED.fullmatch(word.rstrip(".")) else word
+                 for word in (w.lstrip("'") for w in _WORD.findall(text)) if word)  # fmt: skip
+
+
+def _letter(match: re.Match) -> str:
+    return _GREEK[match[1]] + match[2]
+
+
+def _is_border(a: str, b: str) -> bool:
+    """Return whether a new word begins between two letters: ShearRate, 粘度η."""
+    if a.islower() and b.isupper():
+        return True
+    return a.isalpha() and b.isalpha() and (a > "\u2e80") != (b > "\u2e80")
 
 
 def plain(name: str) -> str:
-    """Return a name as it is compared."""
-    name = unicodedata.normalize("NFC", name)
-    name = re.sub(r"[′‘’´`]", "'", name).replace("″", "''").replace('"', "''")
-    return re.sub(r"[\s_]+", " ", name).strip(" :").lower()
+    """Return a name as it is compared, in one word."""
+    return "".join(word.rstrip(".") for word in words_of(name))
+
+
+class NameTable:
+    """Names of quantities, those of the project and a user's own.
+
+    Parameters
+    ----------
+    own
+        A user's names by quantity; they go first.
+    """
+
+    def __init__(self, own: Mapping[str, Sequence[str]]):
+        self._rank: dict[str, dict[str, int]] = {}
+        self._words: dict[tuple[int, str], list[tuple[str, tuple[str, ...]]]] = {}
+        for section, names in shipped_names().items():
+            ranks = self._rank.setdefault(section, {})
+            for name in (*own.get(section, ()), *names):
+                for one in dict.fromkeys((name, name.translate(_UMLAUTS))):
+                    words = tuple(word.rstrip(".") for word in words_of(one))
+                    ranks.setdefault("".join(words), len(ranks))
+                    alike = self._words.setdefault((len(words), words[0][0]), [])
+                    alike.append((section, words))
+        self._found: dict[str, dict[str, int]] = {}
+
+    def rank(self, key: str, name: str) -> int | None:
+        """Return how good a name of a quantity this is, 0 the best; None if it is none."""
+        ranks = self.find(name)
+        before = 0
+        for section in _PARTS.get(key, (key,)):
+            if section in ranks:
+                return before + ranks[section]
+            before += len(self._rank.get(section, ()))
+        return None
+
+    def find(self, name: str) -> dict[str, int]:
+        """Return the tables in which a name stands, and its place there."""
+        if name not in self._found:
+            self._found[name] = self._find(words_of(name))
+        return self._found[name]
+
+    def _find(self, words: tuple[str, ...]) -> dict[str, int]:
+        bare = [word.rstrip(".") for word in words]
+        found = self._exact("".join(bare))
+        if found:
+            return found
+        for i in range(1, len(bare)):  # a name and its symbol
+            first, second = self._exact("".join(bare[:i])), self._exact("".join(bare[i:]))
+            both = {key: min(rank, second[key]) for key, rank in first.items() if key in second}
+            if both:
+                return both
+        cut: dict[str, str] = {}
+        alike = self._words.get((len(words), words[0][0]), ()) if words else ()
+        for section, whole in alike:
+            if all(map(_stands_for, words, whole)):
+                cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
+        least = min(map(len, cut.values()), default=0)
+        best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
+        return best if len(best) == 1 else {}  # Shear str. may be either
+
+    def _exact(self, joined: str) -> dict[str, int]:
+        return {key: ranks[joined] for key, ranks in self._rank.items() if joined in ranks}
+
+
+def _stands_for(word: str, whole: str) -> bool:
+    """Return whether a word is another, perhaps cut short: ``mod.`` is modulus."""
+    if word.endswith("."):
+        return whole.startswith(word[:-1])
+    return word == whole or (len(word) >= _SHORTEST and word.isalpha() and whole.startswith(word))
+
+
+@cache
+def shipped_names() -> dict[str, tuple[str, ...]]:
+    """Return the names of the project by the tables of ``names.toml``."""
+    text = files("discover.dataset.importing").joinpath("names.toml").read_text("utf-8")
+    return {
+        section: tuple(name for names in lists.values() for name in names)
+        for section, lists in tomllib.loads(text).items()
+    }
+
+
+@cache
+def _table(own: tuple[tuple[str, tuple[str, ...]], ...]) -> NameTable:
+    return NameTable(dict(own))
+
+
+def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
+    """Return the names of the project, with a user's own before them."""
+    return _table(tuple((key, tuple(names)) for key, names in sorted((own or {}).items())))
+
+
+def read_names(path: Path) -> dict[str, tuple[str, ...]]:
+    """Return a user's names by quantity, from a file of the form of ``names.toml``.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, names no quantity that is known, or holds something else than names.
+    """
+    example = 'Write lines such as stress = ["Sigma corr."].'
+    content, _ = read_toml(path, "file of names", example)
+    lists = {
+        key: [*value.values()] if isinstance(value, dict) else [value]
+        for key, value in content.items()
+    }
+    wrong = next(
+        (key for key, parts in lists.items() for p in parts if not isinstance(p, list)), ""
+    )
+    if wrong:
+        raise InputError(
+            f'{path.name}: {wrong[:40]} must be a list of names, as in {wrong[:40]} = ["its name"].'
+        )
+    names = {key: tuple(name for part in parts for name in part) for key, parts in lists.items()}
+    check_names(names, path.name)
+    return names
+
+
+def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
+    """Check a user's names.
+
+    Parameters
+    ----------
+    names
+        By quantity.
+    where
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        If there is no such quantity, or a name is no text with a letter in it.
+    """
+    for key, listed in names.items():
+        if key not in shipped_names():
+            near = get_close_matches(key, shipped_names(), 1, 0.5)
+            known = f"Is {near[0]} meant?" if near else f"Known are {', '.join(shipped_names())}."
+            raise InputError(f"{where}: {key[:40]!r} is no quantity that has names. {known}")
+        for name in listed:
+            if not isinstance(name, str) or not plain(name):
+                raise InputError(
+                    f"{where}: {key} holds {str(name)[:40]!r}, which is no name. Write text in "
+                    "quotes, with a letter in it."
+                )
+
+
+_CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")
+
+
+def _may_be_name(cell: str) -> bool:
+    return len(cell) < 80 and any(c.isalpha() for c in cell)
+
+
+def code_page_of(content: bytes) -> str:
+    """Return the encoding of a text that is no Unicode: the one in which most names are known.
+
+    Instruments on Windows write the code page of the country. UTF-8 is one of them for a file of
+    which a byte is damaged.
+    """
+    sample, table = content[:20_000], name_table()
+
+    def known(encoding: str) -> int:
+        text = sample.decode(encoding, "replace")
+        cells = set(re.split(r"[\t;,\r\n]|[\[(].*?[\])]", text))
+        return sum(bool(table.find(cell)) for cell in cells if _may_be_name(cell))
+
+    return max(_CODE_PAGES, key=known)

@@ -1,14 +1,16 @@
 """Which column is what, and how its unit becomes SI."""
 
+import re
 from collections.abc import Mapping
 
-from discover.dataset.importing.names import NAMES, plain
+from discover.dataset.importing.clock_times import is_clock
+from discover.dataset.importing.names import NameTable, plain
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.tables import units
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.unit_text import read_heading, read_unit
+from discover.dataset.tables.unit_text import read_heading, read_unit, tidy_unit
 from discover.dataset.tables.units import Quantity
 from discover.errors import InputError
 
@@ -19,6 +21,8 @@ QUANTITIES: dict[str, Quantity] = {
     "strain": units.STRAIN,
     "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
     "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE,
+    "psi1": Quantity("psi1", "psi1_Pa_s2", "Pa*s^2"),
+    "psi2": Quantity("psi2", "psi2_Pa_s2", "Pa*s^2"),
     "torque": Quantity("torque", "torque_N_m", "N*m"),
     "angular_velocity": Quantity("angular_velocity", "angular_velocity_rad_s", "rad/s"),
     "angle": Quantity("angle", "angle_rad", "rad"),
@@ -29,6 +33,9 @@ QUANTITIES: dict[str, Quantity] = {
     "hencky_rate": units.HENCKY_RATE,
     "tensile_stress": units.TENSILE_STRESS,
     "hencky_strain": units.HENCKY_STRAIN,
+    "extensional_viscosity": Quantity(
+        "extensional_viscosity", "extensional_viscosity_Pa_s", "Pa*s"
+    ),
     "relaxation_modulus": RELAXATION_MODULUS,
     "compliance": COMPLIANCE,
     "viscosity": Quantity("viscosity", "viscosity_Pa_s", "Pa*s"),
@@ -50,54 +57,86 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
-def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
+def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> dict[str, int]:
     """Return the place of each quantity among the columns of a block.
 
-    Columns without a single number are passed over.
+    Columns without a single number are passed over; a clock is a time only if no number is.
 
     Parameters
     ----------
     given
         Names of columns that the user gave; they win over guesses.
+    table
+        What quantities are called.
 
     Raises
     ------
     InputError
         If a name that was given stands above two columns.
     """
-    filled = [any(is_number(row[i]) for row in block.cells) for i in range(len(block.columns))]
-    names = [plain(name) for name, _ in block.columns]
+    count = range(len(block.columns))
+    numbers = [any(is_number(row[i]) for row in block.cells) for i in count]
+    clocks = [not numbers[i] and any(is_clock(row[i]) for row in block.cells) for i in count]
     found: dict[str, int] = {}
     for key in QUANTITIES:
         if key in given:
-            exact = [i for i, (name, _) in enumerate(block.columns) if name == given[key]]
-            at = exact or [i for i, name in enumerate(names) if name == plain(given[key])]
+            at = [i for i in count if block.columns[i][0] == given[key]]
+            at = at or [i for i in count if plain(block.columns[i][0]) == plain(given[key])]
             if len(at) > 1:
                 raise InputError(
                     f"Two columns are named {given[key]!r} (block at line {block.line}). Rename "
                     "one in the file."
                 )
         else:
-            at = [
-                i
-                for wanted in (*NAMES.get(key, ()), plain(QUANTITIES[key].column))
-                for i, name in enumerate(names)
-                if name == wanted and fits(key, name, block.columns[i][1])
-            ]
-            # a column of this project's own may carry another unit in its name
-            at += [i for i, (name, _) in enumerate(block.columns) if _is_own(name, key)]
-        at = [i for i in at if filled[i]]
+            ranks = {i: name_rank(key, *block.columns[i], table) for i in count}
+            places = {i: rank for i, rank in ranks.items() if rank is not None}
+            at = sorted(places, key=places.__getitem__)
+        at = [i for i in at if numbers[i]] + [i for i in at if clocks[i] and key == "time"]
         if at:
             found[key] = at[0]
     return found
 
 
-def _is_own(name: str, key: str) -> bool:
-    quantity = QUANTITIES[key]
-    if not name.startswith(f"{quantity.stem}_"):
-        return False
-    unit = read_heading(name.removeprefix(f"{quantity.stem}_"))
-    return unit is not None and units.factor_to(unit, quantity) is not None
+def name_rank(key: str, name: str, unit: str, table: NameTable) -> int | None:
+    """Return how good a column is for a quantity, 0 the best; None if it is not called so."""
+    rank = table.rank(key, name)
+    if rank is not None:
+        return rank if fits(key, name, unit) else None
+    if name == QUANTITIES[key].column:
+        return 0
+    inside = None if unit else _split(key, name, table)
+    return None if inside is None else inside[0]
+
+
+def unit_in_name(key: str, name: str, table: NameTable) -> str:
+    """Return the unit at the end of a column's name, as in ``stress_kPa`` or ``τ/Pa``; or empty.
+
+    It has to be a unit of the quantity, and what stands before it a name of that.
+    """
+    inside = _split(key, name, table)
+    return "" if inside is None else inside[1]
+
+
+def _split(key: str, name: str, table: NameTable) -> tuple[int, str] | None:
+    """Return the rank of a name that ends in a unit, and that unit."""
+    for mark in re.finditer(r"[\s_/,;]+", name):
+        head, tail = name[: mark.start()], name[mark.end() :]
+        rank = 0 if head == QUANTITIES[key].stem else table.rank(key, head)
+        if rank is None or not re.search(r"[^\W\d_]|%", tail):
+            continue
+        # this project's own 1_s and rad_s, and Pa_s
+        below = tail.replace("_", "/") if read_heading(tail) is not None else tail
+        for text in (below, tail.replace("_", "*")):
+            if _is_unit_of(key, text):
+                return rank, text
+    return None
+
+
+def _is_unit_of(key: str, unit: str) -> bool:
+    if key == "temperature":
+        return to_celsius(0.0, unit) is not None
+    known = read_unit(unit)
+    return known is not None and units.factor_to(known, QUANTITIES[key]) is not None
 
 
 def fits(key: str, name: str, unit: str) -> bool:
@@ -110,15 +149,19 @@ def fits(key: str, name: str, unit: str) -> bool:
     name, unit
         Of the column; a longer name fits whatever its unit is, so that a wrong one is said.
     """
-    if len(name) > _SHORT:
+    if name.strip() == "T" and not unit:
+        return key == "temperature"
+    name = plain(name)
+    if len(name) > _SHORT or any(letter > "\u2e80" for letter in name):
         return True
     if key == "temperature":
         return to_celsius(0.0, unit) is not None
-    known = read_unit(unit) if unit else None
-    if known is None:
-        # without a unit G' is a modulus, and t is a time
-        return not (key == "shear_rate" and name == "gp")
-    return units.factor_to(known, QUANTITIES[key]) is not None
+    if not unit or read_unit(unit) is None:
+        # without a unit G' is a modulus, and t is a time; D and n may be anything
+        return name in ("t", "w", "f", "j") or not (
+            (name == "gp" and key == "shear_rate") or (len(name) == 1 and name.isascii())
+        )
+    return _is_unit_of(key, unit)
 
 
 _SHORT = 3
@@ -127,7 +170,10 @@ _SHORT = 3
 
 def to_celsius(value: float, unit: str) -> float | None:
     """Return a temperature in °C, or None if the unit is none of temperature."""
-    scale = unit.replace("º", "°").replace("°", "").replace("deg", "").strip().upper()
+    scale = tidy_unit(unit).replace("º", "°").replace("°", "").removeprefix("deg").strip()
+    scale = scale.upper().translate({0x421: "C", 0x41A: "K"})  # as a Russian keyboard writes them
+    if scale in ("", "-", "1") and "°" not in unit and "deg" not in unit:
+        return None if not unit else value  # a program's table says a pure number
     if scale in ("C", "CELSIUS"):
         return value
     if scale in ("K", "KELVIN"):
@@ -145,8 +191,7 @@ def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     key
         What they are, from `QUANTITIES`.
     unit
-        Their unit as the export or the user writes it; empty if unknown. A column of this
-        project's own, such as ``stress_kPa``, carries it in its name.
+        Their unit as the export or the user writes it.
     column, name
         Column and file, for messages.
 
@@ -156,18 +201,10 @@ def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
         If the unit is unknown or a unit of something else.
     """
     quantity = QUANTITIES[key]
-    if not unit:
-        own = units.find_column([column], quantity)
-        if own is not None:
-            return own[1]
-        if not quantity.unit:
-            return 1.0
-        raise InputError(
-            f"{name} gives no unit for {shown(column)}. Give it, as in --unit {key}="
-            f"{quantity.column.removeprefix(quantity.stem + '_').replace('_', '/')}."
-        )
-    if key == "angular_velocity" and unit in ("1/min", "min-1", "min⁻¹", "min^-1"):
+    if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
         unit = "turn/min"
+    if key.endswith("viscosity") and unit.lower() == "cps":  # centipoise, not counts
+        unit = "cP"
     found = read_unit(unit)
     if found is None:
         raise InputError(

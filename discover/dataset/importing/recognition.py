@@ -6,7 +6,6 @@ constant rate is a creep test.
 """
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -52,7 +51,7 @@ class Recognised:
 
 
 def recognise(readings: Readings) -> list[Recognised]:
-    """Return which tests a block holds; several where its temperature goes in steps.
+    """Return which tests a block holds; the tests of one table are apart already.
 
     Raises
     ------
@@ -61,7 +60,7 @@ def recognise(readings: Readings) -> list[Recognised]:
     """
     rows = np.ones(len(readings), bool)
     if readings.has("omega", "Gp", "Gpp"):
-        return list(_oscillatory(readings))
+        return [_oscillatory(readings)]
     if readings.has("time", "tensile_stress"):
         return [Recognised("run", rows, "an extension: it has a tensile stress over time")]
     if readings.has("Gp", "Gpp") and not readings.has("omega") and readings.alone("strain"):
@@ -99,23 +98,12 @@ def whole(readings: Readings, *keys: str) -> Rows:
     return kept
 
 
-def _oscillatory(readings: Readings) -> Iterator[Recognised]:
-    # samples of a waveform have no frequency, and are no points that lack something
-    rows, points = whole(readings, "omega", "Gp", "Gpp"), whole(readings, "omega")
-    temperature = readings.get("temperature")
-    if temperature is None or np.sum(rows) < 2:
-        yield replace(_one_oscillatory(readings, rows), rows=points)
-        return
-    # a table of sweeps at one temperature after the other
-    steps = np.abs(np.diff(temperature[rows], prepend=temperature[rows][0])) > _SAME_TEMPERATURE
-    groups = np.full(len(rows), -1)
-    groups[rows] = np.cumsum(steps)
-    sizes = np.bincount(groups[rows])
-    if np.min(sizes) < _FEWEST:  # a ramp of temperature, or a thermometer that hesitates
-        yield replace(_one_oscillatory(readings, rows), rows=points)
-        return
-    for group in range(len(sizes)):
-        yield _one_oscillatory(readings, groups == group)
+def _oscillatory(readings: Readings) -> Recognised:
+    # samples of a waveform have no frequency, and are no points that lack something; before the
+    # tool moves instruments write zeros
+    points = _of(readings, "omega", np.ones(len(readings), bool)) > 0.0
+    rows = points & whole(readings, "omega", "Gp", "Gpp")
+    return replace(_one_oscillatory(readings, rows), rows=points)
 
 
 def _one_oscillatory(readings: Readings, rows: Rows) -> Recognised:

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.mapping import TestName
-from discover.dataset.importing.names import plain
 from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.importing.readings import Readings
@@ -280,12 +279,6 @@ def _after(made: Record, before: Record) -> Record:
     return made
 
 
-_WHOLE = {
-    "time", "t", "test time", "run time", "time (sequence)", "zeit", "messzeit", "temps", "durée",
-}  # fmt: skip
-"""Names of clocks that may go on from block to block."""
-
-
 def clock_before(readings: Readings, last: float) -> tuple[float, float]:
     """Return when a block began, if its clock goes on from the block before, and when it ended."""
     at = readings.columns.get("time")
@@ -299,7 +292,7 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
     time = time[np.isfinite(time)]
     if not len(time):
         return 0.0, last
-    whole_clock = plain(readings.block.columns[at][0]) in _WHOLE
+    whole_clock = "step_time" not in readings.names.find(readings.block.columns[at][0])
     goes_on_from = last if whole_clock and 0.0 < last <= time[0] else 0.0
     return goes_on_from, float(time[-1])
 

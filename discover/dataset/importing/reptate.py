@@ -8,11 +8,9 @@ where it is headed "h" or "Pa-s"   [Boudara, Read & Ramírez 2020, J. Rheol. 64,
 import re
 from pathlib import Path
 
-import numpy as np
-
-from discover.dataset.importing.header_constants import Constant, constants_of
+from discover.dataset.importing.header_constants import Constant, constants_of, name_and_unit
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
+from discover.dataset.importing.text_rows import LARGEST_EXPORT, is_number
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
@@ -28,7 +26,7 @@ COLUMNS = {
     ".creep": (_TIME, ("strain", "-")),
     ".gt": (_TIME, ("relaxation modulus", "Pa")),
 }
-"""Names and units of the columns, by suffix; further ones are not read."""
+"""Names and units of the columns, by suffix; further ones are read by their own names."""
 
 _PARAMETERS = {
     ".shear": {"gdot": ("shear rate", "1/s")},
@@ -47,21 +45,29 @@ def read_reptate(path: Path) -> list[Block]:
         If it has too few columns of numbers, or lacks a parameter that such a file needs.
     """
     suffix = path.suffix.lower()
-    lines = re.split(r"\r\n|\r|\n", read_bytes(path, path.name).decode("cp1252", "replace"))
-    table = [line.replace(",", " ").split() for line in lines[1:]]
+    content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
+    lines = re.split(r"\r\n|\r|\n", content.decode("cp1252", "replace"))
+    table = [line.lstrip("#").replace(",", " ").split() for line in lines]
     wanted = COLUMNS[suffix]
     width = len(wanted)
-    rows = [row[:width] for row in table if len(row) >= width and all(map(is_number, row[:width]))]
-    if len(rows) < 2:
+    data = [i for i, row in enumerate(table) if len(row) >= width and all(map(is_number, row))]
+    if len(data) < 2:
         raise InputError(
             f"{path.name} has no lines of {width} numbers ({', '.join(n for n, _ in wanted)}), as "
             f"a {suffix} file of RepTate has below its first line. Correct it, or give it another "
             "suffix and --format text."
         )
-    values = np.array(rows, dtype=float)
-    columns = {name: (unit, values[:, i]) for i, (name, unit) in enumerate(wanted)}
-    block = Block.of(columns, suffix[1:])
-    given = {constant.name: constant.value for constant in constants_of([[lines[0]]])}
+    whole = max(len(table[i]) for i in data)
+    # a file may hold more columns than its suffix names, under names of their own
+    named = [row for row in table[1 : data[0]] if len(row) == whole]
+    further = [name_and_unit(name, "") for name in named[0][width:]] if named else []
+    further += [(f"column {i + 1}", "") for i in range(width + len(further), whole)]
+    if len(named) > 1:
+        further = [(name, unit or below) for (name, unit), below in zip(
+            further, named[1][width:], strict=True)]  # fmt: skip
+    cells = tuple(tuple((table[i] + [""] * whole)[:whole]) for i in data)
+    first = [] if data[0] == 0 else [[lines[0]]]
+    given = {constant.name: constant.value for constant in constants_of(first)}
     known = {**_PARAMETERS.get(suffix, {}), "T": _TEMPERATURE}
     constants = tuple(
         Constant(name, given[key], unit) for key, (name, unit) in known.items() if key in given
@@ -72,4 +78,4 @@ def read_reptate(path: Path) -> list[Block]:
             f"{path.name} does not say its {needed[0]} on the first line, as a {suffix} file of "
             f"RepTate does. Write {needed[0]}=…; there."
         )
-    return [Block(block.name, block.columns, block.cells, 2, constants)]
+    return [Block(suffix[1:], (*wanted, *further), cells, data[0] + 1, constants)]

@@ -11,15 +11,16 @@ four lines; it does not read RheoCompass, and TRIOS' other text export neither.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from discover.dataset.importing.header_constants import Constant, constants_of, name_and_unit
-from discover.dataset.importing.text_rows import is_number
-from discover.dataset.tables.unit_text import read_unit
+from discover.dataset.importing.clock_times import is_clock
+from discover.dataset.importing.header_constants import Constant, constants_of
+from discover.dataset.importing.text_rows import MOST_CELLS, is_number
+from discover.dataset.tables.unit_text import name_and_unit, read_unit
 from discover.errors import InputError
 
 Rows = Sequence[Sequence[str]]
@@ -32,7 +33,23 @@ _WORDS_FOR_NAME = (
     "intervalle et points de données:", "step name", "test:",
 )  # fmt: skip
 _POINT_OF_SEGMENT = re.compile(r"([0-9]+)\|[0-9]+")
+_TITLE = re.compile(r"[^:=;]*[^\W\d_]{3}[^:=;]*")
+"""A line of one cell that is neither a name with its value nor a number."""
+
 _DATA_POINT = "data point"
+_FEWEST = 3
+
+_OF_SAMPLES = (
+    "sample|specimen|material|batch|fluid|run|test|experiment|series|replicate|repeat|curve|"
+    "data ?set|probe|charge|messung|versuch|messreihe|échantillon|essai|mesure|muestra|ensayo|"
+    "campione|prova|amostra|样品|试样|批次|試料|サンプル|시료|샘플"
+)
+_OF_STEPS = "step|segment|seg ?index|interval|abschnitt|intervall|intervalle"
+OF_TESTS = re.compile(
+    rf"((?P<sample>{_OF_SAMPLES})|{_OF_STEPS})s?( (name|id|no|nr|number|index|label))?#?"
+)
+"""Names of columns that say which sample or step a row is of, as `plain_words` gives them."""
+
 _INVALID = re.compile(r"\((invalid|invalide|ungültig)\)", re.IGNORECASE)
 
 
@@ -52,6 +69,12 @@ class Block:
         Line of the file on which the numbers begin.
     constants
         What the lines above say of the whole block, such as the gap or the rate.
+    over
+        What stands above the name of each column and those to the right of it; empty if nothing.
+    apart
+        Whether what stands before it in the file is another sample, or another temperature.
+    told_by
+        Names of the columns that tell it from the other tests of one table.
     """
 
     name: str
@@ -59,6 +82,9 @@ class Block:
     cells: tuple[tuple[str, ...], ...]
     line: int
     constants: tuple[Constant, ...] = ()
+    over: tuple[str, ...] = ()
+    apart: bool = False
+    told_by: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
@@ -83,15 +109,20 @@ class Block:
             raise InputError(
                 f"The columns of a block must have one length; got {shapes or 'none'}."
             )
-        heads = tuple((str(key), str(unit)) for key, (unit, _) in columns.items())
+        heads = tuple((str(key), str(unit) or "-") for key, (unit, _) in columns.items())
         rows = np.stack(values, axis=1).tolist()
         cells = tuple(tuple("" if x != x else repr(x) for x in row) for row in rows)
         return cls(name, heads, cells, 1)
 
 
+def plain_words(name: str) -> str:
+    """Return the words of a name in small letters, without signs between them."""
+    return re.sub(r"[\s._]+", " ", name).strip().lower()
+
+
 def require_blocks(blocks: list[Block], name: str) -> list[Block]:
-    """Return the blocks of a file."""
-    if not blocks:
+    """Return the blocks of a file, of which one at least has names."""
+    if not any(name for block in blocks for name, _ in block.columns):
         raise InputError(
             f"{name} holds no lines of numbers under a line of names. If it has no names, add "
             "a line such as time_s,shear_rate_1_s,stress_Pa; else say where they are with "
@@ -115,6 +146,7 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     """
     blocks: list[Block] = []
     header: _Columns | None = None
+    over: tuple[str, ...] = ()
     above: list[Sequence[str]] = list(rows[: header_row or 0])
     read, i = 0, header_row or 0
     while i < len(rows):
@@ -127,9 +159,13 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
             end += 1
         # numbers after an empty line alone stand under the names of those before
         if any(any(row) for row in rows[read:i]) or not read:
-            header = _header(rows, i, header_row)
+            header, over = _header(rows, i, header_row)
         if header is not None:
-            blocks += _by_label(rows, i, end, header, constants_of(above))
+            made = _by_label(rows, i, end, header, constants_of(above))
+            blocks += (replace(block, over=over) for block in made)
+        elif end - i >= _FEWEST:  # without names: to be left out with a word
+            width = max(map(len, rows[i:end]))
+            blocks.append(Block("", (("", ""),) * width, _padded(rows[i:end], width), i + 1))
         if header_row is not None and blocks:
             break
         read = i = end
@@ -141,27 +177,40 @@ def _by_label(
 ) -> Iterator[Block]:
     """Yield the blocks of consecutive lines of numbers, one for each word in the first column."""
     width = len(header)
+    if width * (end - data) > MOST_CELLS:
+        raise InputError(
+            f"The table from line {data + 1} on has {width} columns and {end - data} rows; the "
+            f"limit is {MOST_CELLS} cells. Keep the columns and rows of the measurement."
+        )
     name = _name(rows, data)
     numbered = enumerate(rows[data:end], start=data + 1)
-    for label, lines in groupby(numbered, key=lambda pair: _label(pair[1])):
-        group = list(lines)
-        if label and label != _DATA_POINT and len(group) < 2:
+    groups = [
+        (label, list(lines)) for label, lines in groupby(numbered, key=lambda pair: _label(pair[1]))
+    ]
+    alone = sum(bool(label) and len(lines) < 2 for label, lines in groups)
+    if alone > 2 and 2 * alone > len(groups):  # a column of words or of the time of day
+        groups = [("", [line for _, lines in groups for line in lines])]
+    if OF_TESTS.fullmatch(plain_words(header[0][0])) and not _POINT_OF_SEGMENT.fullmatch(
+        rows[data][0]
+    ):
+        groups = [("", [line for _, lines in groups for line in lines])]  # split as any such column
+    for label, lines in groups:
+        if label and label != _DATA_POINT and len(lines) < 2:
             continue  # a line about the measurement, such as the number of its points
-        cells = tuple(
-            # what the instrument itself calls invalid is no number
-            ("",) * width
-            if any(_INVALID.search(cell) for cell in row)
-            else tuple((list(row) + [""] * width)[:width])
-            for _, row in group
-        )
+        # what the instrument itself calls invalid is no number
+        valid = [[] if any(map(_INVALID.search, row)) else row for _, row in lines]
         whole = label if label and label != _DATA_POINT else name
-        yield Block(whole, header, cells, group[0][0], constants)
+        yield Block(whole, header, _padded(valid, width), lines[0][0], constants)
+
+
+def _padded(rows: Rows, width: int) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple((list(row) + [""] * width)[:width]) for row in rows)
 
 
 def _label(row: Sequence[str]) -> str:
     """Return the word that a line of numbers begins with; empty if there is none."""
     first = row[0]
-    if not first or is_number(first) or _INVALID.search(first):
+    if not first or is_number(first) or is_clock(first) or _INVALID.search(first):
         return ""
     if first.lower() == _DATA_POINT:
         return _DATA_POINT
@@ -172,24 +221,28 @@ def _label(row: Sequence[str]) -> str:
 def _is_numbers(row: Sequence[str]) -> bool:
     """Return whether a row is data: most of it numbers (not a status), after a word or none."""
     filled = [cell for cell in row if cell]
-    numbers = [is_number(cell) for cell in filled]
-    if len(filled) < 2 or 2 * sum(numbers) <= len(filled):
+    numbers = [is_number(cell) or is_clock(cell) for cell in filled]
+    if not any(map(is_number, filled)) or len(filled) < 2 or 2 * sum(numbers) <= len(filled):
         return False
     return numbers[0] or (sum(numbers) > 1 and not filled[0].endswith(":"))
 
 
-def _header(rows: Rows, data: int, header_row: int | None) -> _Columns | None:
-    """Return names and units of the columns above the numbers."""
+def _header(
+    rows: Rows, data: int, header_row: int | None
+) -> tuple[_Columns | None, tuple[str, ...]]:
+    """Return names and units of the columns above the numbers, and what stands above the names."""
     if header_row is not None:
-        names = rows[header_row - 1]
+        at, names = header_row - 1, rows[header_row - 1]
         between = [row for row in rows[header_row:data] if any(row)]
         units = between[0] if between else []
     else:
-        above = [row for row in rows[max(0, data - 6) : data] if any(row)]
-        if not above or _is_numbers(above[-1]):
-            return None
-        units = above[-1] if len(above) > 1 and _are_units(above[-1], above[-2]) else []
-        names = above[-2] if units else above[-1]
+        above = [i for i in range(max(0, data - 6), data) if any(rows[i])]
+        if not above or _is_numbers(rows[above[-1]]):
+            return None, ()
+        has_units = len(above) > 1 and _are_units(rows[above[-1]], rows[above[-2]])
+        units = rows[above[-1]] if has_units else []
+        at = above[-2] if has_units else above[-1]
+        names = rows[at]
     # a line of names may begin as a comment does
     if names and names[0].startswith(("#", "%")):
         first = names[0].lstrip("#% ")
@@ -197,7 +250,20 @@ def _header(rows: Rows, data: int, header_row: int | None) -> _Columns | None:
     width = max(len(names), len(rows[data]))
     names, units = ([*row, *[""] * (width - len(row))] for row in (names, units))
     columns = [name_and_unit(name, unit) for name, unit in zip(names, units, strict=False)]
-    return tuple(columns) if any(name for name, _ in columns) else None
+    if not any(name for name, _ in columns):
+        return None, ()
+    return tuple(columns), _over(rows[max(0, at - 2) : at], width)
+
+
+def _over(rows: Rows, width: int) -> tuple[str, ...]:
+    """Return what the lines above the names say of each column, a cell holding for those after."""
+    labels = [""] * width
+    for row in rows:
+        cell = ""
+        for i in range(width) if sum(map(bool, row)) > 1 else ():
+            cell = (row[i] if i < len(row) else "") or cell
+            labels[i] = ", ".join(filter(None, (labels[i], cell)))
+    return tuple(labels)
 
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
@@ -213,8 +279,9 @@ def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
 
 
 def _name(rows: Rows, data: int) -> str:
-    """Return what the lines above say that the block is."""
+    """Return what the lines above say that the block is, or else the title of its section."""
     found: list[str] = []
+    title = ""
     for i in range(data - 1, max(-1, data - 12), -1):
         row = rows[i]
         first = row[0] if row else ""
@@ -226,4 +293,6 @@ def _name(rows: Rows, data: int) -> str:
             break
         if words:
             found.append(f"interval {row[1]}" if first.lower().startswith("inter") else row[1])
-    return ", ".join(dict.fromkeys(word for word in reversed(found) if word))
+        elif not title and sum(map(bool, row)) == 1 and _TITLE.fullmatch("".join(row)):
+            title = "".join(row).strip("-=*#_~<>[]| ")
+    return ", ".join(dict.fromkeys(word for word in reversed(found) if word)) or title

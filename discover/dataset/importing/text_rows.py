@@ -4,9 +4,12 @@ import codecs
 import csv
 import io
 import re
+import unicodedata
 from pathlib import Path
 from typing import Literal
 
+from discover.dataset.importing.clock_times import is_clock
+from discover.dataset.importing.names import code_page_of
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 
@@ -14,9 +17,18 @@ Decimal = Literal[".", ","]
 
 DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
 
+LARGEST_EXPORT = 100_000_000
+"""Bytes of an export as text, of a spreadsheet's when it is unpacked."""
+
+MOST_CELLS = 10_000_000
+"""Cells of a table; more take gigabytes, and hundreds of samples are enough for a test."""
+
 _POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+
+
+_FEWER = "Export fewer samples, or one test a file."
 
 
 def is_number(cell: str) -> bool:
@@ -46,8 +58,14 @@ def read_rows(
     InputError
         If the file cannot be read, or its decimal sign cannot be told from its thousands separator.
     """
-    lines = _decode(read_bytes(path, path.name), path.name, encoding).splitlines()
+    content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
+    lines = _decode(content, path.name, encoding).splitlines()
     mark = DELIMITERS[delimiter] if delimiter else _delimiter(lines)
+    cells = len(lines) + sum(
+        len(line.split()) if mark == " " else line.count(mark) for line in lines
+    )
+    if cells > MOST_CELLS:
+        raise InputError(f"{path.name} has {cells} cells; the limit is {MOST_CELLS}. {_FEWER}")
     try:
         rows = [
             # runs of spaces are one delimiter
@@ -60,7 +78,7 @@ def read_rows(
             "rheometer, and check --delimiter."
         ) from None
     if mark == ",":
-        return [[cell.strip() for cell in row] for row in rows]
+        decimal = "."
     return with_points(rows, path.name, decimal)
 
 
@@ -83,12 +101,27 @@ def with_points(
     InputError
         If the decimal sign cannot be told from the thousands separator.
     """
-    rows = [[cell.strip() for cell in row] for row in rows]
-    if (decimal or _decimal(rows, name)) == ".":
-        return rows
-    return [
-        [cell.replace(",", ".") if _COMMA.fullmatch(cell) else cell for cell in row] for row in rows
-    ]
+    rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
+    sign = decimal or _decimal(rows, name)
+    thousands = "," if sign == "." else "."
+    grouped = re.compile(rf"[+-]?[1-9][0-9]{{0,2}}(?:[{thousands}][0-9]{{3}})+(?:[{sign}][0-9]+)?")
+
+    def pointed(cell: str) -> str:
+        if grouped.fullmatch(cell):
+            cell = cell.replace(thousands, "")
+        return cell.replace(",", ".") if sign == "," and _COMMA.fullmatch(cell) else cell
+
+    return [[pointed(cell) for cell in row] for row in rows]
+
+
+def _tidy(cell: str) -> str:
+    """Return a number without spaces and apostrophes between thousands and with a plain minus."""
+    if len(cell) > 40 or not any(c.isdigit() for c in cell):
+        return cell
+    plain = unicodedata.normalize("NFKC", cell).replace("\u2212", "-").replace("’", "'")
+    if re.fullmatch(r"[+-]?[0-9]{1,3}(?:[ '][0-9]{3})+(?:[.,][0-9]+)?", plain):
+        plain = re.sub("[ ']", "", plain)
+    return plain if is_number(plain) or _COMMA.fullmatch(plain) else cell
 
 
 def _decode(content: bytes, name: str, encoding: str | None) -> str:
@@ -106,8 +139,9 @@ def _decode(content: bytes, name: str, encoding: str | None) -> str:
     try:
         text = content.decode(encoding)
     except UnicodeError:
-        # instruments on Windows write µ, ° and · so; every byte has a meaning in latin-1
-        text = content.decode("cp1252", "replace") if encoding == "utf-8-sig" else None
+        # instruments on Windows write µ, ° and · so; and the letters of the country
+        known = encoding == "utf-8-sig"
+        text = content.decode(code_page_of(content), "replace") if known else None
     if text is None:
         raise InputError(f"{name} is not text in {encoding}. Try another --encoding.")
     if "\0" in text:
@@ -135,12 +169,18 @@ def _delimiter(lines: list[str]) -> str:
         if sum(mark in line for line in filled) > 0.3 * len(filled):
             return mark
     apart = [[cell.replace(",", ".", 1) for cell in line.split()] for line in filled]
-    numbers = sum(len(cells) > 1 and all(map(is_number, cells)) for cells in apart)
+    numbers = sum(
+        len(cells) > 1 and all(is_number(c) or is_clock(c) for c in cells) for cells in apart
+    )
     return " " if numbers > 0.5 * len(filled) else ","
 
 
 def _decimal(rows: list[list[str]], name: str) -> Decimal:
     cells = [cell for row in rows for cell in row]
+    if any(re.fullmatch(r"[+-]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]+", cell) for cell in cells):
+        return ","
+    if any(re.fullmatch(r"[+-]?[0-9]{1,3}(?:,[0-9]{3})+\.[0-9]+", cell) for cell in cells):
+        return "."
     points = sum(_POINT.fullmatch(cell) is not None for cell in cells)
     commas = [cell for cell in cells if "," in cell and _COMMA.fullmatch(cell)]
     grouped = all(re.fullmatch(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}", cell) for cell in commas)

@@ -6,18 +6,37 @@ and ``9**9**9`` is not worked out. What a single word means is asked of pint.
 """
 
 import re
+import unicodedata
 from dataclasses import dataclass
 from functools import cache
 
 _LONGEST = 40  # characters
 
-_SPELLINGS = {"%": "percent", "pct": "percent", "°": "degree", "rev": "turn"}
+_SPELLINGS = {
+    "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
+    "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
+    "pa": "Pa", "PA": "Pa", "kpa": "kPa",
+    "KPa": "kPa", "Mpa": "MPa", "cp": "cP", "CP": "cP", "hz": "Hz", "HZ": "Hz",
+    "Sekunden": "s", "Minuten": "min", "Stunden": "hour", "Prozent": "percent",
+    "secondes": "s", "heures": "hour", "segundos": "s", "minutos": "min", "secondi": "s",
+    "seconden": "s", "sekundy": "s", "секунды": "s", "минуты": "min", "проценты": "percent",
+    "Sek": "s", "sek": "s", "seg": "s", "Std": "hour", "Dyn": "dyn",
+    "Па": "Pa", "мПа": "mPa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "П": "P", "сП": "cP",
+    "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "hour", "рад": "rad", "мрад": "mrad",
+    "Гц": "Hz", "град": "degree", "Н": "N", "мН": "mN", "мкН": "uN", "м": "m", "мм": "mm",
+    "мкм": "um", "см": "cm", "дин": "dyn", "об": "turn",
+    "秒": "s", "毫秒": "ms", "分": "min", "分钟": "min", "分鐘": "min", "小时": "hour",
+    "小時": "hour", "時間": "hour", "帕": "Pa", "千帕": "kPa", "毫帕": "mPa", "兆帕": "MPa",
+    "赫兹": "Hz", "赫茲": "Hz", "弧度": "rad", "ラジアン": "rad", "ヘルツ": "Hz", "パスカル": "Pa",
+    "度": "degree", "转": "turn", "轉": "turn", "毫米": "mm", "초": "s", "분": "min",
+    "시간": "hour", "도": "degree", "라디안": "rad", "파스칼": "Pa", "헤르츠": "Hz",
+}  # fmt: skip
 """What pint does not know under this name."""
 
 _JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
 """Products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms."""
 
-_NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev)/min\b")
+_NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
 
 _DIMENSIONS = ("[mass]", "[length]", "[time]")
 
@@ -84,23 +103,83 @@ def read_unit(text: str) -> Unit | None:
     text
         Such as ``kPa``, ``1/s``, ``N.m`` or ``dyn/cm²``.
     """
-    text = text.strip()
-    if text in ("", "-", "—", "1"):
+    text = tidy_unit(text)
+    if text in ("", "-", "--", "1"):
         return Unit()
     if len(text) > _LONGEST:
         return None
-    plain = {"·": "*", "⋅": "*", "⁻": "-", "¹": "1", "²": "2", "³": "3", "μ": "µ"}
-    text = "".join(plain.get(c, c) for c in text).replace("**", "^")
     text = _JOINED.sub(r"\1*\2", _NUMBERS_PER_MINUTE.sub("turn/min", text))
-    tokens = re.findall(r"[A-Za-zµ°%]++(?:\^?-?[0-9]++)?|[0-9]++|[()/*.]|\S", text)
+    tokens = re.findall(r"(?:[^\W\d_]|[°%])++(?:\^?-?[0-9]++)?|[0-9]++|[()/*.]|\S", text)
     found, rest = _product(tokens)
     return None if rest else found
+
+
+def tidy_unit(text: str) -> str:
+    """Return a unit in plain signs, whatever its width, raised digits, minus signs and dots."""
+    text = unicodedata.normalize("NFKC", text[: 4 * _LONGEST]).translate(_SIGNS).strip("$ ")
+    text = re.sub(r"\^[({](-?[0-9])[)}]", r"^\1", text.replace("**", "^").replace("\\", ""))
+    # Pa-s is a product, and s-1 a power
+    return re.sub(r"(?<=[^\W\d_])-(?=[^\W\d_])", "*", text)
+
+
+_SIGNS = str.maketrans({**dict.fromkeys("·⋅•∙・×", "*"), **dict.fromkeys("−–—‐‑", "-"), "μ": "µ"})
+_OPENING = {")": "(", "]": "[", "}": "{", ">": "<"}
+_BRACKETS = str.maketrans("（）［］｛｝＜＞【】〔〕〈〉", "()[]{}<>[][]<>")
+_IN = re.compile(r"(.*\S)\s+(?:in|en|em)\s+(\S.*)")
+_WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
+"""What stands in brackets and is no unit: Time (action), G(t), tan(delta)."""
+
+
+def name_and_unit(name: str, unit: str) -> tuple[str, str]:
+    """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
+
+    Parameters
+    ----------
+    name
+        Of a column or a constant.
+    unit
+        As it stands beside or below the name; empty if it does not.
+    """
+    name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
+    if unit and _OPENING.get(unit[-1]) == unit[0]:
+        unit = unit[1:-1].strip()
+    if unit:
+        return name, unit
+    head, inside = _last_bracket(name)
+    if head and (_is_unit(inside) or not _WORDS.fullmatch(inside)):
+        return head, inside
+    words = _IN.fullmatch(name)
+    if words and _is_unit(words[2]):
+        return words[1], words[2]
+    return name, ""
+
+
+def _last_bracket(name: str) -> tuple[str, str]:
+    """Return what stands before the bracket in which a name ends, and in it; both may be empty."""
+    name = name.rstrip()
+    closing = name[-1:]
+    if closing not in _OPENING:
+        return "", ""
+    depth = 0
+    for at in range(len(name) - 1, -1, -1):
+        depth += (name[at] == closing) - (name[at] == _OPENING[closing])
+        if not depth:
+            head, inside = name[:at], name[at + 1 : -1].strip()
+            # G(t) is a function, and Time (t) in tons
+            return ("", "") if inside == "t" else (head.rstrip(" /,"), inside)
+    return "", ""
+
+
+def _is_unit(text: str) -> bool:
+    return read_unit(text) is not None or tidy_unit(text).lstrip("°") in ("C", "K", "F")
 
 
 def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
     """Return the unit that the tokens begin with, and the tokens after it."""
     found, sign = Unit(), 1
     expected = True  # a word, not an operator
+    if len(tokens) > 1 and tokens[0] == "/":  # the 1 of 1/s is left out
+        sign, tokens = -1, tokens[1:]
     while tokens and tokens[0] != ")":
         token, tokens = tokens[0], tokens[1:]
         if token in "/*." and not expected:
@@ -122,7 +201,7 @@ def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
 
 def _power(text: str) -> Unit | None:
     """Return a word with its exponent, such as cm2 or s^-1."""
-    match = re.fullmatch(r"([A-Za-zµ°%]+)\^?(-?[1-9])?", text)
+    match = re.fullmatch(r"((?:[^\W\d_]|[°%])+)\^?(-?[1-9])?", text)
     if match is None:
         return None
     word = _word(match.group(1))
@@ -134,7 +213,7 @@ def _word(text: str) -> Unit | None:
     """Return a single word, such as kPa or seconds, from pint."""
     word = _SPELLINGS.get(text, text)
     # whole words may begin with a capital; of short symbols the case has a meaning
-    for name in (word, word.lower()) if len(word) > 3 else (word,):
+    for name in (word, word.lower()) if len(word) > 2 else (word,):
         parsed = _registry().parse_unit_name(name)
         if not parsed or _is_short_plural(name):
             continue

@@ -1,0 +1,211 @@
+"""Claims: names of quantities are known in many languages and spellings, and a user's own too."""
+
+import subprocess
+import sys
+import tomllib
+from typing import get_args
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from discover.cli import app
+from discover.dataset.importing import import_files
+from discover.dataset.importing.mapping import Mapping, QuantityName, make_mapping
+from discover.dataset.importing.names import name_table, plain, shipped_names
+from discover.dataset.importing.quantities import QUANTITIES
+from discover.errors import InputError
+
+RATE = [0.5, 2.0, 8.0, 32.0]
+STRESS = [3.0, 6.0, 12.0, 24.0]
+OMEGA = [0.5, 1.0, 2.0, 4.0]
+STORAGE = [10.0, 30.0, 80.0, 200.0]
+LOSS = [40.0, 70.0, 110.0, 150.0]
+
+# rate, stress, viscosity; angular frequency, storage and loss modulus
+LANGUAGES = {
+    "English": "Shear Rate|Shear Stress|Viscosity|Angular Frequency|Storage Modulus|Loss Modulus",
+    "German": "Schergeschwindigkeit|Schubspannung|Viskosität|Kreisfrequenz|Speichermodul|"
+    "Verlustmodul",
+    "German in ASCII": "Schergefaelle|Scherspannung|Viskositaet|Winkelfrequenz|Speichermodul G'|"
+    "Verlustmodul G''",
+    "French": "Gradient de cisaillement|Contrainte de cisaillement|Viscosité|Fréquence angulaire|"
+    "Module de conservation|Module de perte",
+    "Spanish": "Tasa de corte|Esfuerzo de corte|Viscosidad|Frecuencia angular|"
+    "Módulo de almacenamiento|Módulo de pérdida",
+    "Italian": "Gradiente di velocità|Tensione di taglio|Viscosità|Frequenza angolare|"
+    "Modulo conservativo|Modulo dissipativo",
+    "Portuguese": "Taxa de cisalhamento|Tensão de cisalhamento|Viscosidade|Frequência angular|"
+    "Módulo de armazenamento|Módulo de perda",
+    "Dutch": "Afschuifsnelheid|Schuifspanning|Viscositeit|Hoekfrequentie|Opslagmodulus|"
+    "Verliesmodulus",
+    "Polish": "Szybkość ścinania|Naprężenie ścinające|Lepkość|Częstość kątowa|"
+    "Moduł zachowawczy|Moduł stratności",
+    "Czech": "Smyková rychlost|Smykové napětí|Viskozita|Úhlová frekvence|Paměťový modul|"
+    "Ztrátový modul",
+    "Russian": "Скорость сдвига|Напряжение сдвига|Вязкость|Угловая частота|Модуль накопления|"
+    "Модуль потерь",
+    "Turkish": "Kayma hızı|Kayma gerilmesi|Viskozite|Açısal frekans|Depolama modülü|Kayıp modülü",
+    "Swedish": "Skjuvhastighet|Skjuvspänning|Viskositet|Vinkelfrekvens|Lagringsmodul|Förlustmodul",
+    "Japanese": "ずり速度|ずり応力|粘度|角周波数|貯蔵弾性率|損失弾性率",
+    "Chinese, simplified": "剪切率|剪应力|粘度|角频率|储能模量|损耗模量",
+    "Chinese, traditional": "剪切速率|剪應力|黏度|角頻率|儲存模數|損失模數",
+    "Korean": "전단 속도|전단응력|점도|각주파수|저장 탄성률|손실 탄성률",
+}
+CODE_PAGES = {
+    "German": "cp1252", "Polish": "cp1250", "Russian": "cp1251", "Japanese": "cp932",
+    "Chinese, simplified": "gb18030", "Chinese, traditional": "big5", "Korean": "cp949",
+}  # fmt: skip
+
+
+def lines(names, units, *columns):
+    head = ";".join(f"{name} [{unit}]" for name, unit in zip(names, units, strict=True))
+    return "\n".join([head, *(";".join(map(str, row)) for row in zip(*columns, strict=True))])
+
+
+def read(folder, text, encoding="utf-8", name="a.txt", **known):
+    file = folder / name
+    file.write_bytes(text.encode(encoding))
+    return import_files([file], Mapping(**known))
+
+
+def columns(text):
+    head, *rows = text.splitlines()
+    values = np.array([row.split(",") for row in rows], dtype=float)
+    return dict(zip(head.split(","), values.T, strict=True))
+
+
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_flow_curves_and_sweeps_are_read_in_each_language(tmp_path, language):
+    rate, stress, viscosity, omega, storage, loss = LANGUAGES[language].split("|")
+    thick = [s / r for s, r in zip(STRESS, RATE, strict=True)]
+    curve = lines((rate, stress), ("1/s", "Pa"), RATE, STRESS)
+    from_viscosity = lines((rate, viscosity), ("1/s", "Pa·s"), RATE, thick)
+    for text in (curve, from_viscosity):
+        table = columns(read(tmp_path, text).files["flow_curve.csv"])
+        np.testing.assert_allclose(table["shear_rate_1_s"], RATE)
+        np.testing.assert_allclose(table["stress_Pa"], STRESS)
+    sweep = lines((omega, storage, loss), ("rad/s", "Pa", "kPa"), OMEGA, STORAGE, LOSS)
+    table = columns(read(tmp_path, sweep).files["lve.csv"])
+    np.testing.assert_allclose(table["Gp_Pa"], STORAGE)
+    np.testing.assert_allclose(table["Gpp_Pa"], np.multiply(LOSS, 1e3))
+
+
+@pytest.mark.parametrize("language", CODE_PAGES)
+def test_the_code_page_of_the_country_is_found_from_the_names(tmp_path, language):
+    rate, stress, *_ = LANGUAGES[language].split("|")
+    text = lines((rate, stress), ("1/s", "Pa"), RATE, STRESS)
+    made = read(tmp_path, text, CODE_PAGES[language])
+    np.testing.assert_allclose(columns(made.files["flow_curve.csv"])["stress_Pa"], STRESS)
+
+
+@pytest.mark.parametrize(
+    ("key", "spellings"),
+    [
+        ("shear_rate", "ɣ̇§γ̇§γ ̇§γ˙§ẏ§γ_dot§gamma_dot§GammaDot§gammadot§gdot§$\\dot{\\gamma}$§dγ/dt§"
+                       "ShearRate§StrainRate§S. Rate§SHEAR_RATE§Ｓｈｅａｒ　Ｒａｔｅ"),
+        ("strain", "ɣ§γ§Gamma§Shear Strain§ShearStrain"),
+        ("stress", "τ§Tau§sigma_xy§σ₁₂§ShearStress§Shear stress τ§S. Stress"),
+        ("Gp", "G'§G′§G’§G´§Storage mod.§StorageModulus§Storage modulus (G')§GPrime"),
+        ("Gpp", "G''§G″§G\"§G′′§G’’§Loss mod.§LossModulus§Loss modulus G″"),
+        ("complex_modulus", "|G*|§G*§|G∗|§Complex modulus |G*|"),
+        ("complex_viscosity", "η*§eta*§Compl. visc."),
+        ("loss_factor", "tan δ§tan(δ)§tan(delta)§TanDelta§tan_delta"),
+        ("omega", "ω§Omega§AngFreq§Ang. freq.§Angular frequency ω"),
+        ("psi1", "Ψ1§Ψ₁§psi_1§First normal stress coefficient"),
+        ("N1", "N1§N₁§N_1§First normal stress difference"),
+        ("extensional_viscosity", "Extensional viscosity§Elongational viscosity§η_E§ηE+"),
+        ("hencky_rate", "ε̇§ɛ̇§epsilon_dot§Hencky rate§HenckyRate"),
+    ],
+)  # fmt: skip
+def test_a_name_is_known_however_it_is_spelled(key, spellings):
+    known = name_table()
+    unknown = [one for one in spellings.split("§") if known.rank(key, one) is None]
+    assert not unknown
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["Status", "Comment", "Step no", "G'/G''", "Shear str.", "Raw phase", "Set point", "RPM"],
+)
+def test_a_name_that_says_something_else_or_too_little_is_none(name):
+    assert not name_table().find(name)
+
+
+def test_a_name_means_one_quantity_but_for_symbols_that_units_tell_apart():
+    places: dict[str, set[str]] = {}
+    for section, names in shipped_names().items():
+        for name in names:
+            places.setdefault(plain(name), set()).add(section)
+    several = {name for name, sections in places.items() if len(sections) > 1}
+    assert several == {"t", "gp", "ω", "φ", "θ"}
+
+
+def test_every_quantity_has_names_and_can_be_named_by_the_user():
+    assert set(get_args(QuantityName)) == set(QUANTITIES)
+    assert set(QUANTITIES) <= set(shipped_names())
+
+
+def test_extensional_viscosity_times_rate_is_the_tensile_stress(tmp_path):
+    time, thick = [0.1, 0.2, 0.4, 0.8, 1.6], [100.0, 180.0, 300.0, 450.0, 700.0]
+    for name in ("Extensional viscosity", "Viscosity"):
+        text = lines(("Time", "Hencky rate", name), ("s", "1/s", "kPa·s"), time, [0.5] * 5, thick)
+        table = columns(read(tmp_path, text).files["a.csv"])
+        np.testing.assert_allclose(table["tensile_stress_Pa"], np.multiply(thick, 500.0))
+
+
+def test_a_normal_stress_coefficient_times_rate_squared_is_N1(tmp_path):
+    psi = [4.0, 3.0, 2.0, 1.0]
+    names, units = ("Shear rate", "Shear stress", "Ψ1"), ("1/s", "Pa", "Pa·s²")
+    table = columns(read(tmp_path, lines(names, units, RATE, STRESS, psi)).files["flow_curve.csv"])
+    np.testing.assert_allclose(table["N1_Pa"], np.multiply(psi, np.square(RATE)))
+
+
+def test_names_of_the_users_own_are_read_and_kept_for_the_next_import(tmp_path):
+    export = tmp_path / "house.txt"
+    export.write_text(lines(("Kanal 7", "Kanal 9"), ("1/s", "Pa"), RATE, STRESS), "utf-8")
+    own = tmp_path / "own.toml"
+    own.write_text('shear_rate = ["Kanal 7"]\n[stress]\nhouse = ["KANAL_9"]\n', "utf-8")
+    run = CliRunner().invoke
+    given = ["data", "import", str(export), "--no-page"]
+    assert run(app, [*given, "--out", str(tmp_path / "none")]).exit_code == 2
+    assert run(app, [*given, "--names", str(own), "--out", str(tmp_path / "one")]).exit_code == 0
+    by_variable = [*given, "--out", str(tmp_path / "two")]
+    assert run(app, by_variable, env={"DISCOVER_NAMES": str(own)}).exit_code == 0
+    kept = tomllib.loads((tmp_path / "one" / "import.toml").read_text("utf-8"))["names"]
+    assert kept == {"shear_rate": ["Kanal 7"], "stress": ["KANAL_9"]}
+    again = ["data", "import", "--mapping", str(tmp_path / "one" / "import.toml"), "--no-page"]
+    assert run(app, [*again, "--out", str(tmp_path / "three")]).exit_code == 0
+    tables = [(tmp_path / n / "flow_curve.csv").read_text() for n in ("one", "two", "three")]
+    assert len(set(tables)) == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('shear_rte = ["a"]', "Is shear_rate meant"),
+        ('stress = "tau"', "must be a list"),
+        ("stress = [3]", "no name"),
+        ('stress = ["()"]', "no name"),
+        ("stress = [", "own.toml"),
+    ],
+)
+def test_a_wrong_file_of_names_is_one_message(tmp_path, text, said):
+    own = tmp_path / "own.toml"
+    own.write_text(text, "utf-8")
+    export = tmp_path / "a.txt"
+    export.write_text(lines(("Shear rate", "Stress"), ("1/s", "Pa"), RATE, STRESS), "utf-8")
+    given = ["data", "import", str(export), "--out", str(tmp_path / "o"), "--names", str(own)]
+    result = CliRunner().invoke(app, given)
+    assert result.exit_code == 2
+    assert said in result.output.replace("\n", " ")
+
+
+def test_a_mapping_file_with_names_of_an_unknown_quantity_is_refused():
+    with pytest.raises(InputError, match="Is shear_rate meant"):
+        make_mapping({"names": {"shear_rte": ["a"]}}, "import.toml")
+
+
+def test_names_are_read_only_where_something_is_imported():
+    code = "import sys, discover.cli; sys.exit('discover.dataset.importing.names' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,239 @@
+"""One table that holds several tests is read as each of them, and nothing is left out unsaid."""
+
+import numpy as np
+import pytest
+from made_exports import (
+    EXACT,
+    LAMBDA,
+    OMEGA,
+    RATES,
+    TIMES,
+    G,
+    assert_sweep,
+    imported,
+    lines,
+    moduli,
+    run,
+    table,
+)
+
+from discover.dataset import load_dataset
+
+
+def start_up(rate):
+    return G * LAMBDA * rate * (1 - np.exp(-TIMES / LAMBDA))
+
+
+def sweep(shift=1.0):
+    return OMEGA, *moduli(OMEGA, shift)
+
+
+def assert_start_ups(folder, names, rates):
+    data = load_dataset(folder)
+    assert set(data.names) == set(names)
+    for name, rate in zip(names, rates, strict=True):
+        np.testing.assert_allclose(data[name].time, TIMES, rtol=EXACT)
+        np.testing.assert_allclose(data[name].rate, rate, rtol=EXACT)
+        np.testing.assert_allclose(data[name].stress, start_up(rate), rtol=EXACT)
+
+
+SWEEPS_SIDE_BY_SIDE = {
+    "numbers over shared frequencies": [",20,,40,", "w (rad/s),Gp (Pa),Gpp (Pa),Gp (Pa),Gpp (Pa)"],
+    "kelvin above names above units": [",T = 293.15 K,,T = 313.15 K,", "w,G',G'',G',G''",
+                                       "rad/s,Pa,Pa,Pa,Pa"],
+    "degrees in the names": ["omega [rad/s],G' 20 °C [Pa],G'' 20 °C [Pa],G' 40 °C [Pa],"
+                             "G'' 40 °C [Pa]"],
+    "degrees behind the units": ["omega_rad_s,Gp_Pa_20C,Gpp_Pa_20C,Gp_Pa_40C,Gpp_Pa_40C"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SWEEPS_SIDE_BY_SIDE)
+def test_sweeps_side_by_side_are_one_for_each_temperature(tmp_path, case):
+    columns = OMEGA, *moduli(OMEGA), *moduli(OMEGA, 0.1)
+    rows = [*SWEEPS_SIDE_BY_SIDE[case], *lines(*columns, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    assert_sweep(out / "lve_20C.csv")
+    assert_sweep(out / "lve_40C.csv", shift=0.1)
+    out, _ = imported(tmp_path, "a.csv", rows, "--temperature", 40, "--overwrite")
+    assert_sweep(out / "lve.csv", shift=0.1)
+
+
+def test_moduli_side_by_side_may_be_grouped_by_what_they_are(tmp_path):
+    (a, b), (c, d) = moduli(OMEGA), moduli(OMEGA, 0.1)
+    rows = ["w (rad/s),G' (Pa) 20C,G' (Pa) 40C,G'' (Pa) 20C,G'' (Pa) 40C"]
+    out, _ = imported(tmp_path, "a.csv", rows + lines(OMEGA, a, c, b, d, mark=","))
+    assert_sweep(out / "lve_20C.csv")
+    assert_sweep(out / "lve_40C.csv", shift=0.1)
+
+
+RUNS_SIDE_BY_SIDE = {
+    "rates above pairs": ["0.5 1/s,,2 1/s,", "Time [s],Stress [Pa],Time [s],Stress [Pa]"],
+    "numbers above pairs": ["0.5,,2,", "time,stress,time,stress", "s,Pa,s,Pa"],
+    "rates in the names": ["Time [s],Stress at 0.5 1/s [Pa],time [s],Stress at 2 1/s [Pa]"],
+}
+
+
+@pytest.mark.parametrize("case", RUNS_SIDE_BY_SIDE)
+def test_pairs_of_time_and_stress_are_runs_at_the_rates_above_them(tmp_path, case):
+    rows = RUNS_SIDE_BY_SIDE[case] + lines(TIMES, start_up(0.5), TIMES, start_up(2.0), mark=",")
+    out, _ = imported(tmp_path, "a.csv", rows)
+    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+
+
+@pytest.mark.parametrize("count", [("", ".1"), ("_1", "_2")])
+def test_columns_that_are_counted_are_runs_which_may_differ_in_length(tmp_path, count):
+    names = [f"{name}{k}" for k in count for name in ("Time [s]", "Rate [1/s]", "Stress [Pa]")]
+    rate = np.full(30, 0.5)
+    rows = lines(TIMES, rate, start_up(0.5), TIMES, 4 * rate, start_up(2.0), mark=",")
+    shorter = [",".join([*row.split(",")[:3], "", "", ""]) for row in rows[20:]]
+    out, _ = imported(tmp_path, "a.csv", [",".join(names), *rows[:20], *shorter])
+    first, second = load_dataset(out)
+    np.testing.assert_allclose(first.stress, start_up(0.5), rtol=EXACT)
+    np.testing.assert_allclose(second.stress, start_up(2.0)[:20], rtol=EXACT)
+
+
+def test_a_quantity_that_stands_in_a_table_twice_makes_no_second_test(tmp_path):
+    rows = ["Time (s),Temperature (°C),Shear rate (1/s),Temperature (°C),Stress (Pa)"]
+    still = np.full(30, 25.0)
+    columns = TIMES, still, np.full(30, 0.5), still + 0.1, start_up(0.5)
+    out, _ = imported(tmp_path, "a.csv", rows + lines(*columns, mark=","))
+    assert_start_ups(out, ("a.csv",), (0.5,))
+
+
+def stacked(*parts):
+    return np.concatenate([np.stack(np.broadcast_arrays(*part), 1) for part in parts]).T
+
+
+def test_runs_below_each_other_are_told_by_their_clock_that_starts_again(tmp_path):
+    columns = stacked(*((TIMES, rate, start_up(rate)) for rate in (0.5, 2.0)))
+    rows = ["Time (s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+    again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
+    assert_start_ups(again, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+
+
+def test_runs_row_by_row_in_turn_are_told_by_their_set_rate(tmp_path):
+    columns = stacked(*((TIMES, rate, rate, start_up(rate)) for rate in (0.5, 2.0)))
+    columns = columns[:, np.argsort(columns[0], kind="stable")]
+    rows = ["Time (s),Set rate (1/s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
+    out, result = imported(tmp_path, "a.csv", rows)
+    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+    assert "Set rate 0.5 1/s" in result.stdout
+
+
+def test_a_clock_that_goes_on_through_steps_of_rate_is_one_run(tmp_path):
+    columns = stacked(*((TIMES + 10.0 * k, rate, start_up(rate))
+                        for k, rate in enumerate((0.5, 2.0, 0.5))))  # fmt: skip
+    rows = ["Time (s),Shear rate (1/s),Stress (Pa)", *lines(*columns, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    assert len(load_dataset(out)["a.csv"].time) == 90
+
+
+@pytest.mark.parametrize("in_turn", [False, True])
+def test_a_column_of_samples_keeps_them_apart(tmp_path, in_turn):
+    rows = [f"{t!r},{name},{rate},{s!r}" for name, rate in (("A", 0.5), ("B", 2.0))
+            for t, s in zip(TIMES.tolist(), start_up(rate).tolist(), strict=True)]  # fmt: skip
+    rows = sorted(rows, key=lambda row: float(row.split(",")[0])) if in_turn else rows
+    head = "Time (s),Sample,Shear rate (1/s),Stress (Pa)"
+    out, result = imported(tmp_path, "a.csv", [head, *rows])
+    assert_start_ups(out, ("a-1.csv", "a-2.csv"), (0.5, 2.0))
+    assert "stands before it" not in result.stdout
+
+
+@pytest.mark.parametrize("in_turn", [False, True])
+def test_flow_curves_at_two_temperatures_are_two(tmp_path, in_turn):
+    columns = stacked((RATES, 3.0 * RATES, 20.1), (RATES, 0.3 * RATES, 60.0))
+    if in_turn:
+        columns = columns[:, np.argsort(columns[0], kind="stable")]
+    rows = ["shear_rate_1_s,stress_Pa,temperature_C", *lines(*columns, mark=",")]
+    out, _ = imported(tmp_path, "a.csv", rows)
+    for degrees, factor in (("20.1", 3.0), ("60", 0.3)):
+        found = table(out / f"flow_curve_{degrees}C.csv")
+        np.testing.assert_allclose(found["stress_Pa"], factor * RATES, rtol=EXACT)
+
+
+def test_a_thermometer_that_drifts_makes_one_curve_and_a_ramp_makes_none(tmp_path):
+    head = ["shear_rate_1_s,stress_Pa,temperature_C"]
+    drift = 20.0 + 0.2 * np.arange(11.0)
+    out, _ = imported(tmp_path, "a.csv", head + lines(RATES, 3 * RATES, drift, mark=","))
+    assert len(table(out / "flow_curve.csv")["stress_Pa"]) == 11
+    ramp = 20.0 + 4.0 * np.arange(11.0)
+    _, result = imported(tmp_path, "b.csv", head + lines(RATES, RATES, ramp, mark=","), code=2)
+    assert "at no one temperature, but from 22 to 58 °C" in result.stderr
+
+
+def test_curves_below_each_other_are_told_by_rates_that_start_again(tmp_path):
+    columns = stacked((RATES, 3.0 * RATES), (RATES, 0.3 * RATES))
+    rows = ["shear_rate_1_s,stress_Pa", *lines(*columns, mark=",")]
+    out, result = imported(tmp_path, "a.csv", rows)
+    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3 * RATES, rtol=EXACT)
+    assert "Nothing says its temperature" in result.stdout
+
+
+def test_a_table_of_a_calibration_is_no_test_of_the_sample(tmp_path):
+    rows = [
+        "Model X", "", "-- {} --", "Slope = 13.5", "Rotor speed,Shear rate,Shear stress",
+        "(rpm),(1/s),(Pa)", *lines(RATES, RATES, 0.2 * RATES, mark=","), "****", "-- Data --",
+        "Time,Shear rate,Shear stress,Signal", "(s),(1/s),(Pa),(V)",
+        *lines(TIMES, np.full(30, 0.5), start_up(0.5), TIMES, mark=","),
+    ]  # fmt: skip
+    for title in ("Calibration Data", "Reference oil", "Kalibrierung"):
+        made = [row.format(title) for row in rows]
+        out, result = imported(tmp_path, "a.csv", made, "--overwrite")
+        assert_start_ups(out, ("a-2.csv",), (0.5,))
+        assert not (out / "flow_curve.csv").exists()
+        assert f"block 1 {title}: left out" in result.stdout
+        assert "--test a.csv:1=flow_curve" in result.stdout
+        assert "columns not read: Signal." in result.stdout
+    plain = [row.format("Flow curve") for row in rows]
+    out, _ = imported(tmp_path, "a.csv", plain, "--overwrite")
+    np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 0.2 * RATES, rtol=EXACT)
+
+
+def test_a_table_whose_first_column_is_the_time_of_day_is_not_passed_over(tmp_path):
+    clock = [f"10:00:{i:02d}" for i in range(30)]
+    rows = [f"{c},{row}" for c, row in zip(clock, lines(TIMES, start_up(1.0), mark=","),
+                                          strict=True)]  # fmt: skip
+    head = ["Lab time,Age (s),Torque (mN.m)"]
+    _, result = imported(tmp_path, "a.csv", head + rows, code=2)
+    assert "Its columns are Lab time, Age, Torque" in result.stderr
+
+
+def test_zeros_in_one_segment_leave_out_that_segment_alone(tmp_path):
+    rows = ["SegIndex;t in s;omega in rad/s;G' in Pa;G\" in Pa"]
+    rows += [f"1|{i};{i};0;0;0" for i in range(1, 6)]
+    rows += [f"2|{i};{i};{row}" for i, row in enumerate(lines(*sweep(), mark=";"), start=1)]
+    out, result = imported(tmp_path, "a.csv", rows)
+    assert_sweep(out / "lve.csv")
+    assert "segment 1: left out" in result.stdout
+    assert "divide" not in result.output
+
+
+def test_a_table_that_cannot_be_read_does_not_keep_the_others_from_being_read(tmp_path):
+    rows = ["[step]", "Sweep - 1", "Angular frequency\tStorage modulus\tLoss modulus",
+            "rad/s\tPa\tPa", *lines(*sweep()), "", "[step]", "Hold - 2",
+            "Step time\tShear rate\tStress", "s\t1/s\tblorp",
+            *lines(TIMES, np.full(30, 1.0), TIMES)]  # fmt: skip
+    out, result = imported(tmp_path, "a.txt", rows)
+    assert_sweep(out / "lve.csv")
+    assert "not read: a.txt, block 2 Hold - 2" in result.stderr
+    assert "--unit stress=" in result.stderr
+    _, result = imported(tmp_path, "a.txt", rows, "--block", 2, "--overwrite", code=2)
+    assert "blorp" in result.stderr
+
+
+def test_a_file_of_reptate_may_lack_its_first_line_and_have_more_columns(tmp_path):
+    out, _ = imported(tmp_path, "a.tts", lines(*sweep()))
+    assert_sweep(out / "lve.csv")
+    x = np.linspace(0.0, 4 * np.pi, 200)
+    wave = x, 2 * np.sin(x), 3 * np.sin(x + 0.5), 1 - np.cos(2 * x)
+    rows = ["omega=1.0;gamma=2.0;", "#Time(s)\tStrain(-)\ttau_yx(Pa)\ttau_xx-tau_yy(Pa)"]
+    out, _ = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite")
+    (test,) = load_dataset(out)
+    found = test.first_normal_stress_difference
+    assert found is not None
+    np.testing.assert_allclose(found, wave[3], atol=1e-14)
+    rows[1] = "#Time(s)\tStrain(-)\ttau_yx(Pa)\tIntensity"
+    out, result = imported(tmp_path, "b.laos", rows + lines(*wave), "--overwrite")
+    assert "columns not read: Intensity" in result.stdout
