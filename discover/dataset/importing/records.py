@@ -5,22 +5,19 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.importing.in_time import AT_REST, CONSTANT, spread, strain_of, up_and_down
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.names import plain
 from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.recognition import Recognised, spread, whole
+from discover.dataset.importing.recognition import Recognised, whole
 from discover.errors import InputError
 
 Values = Float[np.ndarray, " n"]
 
 _REACHED = 0.95
 """Share of a step of strain from which on it counts as put on."""
-
-_CONSTANT = 0.03
-_AT_REST = 0.02
-"""Rate or stress over that of the step before, below which it is none."""
 
 
 @dataclass
@@ -150,6 +147,9 @@ def _flow_curve(readings: Readings, found: Recognised) -> Record:
         made.table |= {"shear_rate": -rate, "stress": -stress}
         made.notes.append("rate and stress, both negative, are taken without their signs")
     _keep(made, (made.table["shear_rate"] > 0.0) & (made.table["stress"] > 0.0), "no steady flow")
+    ways = up_and_down(made.table["shear_rate"], made.table["stress"])
+    if ways is not None:
+        made.notes.append(f"the ways up and down in rate are {ways.described}")
     if time is not None and len(time) > 1:
         strains = np.abs(made.table["shear_rate"]) * np.median(np.abs(np.diff(time)))
         few = int(np.sum(strains < 2.0))
@@ -181,8 +181,9 @@ def _run(readings: Readings, found: Recognised) -> Record:
             ("hencky_rate",) if readings.has("hencky_rate") else ("hencky_strain",),
         )
         _begin(made, readings)
-        made.conditions["flow"] = "uniaxial"
-        made.notes.append("taken as uniaxial; write planar or biaxial in runs.csv if it is not")
+        flow = next((word for word in ("planar", "biaxial") if word in found.why), "uniaxial")
+        made.conditions["flow"] = flow
+        made.notes.append(f"taken as {flow}; write another flow in runs.csv if it is not")
         return made
     moved = ("shear_rate",) if readings.has("shear_rate") else ("strain",)
     besides = ("N1", "N2", "strain") if moved[0] == "shear_rate" else ("N1", "N2")
@@ -207,10 +208,15 @@ def _start(made: Record) -> None:
 
 
 def _creep(readings: Readings, found: Recognised) -> Record:
-    if not readings.has("stress", "strain"):
+    moved = "strain" if readings.has("strain") else "shear_rate"
+    if not readings.has("stress", moved):
         return _function_of_time(readings, found, "compliance")
-    made = _table(readings, found, ("time", "stress", "strain"))
+    made = _table(readings, found, ("time", "stress", moved))
     _begin(made, readings)
+    if moved == "shear_rate":
+        rate = made.table.pop(moved)
+        made.table["strain"] = strain_of(made.table["time"], rate)
+        made.notes.append("the strain is the integral of the rate from t = 0 on")
     made.conditions["control"] = "stress"
     _start(made)
     return made
@@ -251,15 +257,15 @@ def _after(made: Record, before: Record) -> Record:
     rate = made.table.get("shear_rate", np.zeros(1))
     if "rate_before_1_s" in before.conditions:
         level = float(before.conditions["rate_before_1_s"])
-        if made.kind == "run" and np.median(np.abs(rate)) < _AT_REST * abs(level):
+        if made.kind == "run" and np.median(np.abs(rate)) < AT_REST * abs(level):
             made.kind, made.notes = "none", ["a rest: it goes on from the relaxation before it"]
         return made
     if before.conditions or rate_before is None or not np.median(rate_before):
         return made
-    if spread(rate_before) >= _CONSTANT:
+    if spread(rate_before) >= CONSTANT:
         return made
     level = float(np.median(rate_before))
-    if np.median(np.abs(rate)) < _AT_REST * abs(level):
+    if np.median(np.abs(rate)) < AT_REST * abs(level):
         share = made.table["stress"][0] / before.table["stress"][-1]
         if 0.3 < share < 1.2:
             zeros = np.zeros(len(made.table["time"]))
@@ -314,7 +320,7 @@ def joined(creep: Record, recovery: Readings) -> Record | None:
     time, stress, strain = (recovery.get(key)[rows] for key in ("time", "stress", "strain"))  # type: ignore[index]
     time = time - recovery.begins
     level = float(np.median(np.abs(creep.table["stress"])))
-    if np.percentile(np.abs(stress), 90.0) > _AT_REST * level:
+    if np.percentile(np.abs(stress), 90.0) > AT_REST * level:
         return None
     end, last = float(creep.table["time"][-1]), float(creep.table["strain"][-1])
     if abs(strain[0]) < 0.2 * abs(last):  # counted from the start of the recovery

@@ -72,4 +72,6 @@ def read_reptate(path: Path) -> list[Block]:
             f"{path.name} does not say its {needed[0]} on the first line, as a {suffix} file of "
             f"RepTate does. Write {needed[0]}=…; there."
         )
-    return [Block(block.name, block.columns, block.cells, 2, constants)]
+    # of a creep file `rec` says that the strain is the recovered one
+    name = "recovery" if float(given.get("rec", 0)) else block.name
+    return [Block(name, block.columns, block.cells, 2, constants)]

@@ -11,7 +11,7 @@ four lines; it does not read RheoCompass, and TRIOS' other text export neither.
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -52,6 +52,8 @@ class Block:
         Line of the file on which the numbers begin.
     constants
         What the lines above say of the whole block, such as the gap or the rate.
+    above
+        Those lines: of the file's head, and since the block before, the nearest last.
     """
 
     name: str
@@ -59,6 +61,7 @@ class Block:
     cells: tuple[tuple[str, ...], ...]
     line: int
     constants: tuple[Constant, ...] = ()
+    above: tuple[tuple[str, ...], ...] = ()
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
@@ -117,6 +120,7 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     header: _Columns | None = None
     above: list[Sequence[str]] = list(rows[: header_row or 0])
     read, i = 0, header_row or 0
+    head: Rows = ()
     while i < len(rows):
         if not _is_numbers(rows[i]):
             above.append(rows[i])
@@ -129,7 +133,10 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
         if any(any(row) for row in rows[read:i]) or not read:
             header = _header(rows, i, header_row)
         if header is not None:
-            blocks += _by_label(rows, i, end, header, constants_of(above))
+            head = head or rows[:i]
+            words = (*head, *rows[read:i]) if read else head
+            made = _by_label(rows, i, end, header, constants_of(above))
+            blocks += (replace(block, above=tuple(map(tuple, words))) for block in made)
         if header_row is not None and blocks:
             break
         read = i = end
