@@ -11,7 +11,7 @@ from discover.dataset.kind_of_test import DeclaredTest, declared_test
 from discover.dataset.records.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
-from discover.dataset.run_table import oscillation
+from discover.dataset.run_table import oscillation, wave_of
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
@@ -30,7 +30,7 @@ _CONSTANT = 1e-6
 _WRONG_SIGN = -0.5
 
 # Intervals between samples, and a little, that may be missing of a cycle
-_NEXT_SAMPLE = 1.2
+_NEXT_SAMPLE = 1.5
 
 # Samples that a moving cubic needs
 _FEWEST_SMOOTHED = 5
@@ -167,7 +167,9 @@ def _begun(run: Run, test: DeclaredTest, where: str) -> Run:
         return replace(run, protocol=begun)
     if test.start != "periodic":
         return run
-    wave = oscillation(run)
+    # a strain that was recorded tells the period better than a rate that is derived from it
+    strain = None if run.strain is None else wave_of(run.time, run.strain - np.mean(run.strain))
+    wave = strain or oscillation(run)
     if wave is None:
         raise InputError(
             f"{where} declares a periodic start, but the rate of {run.name} does not alternate. "

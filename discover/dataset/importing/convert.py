@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from discover.dataset.importing.folder_files import NamedRecord, files_of
+from discover.dataset.importing.intervals import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
@@ -110,7 +111,7 @@ def import_files(
 
 def _read(path: Path, state: _Import) -> None:
     """Add the tests of a file."""
-    blocks = _blocks(path, state.mapping)
+    blocks = joined_intervals(_blocks(path, state.mapping), state.mapping, path.name)
     before: Record | None = None
     clock = 0.0
     reasons = []

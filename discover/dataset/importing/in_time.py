@@ -89,21 +89,16 @@ def _as_said(course: Course, said: Said) -> tuple[TestName, str] | None:
     by_rate, by_stress = _rate_is_set(course), held(course.stress)
     only_stress = by_stress and not by_rate
     flows = by_rate and not by_stress and bool(np.median(np.abs(course.moved)))
-    calls = f"its words, {said.words!r}"
-    if said.test == "recovery":
-        return "none", (
-            f"a recovery ({calls}), and the creep before it, from which it starts, is not in the "
-            "file: give both in one file, one after the other"
-        )
+    calls = f"it is called {said.words!r}"
+    if said.test == "recovery" and not flows and not said.by_file_name:
+        return "none", f"a recovery ({calls}), {_WITHOUT_CREEP}"
     excluded = {
         "creep": flows and "the rate is held and the stress is not",
         "relaxation": (flows or only_stress) and _goes_on(course) and "the strain is not held",
-        "start_up": only_stress and "the stress is held and the rate is not",
+        "start_up": only_stress and _drifts(course) and "the stress is held and the rate is not",
     }.get(said.test)
     if excluded:
-        if said.by_file_name:
-            return None
-        return "none", f"called {said.words!r}, but {excluded}"
+        return None if said.by_file_name else ("none", f"called {said.words!r}, but {excluded}")
     if said.test == "creep":
         return "creep", f"{calls}; the strain is what the stress was answered with"
     if said.test == "relaxation" and course.strain is not None:
@@ -111,10 +106,10 @@ def _as_said(course: Course, said: Said) -> tuple[TestName, str] | None:
     if said.test == "flow_curve" and (every_row_differs(course.moved) or _steps_alike(course)):
         return "flow_curve", f"{calls}; every row is another steady state"
     if said.test == "ramp":
-        if course.strain is not None and _rougher(course.time, course.moved, course.stress):
+        if _follows_stress(course):
             return "creep", "a ramp of stress, which the strain follows"
         return None if only_stress else ("run", f"{calls}; the rate goes its way in time")
-    if said.test in ("loop", "intervals") and not only_stress:
+    if said.test in ("loop", "intervals") and not only_stress and not said.by_file_name:
         return "run", f"{calls}; the rate goes its way in time"
     return None
 
@@ -125,29 +120,46 @@ def _by_numbers(course: Course) -> tuple[TestName, str]:
     if by_stress and np.any(stress):
         exact = spread(stress) < EXACTLY
         steps = rate is not None and every_row_differs(rate)
-        more = spread(stress) * _MORE_EXACT <= spread(course.moved)
-        if (exact and more) or (not by_rate and not steps and _drifts(course)):
+        more = max(spread(stress) * _MORE_EXACT, EXACTLY) <= spread(course.moved)
+        if (exact and (more or _jumps(course))) or (not by_rate and not steps and _drifts(course)):
             return "creep", "the stress is held, and the rate is what answers it"
     if not np.any(np.abs(stress) > 0.0) and strain is not None and np.ptp(strain) > 0.0:
-        return "none", (
-            "a recovery, as there is no stress; the creep before it, from which it starts, is not "
-            "in the file: give both in one file, one after the other"
-        )
+        return "none", f"a recovery, as there is no stress, {_WITHOUT_CREEP}"
     if rate is not None and every_row_differs(rate):
         span = f"{np.min(np.abs(rate)):.3g} to {np.max(np.abs(rate)):.3g} 1/s"
         return "flow_curve", f"every row has another rate, {span}"
     if rate is not None and _steps_alike(course):
         return "flow_curve", "the rate goes up and down in steps, and the stress is the same"
-    if not by_rate and straight(course.time, stress) and strain is not None:
+    if straight(course.time, stress) and _follows_stress(course):
         return "creep", "a ramp of stress, which the strain follows"
     if strain is not None and not by_rate:
         # held: what is left of the rise of the strain lies before the middle of the record
         late = strain[len(strain) // 4 :]
         if abs(np.median(strain)) > 0.0 and spread(late) < CONSTANT:
             return "relaxation", "the strain is held, and the stress relaxes"
+    ways = None if rate is None else up_and_down(rate, stress)
+    if ways is not None and ways.apart:
+        return "run", (
+            f"the rate goes up and down over time, and the stresses of the two ways are "
+            f"{ways.described}"
+        )
     if rate is not None and np.ptp(rate) > 0.0 and held(rate) and spread(rate) >= CONSTANT:
         return "run", "a flow whose rate goes in steps, over time"
     return "run", "a flow at a given rate, over time"
+
+
+_WITHOUT_CREEP = (
+    "and the creep before it, from which it starts, is not in the file: give both in one file, one "
+    "after the other"
+)
+
+
+def _follows_stress(course: Course) -> bool:
+    """Return whether the stress is a smooth ramp and the rate is not."""
+    smooth = straight(course.time, course.stress) or _rougher(
+        course.time, course.moved, course.stress
+    )
+    return smooth and not _rate_is_set(course)
 
 
 def _rate_is_set(course: Course) -> bool:
@@ -173,6 +185,16 @@ def _drifts(course: Course) -> bool:
     scatter = np.median(np.abs(np.diff(moved)))
     change = abs(float(np.median(first) - np.median(last)))
     return change > max(CONSTANT * float(np.median(moved)), 3.0 * float(scatter))
+
+
+def _jumps(course: Course) -> bool:
+    """Return whether the strain has a part that is there at once, as a given stress makes it."""
+    if course.strain is None or len(course.time) < 5:
+        return False
+    line = np.polynomial.Polynomial.fit(course.time, course.strain, 1)
+    return bool(line(0.0) * np.median(course.stress) > 0.0) and bool(
+        abs(line(0.0)) > CONSTANT * np.max(np.abs(course.strain))
+    )
 
 
 def _steps_alike(course: Course) -> bool:
@@ -242,9 +264,10 @@ def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
         if (x[b - 1] - x[a]) * (x[d - 1] - x[c]) < 0.0 and both.any():
             found.append(np.interp(first[both], second, other) - one[both])
         bends += [_bends(first, one), _bends(second, other)]
-    if not found:
+    off = np.concatenate(bends) if bends else np.empty(0)
+    if not found or not len(off):
         return None
-    scatter = 1.4826 * float(np.median(np.abs(np.concatenate(bends)))) / np.sqrt(1.5)
+    scatter = 1.4826 * float(np.median(np.abs(off))) / np.sqrt(1.5)
     return UpAndDown(np.concatenate(found), scatter)
 
 

@@ -52,7 +52,9 @@ def frequency_of(time: Values, values: Values) -> float:
     def misfit(omega: float) -> float:
         return float(np.sum((values - _series(time, values, omega, 1)[0]) ** 2))
 
-    trials = guess * np.linspace(0.5, 1.6, 111)
+    # between its turns and beyond them lies up to one more half cycle
+    most = max(1.6, 1.1 + 1.0 / max(len(turns), 1))
+    trials = guess * np.arange(0.5, most, 0.01)
     best = trials[int(np.argmin([misfit(omega) for omega in trials]))]
     step = 0.01 * guess
     return np.asarray(fminbound(misfit, best - step, best + step, xtol=1e-9 * best)).item()

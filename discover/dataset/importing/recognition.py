@@ -15,7 +15,7 @@ from discover.dataset.importing.said_test import Said, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.tables.table import shown
 from discover.dataset.tables.unit_text import read_unit
-from discover.dataset.tables.units import TIME, factor_to
+from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to
 from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02
@@ -173,15 +173,15 @@ def _without_time(readings: Readings) -> Recognised:
         return found
     rate, stress = _of(readings, "shear_rate", rows), _of(readings, "stress", rows)
     ways = up_and_down(rate, stress)
-    if ways is not None and ways.apart:
-        why = f"a loop whose ways up and down are {ways.described} at the same rates, so no flow "
-        why += "curve of steady states"
-    elif alternates(rate) or alternates(stress):
+    if alternates(rate) or alternates(stress):
         why = "an oscillation, as rate or stress swing to and fro"
     elif not np.any(rate) or np.ptp(np.percentile(rate, [5.0, 95.0])) < 0.1 * np.max(np.abs(rate)):
         why = "a record at one rate, and no flow curve"
     elif _waits(rate, stress):
         why = "records at one rate after the other, and no flow curve"
+    elif ways is not None and ways.apart:
+        why = f"a loop whose ways up and down are {ways.described} at the same rates, so no flow "
+        why += "curve of steady states"
     else:
         return found
     unread = [
@@ -189,12 +189,11 @@ def _without_time(readings: Readings) -> Recognised:
         for i, (name, _) in enumerate(readings.block.columns)
         if name and i not in readings.columns.values()
     ]
-    which = f"of the columns that are not read, {', '.join(unread[:8])}, " if unread else ""
-    why += (
-        f", and no column is known as its time: {which}name that of the time, as in --column "
-        f'time="{unread[0] if unread else "its name"}"'
-        + ("" if unread else ", after exporting it along")
-    )
+    why += ", and no column is known as its time. "
+    if unread:
+        why += f'Name it, as in --column time="{unread[0]}"; not read: {", ".join(unread[:8])}'
+    else:
+        why += "Export it with its time, or add a column of it"
     return Recognised("none", found.rows, why)
 
 
@@ -211,12 +210,9 @@ def _find_time(readings: Readings) -> None:
     """Take for the time a column in a unit of time that nothing else is known by, if it rises."""
     if readings.alone("time") or "time" in readings.mapping.columns:
         return
-    for i, (name, unit) in enumerate(readings.block.columns):
-        known = read_unit(unit) if unit and i not in readings.columns.values() else None
-        if known is None or factor_to(known, TIME) is None:
-            continue
+    for i in _unread_in(readings, TIME):
         cells = [float(row[i]) for row in readings.block.cells if is_number(row[i])]
-        if len(cells) >= _FEWEST and np.all(np.diff(cells) > 0.0) and name:
+        if len(cells) >= _FEWEST and np.all(np.diff(cells) > 0.0):
             readings.columns["time"] = i
             return
 
@@ -236,10 +232,21 @@ def _as_extension(readings: Readings, said: Said | None) -> None:
         return
     for shear, extension in _OF_TENSION.items():
         at = readings.columns.get(shear)
+        if at is None and shear == "shear_rate":
+            at = next(_unread_in(readings, SHEAR_RATE), None)
         if at is None or extension in readings.columns:
             continue
         if not _SHEAR.search(readings.block.columns[at][0]):
-            readings.columns[extension] = readings.columns.pop(shear)
+            readings.columns.pop(shear, None)
+            readings.columns[extension] = at
+
+
+def _unread_in(readings: Readings, quantity: Quantity) -> Iterator[int]:
+    """Yield the columns with a name in a unit of a quantity that nothing is known by."""
+    for i, (name, unit) in enumerate(readings.block.columns):
+        known = read_unit(unit) if unit and i not in readings.columns.values() else None
+        if name and known is not None and factor_to(known, quantity) is not None:
+            yield i
 
 
 _SHEAR = re.compile(r"shear|scher|schub|cisaill|cizall|cortante|taglio|xy|12", re.IGNORECASE)

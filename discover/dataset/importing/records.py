@@ -177,8 +177,11 @@ def _run(readings: Readings, found: Recognised) -> Record:
         made = _table(
             readings,
             found,
-            ("time", "tensile_stress"),
-            ("hencky_rate",) if readings.has("hencky_rate") else ("hencky_strain",),
+            (
+                "time",
+                "tensile_stress",
+                "hencky_rate" if readings.has("hencky_rate") else "hencky_strain",
+            ),
         )
         _begin(made, readings)
         flow = next((word for word in ("planar", "biaxial") if word in found.why), "uniaxial")
@@ -213,13 +216,26 @@ def _creep(readings: Readings, found: Recognised) -> Record:
         return _function_of_time(readings, found, "compliance")
     made = _table(readings, found, ("time", "stress", moved))
     _begin(made, readings)
+    # the clock of a recovery in the same block may start again
+    starts = np.flatnonzero(np.diff(made.table["time"]) < -0.5 * made.table["time"][:-1]) + 1
+    first, *others = (
+        dict(zip(made.table, piece, strict=True))
+        for piece in zip(*(np.split(v, starts) for v in made.table.values()), strict=True)
+    )
+    made.table = _with_strain(first)
     if moved == "shear_rate":
-        rate = made.table.pop(moved)
-        made.table["strain"] = strain_of(made.table["time"], rate)
         made.notes.append("the strain is the integral of the rate from t = 0 on")
     made.conditions["control"] = "stress"
+    for other in others:
+        made = _followed(made, _with_strain(other))
     _start(made)
     return made
+
+
+def _with_strain(table: dict[str, Values]) -> dict[str, Values]:
+    """Return time, stress and strain, which is the integral of the rate where that stands."""
+    strain = table["strain"] if "strain" in table else strain_of(table["time"], table["shear_rate"])
+    return {"time": table["time"], "stress": table["stress"], "strain": strain}
 
 
 def _relaxation(readings: Readings, found: Recognised) -> Record:
@@ -312,25 +328,37 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
 
 def joined(creep: Record, recovery: Readings) -> Record | None:
     """Return creep and the recovery after it as one test; None if a block is no such recovery."""
-    if creep.conditions.get("control") != "stress" or not recovery.has("time", "stress", "strain"):
+    moved = "strain" if recovery.has("strain") else "shear_rate"
+    keys = ("time", "stress", moved)
+    if creep.conditions.get("control") != "stress" or not recovery.has(*keys):
         return None
-    rows = whole(recovery, "time", "stress", "strain")
+    rows = whole(recovery, *keys)
     if not rows.any():
         return None
-    time, stress, strain = (recovery.get(key)[rows] for key in ("time", "stress", "strain"))  # type: ignore[index]
-    time = time - recovery.begins
+    table = {key: recovery.get(key)[rows] for key in keys}  # type: ignore[index]
     level = float(np.median(np.abs(creep.table["stress"])))
-    if np.percentile(np.abs(stress), 90.0) > AT_REST * level:
+    if np.percentile(np.abs(table["stress"]), 90.0) > AT_REST * level:
         return None
+    table["time"] = table["time"] - recovery.begins
+    table["stress"] = np.zeros(int(np.sum(rows)))
+    return _followed(creep, _with_strain(table))
+
+
+def _followed(creep: Record, after: dict[str, Values]) -> Record:
+    """Return a test at given stress with what follows it, whose clock and strain may start again.
+
+    Parameters
+    ----------
+    after
+        Time in s, stress in Pa and strain of what follows.
+    """
+    time, strain = after["time"], after["strain"]
     end, last = float(creep.table["time"][-1]), float(creep.table["strain"][-1])
     if abs(strain[0]) < 0.2 * abs(last):  # counted from the start of the recovery
         strain = last + strain if np.median(strain) * last < 0.0 else last - strain
     time = time + end if time[0] < end else time
     later = time > end
-    table = {
-        "time": np.concatenate([creep.table["time"], time[later]]),
-        "stress": np.concatenate([creep.table["stress"], np.zeros(int(np.sum(later)))]),
-        "strain": np.concatenate([creep.table["strain"], strain[later]]),
-    }
+    more = {"time": time, "stress": after["stress"], "strain": strain}
+    table = {key: np.concatenate([creep.table[key], v[later]]) for key, v in more.items()}
     notes = [*creep.notes, f"with the recovery after {end:.4g} s as one run"]
     return Record("creep", table, creep.conditions, creep.temperature, creep.dropped, notes)

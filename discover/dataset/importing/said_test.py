@@ -85,8 +85,10 @@ def said_of(block: Block, file: str) -> Said | None:
 
 def _named(words: str) -> SaidTest | None:
     found = [test for test, pattern in _PATTERNS.items() if pattern.search(words)]
-    if "recovery" in found and "creep" in found:  # one run, or what follows the creep
-        found.remove("recovery")
+    if "recovery" in found and "creep" in found:  # one run, or "recovery after creep"
+        places = [_PATTERNS[test].search(words) for test in ("recovery", "creep")]
+        first = min(places, key=lambda place: place.start() if place else 0)
+        found.remove("creep" if first is places[0] else "recovery")
     if {"planar", "biaxial"} & set(found):
         found = [test for test in found if test != "uniaxial"]
     if {"loop", "intervals"} & set(found):  # made of ramps or of steps, and relaxing meanwhile
@@ -99,7 +101,7 @@ def _named(words: str) -> SaidTest | None:
 def _titles(lines: Sequence[Sequence[str]]) -> Iterator[str]:
     """Yield lines that may say which test it is, the last first."""
     for line in reversed(lines):
-        cells = [cell.strip(" #%") for cell in line if cell.strip(" #%")]
+        cells = [cell.strip(" #%:") for cell in line if cell.strip(" #%:")]
         if not cells or len(cells) > 2:
             continue  # names and units of columns
         key, mark, value = re.sub(r"\s+", " ", ": ".join(cells)).partition(":")
