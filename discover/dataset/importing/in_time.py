@@ -73,7 +73,8 @@ def kind_of_course(course: Course, said: Said | None) -> tuple[TestName, str]:
         What its words say.
     """
     strain, stress = course.strain, course.stress
-    if alternates(strain if strain is not None else course.moved) or alternates(stress):
+    swings = alternates(strain if strain is not None else course.moved) or alternates(stress)
+    if swings and not held(stress):  # creep and recovery have a rate of both signs
         if strain is not None and purer(course.time, stress, strain):
             return "creep", "the stress is a sine and the strain is not"
         return "run", "an oscillation, sample by sample"

@@ -6,22 +6,25 @@ from jaxtyping import Bool
 from discover.dataset.run import Run
 from discover.statistics.noise.outliers import isolated
 
-_JUMP = 0.1  # share of the largest rate, or stress, that was imposed
-_ABOVE_STEPS = 10.0  # times the median change between samples: a sine changes by more than a tenth
+_CORNER = 0.01  # share of the largest rate, or stress, that was imposed
+_ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
 
 
 def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
-    """Return which samples are next to a step of what was imposed: rate or stress.
+    """Return which samples are next to a step or a corner of what was imposed: rate or stress.
 
-    What is answered there may be a peak of one sample, as where the next interval of a thixotropy
-    test begins, and no knock.
+    What is answered there may stand alone without a knock, as where the next interval of a
+    thixotropy test begins, or the way down of a loop.
     """
     imposed = run.stress if run.protocol.control == "stress" else run.rate
-    change = np.abs(np.diff(imposed))
-    if not len(change):
-        return np.zeros(len(imposed), dtype=bool)
-    steps = change > _JUMP * np.max(np.abs(imposed)) + _ABOVE_STEPS * np.median(change)
-    return np.append(steps, False) | np.append(False, steps)
+    beside = np.zeros(len(imposed), dtype=bool)
+    if len(imposed) < 3:
+        return beside
+    bends = np.abs(np.diff(imposed, 2))
+    sharp = bends > _CORNER * np.max(np.abs(imposed)) + _ABOVE_BENDS * np.median(bends)
+    for shift in range(3):
+        beside[shift : shift + len(sharp)] |= sharp
+    return beside
 
 
 def without_spikes(run: Run) -> tuple[Run, list[float]]:
