@@ -22,7 +22,7 @@ from discover.errors import InputError
 # speaks, not the fluid
 _ELASTIC_FACTOR = 2.0
 _SMALL_STRAIN = 0.5
-_MODERATE_STRAIN = 1.0  # laws part from linear theory in N1 by less than the factor until here
+_EARLY_STRAIN = 1.0  # laws part from linear theory in N1 by less than the factor until here
 _MOSTLY_ELASTIC = 0.5  # share of σ12 γ in N1 below which a stress may be viscous and say nothing
 # Means of so many samples miss what is allowed by so many of their standard errors: in a record of
 # some hundred samples noise alone does in fewer than one of a hundred
@@ -149,28 +149,27 @@ def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
     """
     rate = abs(float(run.rate[0]))
     strain, stress = rate * run.time, run.stress * np.sign(run.rate[0])
-    small, moderate = strain < _SMALL_STRAIN, strain < _MODERATE_STRAIN
-    if np.sum(small) < 5:
+    early = strain < _EARLY_STRAIN
+    if np.sum(early) < 5:
         return None
     most = np.abs(stress) * strain
     grown = cumulative_trapezoid(np.append(0.0, stress), np.append(0.0, run.time))
     memory = 2.0 * (strain * stress - rate * grown)
-    least = -0.5 * most
-    least[moderate] = np.where(memory >= _MOSTLY_ELASTIC * most, memory / _ELASTIC_FACTOR, least)[
-        moderate
-    ]
+    least = np.where(
+        early & (memory >= _MOSTLY_ELASTIC * most), memory / _ELASTIC_FACTOR, -0.5 * most
+    )
     # of the noise of N1, and of the stress in what it foretells
     error = np.hypot(local_noise(run.time, normal), local_noise(run.time, stress) * strain)
-    width = min(_AVERAGED, int(np.sum(small)))
+    width = min(_AVERAGED, int(np.sum(early)))
     excess = np.maximum(
         _averaged(normal - _ELASTIC_FACTOR * most, width), _averaged(least - normal, width)
     )
     allowed = _STANDARD_ERRORS * error / np.sqrt(width)
     bad = excess > np.maximum(allowed, _NOTICEABLE * np.max(np.abs(normal)))
-    if not bad[small].any():
+    if not bad[early].any():
         return None
     # on from there as long as it is wrong
-    last = int(np.flatnonzero(bad & small)[-1])
+    last = int(np.flatnonzero(bad & early)[-1])
     last += int(np.argmin(np.append(bad[last:], False))) - 1
     until = float(run.time[last])
     lasts = len(run) - last - 1 < _FEWEST_LEFT
