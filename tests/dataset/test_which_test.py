@@ -40,7 +40,7 @@ def test_a_creep_that_is_exported_with_its_rate_is_a_run_at_given_stress(tmp_pat
     assert "integral of the rate" in result.stdout
     strain = 0.1 * TIMES + 0.2 * (1 - np.exp(-2.0 * TIMES))
     # thirty samples over three decades: what lies between them is known to some per cent
-    np.testing.assert_allclose(test.strain, strain, rtol=0.03)
+    np.testing.assert_allclose(test.recorded, strain, rtol=0.03)
 
 
 @pytest.mark.parametrize("which", ["rate", "noisy rate", "noisy stress"])
@@ -63,9 +63,9 @@ def test_creep_and_recovery_are_one_run_though_their_clock_starts_again(tmp_path
     assert test.protocol.control == "stress"
     assert np.all(test.stress[30:] == 0.0)
     if moved == "strain":
-        np.testing.assert_allclose(test.strain, strain, rtol=1e-12)
+        np.testing.assert_allclose(test.recorded, strain, rtol=1e-12)
     else:  # it goes back by 0.2 (1 - exp(-t)), and starts at the last strain of the creep
-        back = test.strain[30:] - test.strain[29]
+        back = test.recorded[30:] - test.recorded[29]
         np.testing.assert_allclose(back[-1], -0.2, rtol=0.03)
 
 
