@@ -37,7 +37,7 @@ RATES = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 def measured(rate, fluid=(0.3, 0.0), seed=0, change=lambda time, normal: normal):
     """Return a start-up with 2 % of noise, of the largest stress and N1."""
     time = np.geomspace(2e-3 / max(rate, 1.0), 20.0, 120)
-    stress, normal = giesekus(rate, *fluid, time)
+    stress, normal = giesekus(rate, fluid[0], fluid[1], time)
     noise = 0.02 * np.random.default_rng(seed).standard_normal((2, len(time)))
     stress = stress + np.max(stress) * noise[0]
     normal = change(time, normal) + np.max(normal) * noise[1]

@@ -84,7 +84,7 @@ def said_of(block: Block, file: str) -> Said | None:
 
 
 def _named(words: str) -> SaidTest | None:
-    found = [test for test, pattern in _PATTERNS.items() if pattern.search(words)]
+    found: list[SaidTest] = [t for t, pattern in _PATTERNS.items() if pattern.search(words)]
     if "recovery" in found and "creep" in found:  # one run, or "recovery after creep"
         places = [_PATTERNS[test].search(words) for test in ("recovery", "creep")]
         first = min(places, key=lambda place: place.start() if place else 0)
