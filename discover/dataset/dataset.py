@@ -7,7 +7,7 @@ from typing import Any, overload
 import numpy as np
 import pandas as pd
 
-from discover.dataset.checking.normal_stress import impossible_normal_stress
+from discover.dataset.checking.normal_stress import sound_normal_stress
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
@@ -238,18 +238,17 @@ class Dataset(NotebookView):
     def quantity_by_quantity(self) -> "Dataset":
         """Return the data with N1 and N2, where recorded, as records of their own beside σ12.
 
-        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run. One
-        that no fluid can have is set aside, and is neither fitted nor judges.
+        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run.
+        Samples that no fluid can have are left out; a record of nothing else is set aside.
         """
-        reasons = impossible_normal_stress(self.runs, self.linear_sweep)
-        aside = {f"{name} (N1)": why for name, why in reasons.items()}
-        runs = [
-            seen
-            for run in self.runs
-            for seen in (run, *(run.observing(name) for name in run.beside))
-            if seen.name not in aside
-        ]
-        return replace(self, runs=tuple(runs), set_aside={**self.set_aside, **aside})
+        late, never = sound_normal_stress(self.runs, self.linear_sweep)
+        aside = {f"{name} (N1)": why for name, why in never.items()}
+        seen: list[Run] = []
+        for run in self.runs:
+            records = [run.observing(name) for name in run.beside]
+            kept = [record for record in records if record.name not in aside]
+            seen += [run, *(_from_then_on(record, late.get(run.name)) for record in kept)]
+        return replace(self, runs=tuple(seen), set_aside={**self.set_aside, **aside})
 
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
@@ -298,3 +297,14 @@ class Dataset(NotebookView):
         )
         table.insert(0, "run", table.pop("run"))
         return table
+
+
+def _from_then_on(record: Run, time: float | None) -> Run:
+    """Return a record of N1 without the samples that cannot be right, up to a time in s."""
+    if time is None or record.quantity != "N1":
+        return record
+    kept = record.time > time
+    said = f"{int(np.sum(~kept))} samples up to {time:.4g} s, which cannot be right, are left out"
+    before = record.metadata.get("thinned")
+    metadata = {**record.metadata, "thinned": f"{before}; {said}" if before else said}
+    return replace(record.window(kept), metadata=metadata)

@@ -11,7 +11,7 @@ from discover.dataset.kind_of_test import DeclaredTest, declared_test
 from discover.dataset.records.differentiation import DEFAULT_WINDOW, differentiate
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
-from discover.dataset.run_table import oscillation
+from discover.dataset.run_table import oscillation, wave_of
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
@@ -28,6 +28,9 @@ _CONSTANT = 1e-6
 # From rest a passive fluid cannot return more work than it was given. A record that is noise around
 # zero comes near 0, one with the wrong sign near -1
 _WRONG_SIGN = -0.5
+
+# Intervals between samples, and a little, that may be missing of a cycle
+_NEXT_SAMPLE = 1.5
 
 # Samples that a moving cubic needs
 _FEWEST_SMOOTHED = 5
@@ -164,20 +167,33 @@ def _begun(run: Run, test: DeclaredTest, where: str) -> Run:
         return replace(run, protocol=begun)
     if test.start != "periodic":
         return run
-    wave = oscillation(run)
+    # a strain that was recorded tells the period better than a rate that is derived from it
+    strain = None if run.strain is None else wave_of(run.time, run.strain - np.mean(run.strain))
+    wave = strain or oscillation(run)
     if wave is None:
         raise InputError(
             f"{where} declares a periodic start, but the rate of {run.name} does not alternate. "
             "Leave the cell start empty, or correct the rate."
         )
     period = 2.0 * np.pi / wave[0]
-    if run.time[-1] - run.time[0] < period * (1.0 - 1e-6):
+    missing = period - (run.time[-1] - run.time[0])
+    # one cycle may lack its end, which is its first sample: instruments give n phases of 2 π k/n
+    if missing > _NEXT_SAMPLE * np.max(np.diff(run.time)):
         raise InputError(
             f"{where} declares a periodic start, but {run.name} lasts {np.ptp(run.time):.3g} s, "
             f"less than one period ({period:.3g} s), so nobody can say what came before. Give a "
             "whole cycle."
         )
-    return replace(run, protocol=after_alternation(run.protocol, period, run.time))
+    protocol = _closed(run, period) if missing > 1e-6 * period else run.protocol
+    return replace(run, protocol=after_alternation(protocol, period, run.time))
+
+
+def _closed(run: Run, period: float) -> FlowProtocol:
+    """Return what was imposed in a cycle without its end, ended by its first sample."""
+    time = np.append(run.time, run.time[0] + period)
+    if run.protocol.control == "stress":
+        return in_flow(_imposed(run.name, time, np.append(run.stress, run.stress[0])), run.flow)
+    return in_flow(sampled_rate(time, np.append(run.rate, run.rate[0])), run.flow)
 
 
 def _checked_time(table: Table) -> Float[np.ndarray, " n"]:

@@ -13,6 +13,7 @@ from discover.protocols.kinematics import STATES
 # share of the squared rate that its first harmonic must make up; the rest are higher harmonics,
 # many where the stress was commanded, and noise
 _PERIODIC = 0.7
+_ONE_CYCLE = 0.95  # one cycle alone: a step to the other side, which is none, has 0.81
 _VARYING = "varying rate"
 
 
@@ -89,10 +90,14 @@ def wave_of(
     """
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)
-    if turns.size < 2:
+    if not turns.size:
         return None
-    zeros = 0.5 * (time[clear[turns]] + time[clear[turns + 1]])
-    about = np.pi * (turns.size - 1) / (zeros[-1] - zeros[0])
+    least = _PERIODIC
+    if turns.size == 1:  # one cycle alone, which begins and ends at rest
+        about, least = 2.0 * np.pi / (time[-1] - time[0]) * (1.0 - 1.0 / len(time)), _ONE_CYCLE
+    else:
+        zeros = 0.5 * (time[clear[turns]] + time[clear[turns + 1]])
+        about = np.pi * (turns.size - 1) / (zeros[-1] - zeros[0])
 
     def fitted(frequency: float) -> tuple[np.ndarray, np.ndarray]:
         angle = frequency * time
@@ -105,6 +110,6 @@ def wave_of(
     frequency = float(best.x)  # pyright: ignore[reportAttributeAccessIssue]
     found, left = fitted(frequency)
     amplitude = float(np.hypot(found[0], found[1]))
-    if left @ left > (1.0 - _PERIODIC) * (rate @ rate) or abs(found[2]) > 0.2 * amplitude:
+    if left @ left > (1.0 - least) * (rate @ rate) or abs(found[2]) > 0.2 * amplitude:
         return None
     return frequency, amplitude

@@ -1,12 +1,15 @@
 """First normal stress differences that no fluid can have, told without any law."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.integrate import cumulative_trapezoid
 
 from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
+from discover.dataset.checking.one_run import local_noise
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
@@ -15,10 +18,17 @@ from discover.dataset.linear_viscoelasticity import (
 from discover.dataset.run import Run
 from discover.errors import InputError
 
-# Elastic limit: N1 = σ12 γ where all modes are still elastic, less later. Beyond this factor of it,
-# or below zero by as much, the transducer speaks, not the fluid
+# Beyond this factor of what elasticity allows, or below zero by half as much, the transducer
+# speaks, not the fluid
 _ELASTIC_FACTOR = 2.0
 _SMALL_STRAIN = 0.5
+_EARLY_STRAIN = 1.0  # laws part from linear theory in N1 by less than the factor until here
+_MOSTLY_ELASTIC = 0.5  # share of σ12 γ in N1 below which a stress may be viscous and say nothing
+# Means of so many samples miss what is allowed by so many of their standard errors: in a record of
+# some hundred samples noise alone does in fewer than one of a hundred
+_AVERAGED, _STANDARD_ERRORS = 9, 4.0
+_NOTICEABLE = 0.005  # share of the largest N1; what is off by less matters to no fit
+_FEWEST_LEFT = 10
 # Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number, and of what it
 # foretells a modulus and a time that are off leave this factor open
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
@@ -42,16 +52,54 @@ def doubts_of_normal_stress(
     normal = run.first_normal_stress_difference
     if normal is None:
         return
-    for reason in _reasons(run, normal, sweep, spectrum):
-        yield Finding("warning", "N1", run.name, f"N1 in {run.name} {reason}")
+    for fault in _faults(run, normal, sweep, spectrum):
+        yield Finding("warning", "N1", run.name, f"N1 in {run.name} {fault.why}")
 
 
-def impossible_normal_stress(runs: Sequence[Run], sweep: LinearSweep | None) -> dict[str, str]:
-    """Return why the N1 of runs cannot be right, by the names of runs of which that is so."""
+@dataclass(frozen=True)
+class _Fault:
+    """Why an N1 cannot be right.
+
+    Attributes
+    ----------
+    why
+        The rest of a sentence that begins with the record, and what to do.
+    until
+        Time in s from which on the record may be right; infinite if that is never.
+    """
+
+    why: str
+    until: float = np.inf
+
+
+def sound_normal_stress(
+    runs: Sequence[Run], sweep: LinearSweep | None
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Return from when on the N1 of runs may be right, and why of those of which it never is.
+
+    Parameters
+    ----------
+    runs
+        Any; those without N1, or of which nothing can be said, are in neither.
+    sweep
+        The linear sweep, if there is one.
+
+    Returns
+    -------
+    Times in s by name of the run, the samples up to which cannot be right; and reasons by name.
+    """
     there = [(run, n1) for run in runs if (n1 := run.first_normal_stress_difference) is not None]
     spectrum = _spectrum(sweep) if there and sweep is not None else None
-    found = {run.name: next(_reasons(run, n1, sweep, spectrum), None) for run, n1 in there}
-    return {name: f"it {why.rstrip('.')}" for name, why in found.items() if why is not None}
+    late: dict[str, float] = {}
+    never: dict[str, str] = {}
+    for run, normal in there:
+        faults = list(_faults(run, normal, sweep, spectrum))
+        lasting = [fault for fault in faults if fault.until == np.inf]
+        if lasting:
+            never[run.name] = f"it {lasting[0].why.rstrip('.')}"
+        elif faults:
+            late[run.name] = faults[0].until
+    return late, never
 
 
 def _spectrum(sweep: LinearSweep) -> RelaxationSpectrum | None:
@@ -61,45 +109,77 @@ def _spectrum(sweep: LinearSweep) -> RelaxationSpectrum | None:
         return None
 
 
-def _reasons(
+def _faults(
     run: Run,
     normal: Float[np.ndarray, " n"],
     sweep: LinearSweep | None,
     spectrum: RelaxationSpectrum | None,
-) -> Iterator[str]:
+) -> Iterator[_Fault]:
     in_shear = run.protocol.control == "rate" and run.flow == "shear" and run.from_rest
     if not (in_shear and is_start_up(run)):
         return
-    reasons = (
-        _early(run, normal),
+    early = _early(run, normal)
+    if early is not None:
+        yield early
+    lasting = (
         _negative_end(run, normal),
         None if spectrum is None else _second_order(run, normal, spectrum),
         None if sweep is None else _laun(run, normal, sweep),
     )
-    yield from (reason for reason in reasons if reason is not None)
+    yield from (_Fault(why) for why in lasting if why is not None)
 
 
 def _end(run: Run, values: Float[np.ndarray, " n"]) -> float:
     return float(np.median(values[-max(3, len(run) // 10) :]))
 
 
-def _early(run: Run, normal: Float[np.ndarray, " n"]) -> str | None:
-    """Hold N1 against what elasticity allows in start-up from rest: 0 ≤ N1 ≤ σ12 γ, about.
+def _averaged(values: Float[np.ndarray, " n"], width: int) -> Float[np.ndarray, " _"]:
+    """Return means over so many samples around each; at an end those of the last whole window."""
+    means = np.mean(np.lib.stride_tricks.sliding_window_view(values, width), axis=1)
+    return np.pad(means, (width // 2, width - 1 - width // 2), mode="edge")
+
+
+def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
+    """Hold N1 against what elasticity allows in start-up from rest.
 
     With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
-    only lowers it.
+    only lowers it. At small strain any fluid with memory has N1 = 2 γ̇² ∫ s G(s) ds and
+    σ12 = γ̇ ∫ G(s) ds (Bird, Armstrong & Hassager 1987, vol. 1, ch. 6), so that
+    N1 = 2 γ̇ (t σ12 − ∫ σ12 dt), whatever its G and its solvent.
     """
-    strain = abs(run.rate[0]) * run.time
-    limit = np.abs(run.stress) * strain
-    small = strain < _SMALL_STRAIN
-    bad = (normal > _ELASTIC_FACTOR * limit) | (normal < -0.5 * limit)
-    if np.sum(small) < 5 or np.mean(bad[small]) <= 0.3:
+    rate = abs(float(run.rate[0]))
+    strain, stress = rate * run.time, run.stress * np.sign(run.rate[0])
+    early = strain < _EARLY_STRAIN
+    if np.sum(early) < 5:
         return None
-    until = run.time[np.flatnonzero(bad & small)[-1]]
-    return (
-        f"cannot be right early: {100 * np.mean(bad[small]):.0f} % of its samples below strain "
-        f"{_SMALL_STRAIN:g} (the last at {until:.4g} s) are negative or above "
-        f"{_ELASTIC_FACTOR:g} times stress × strain, the elastic limit. Do not judge a law by them."
+    most = np.abs(stress) * strain
+    grown = cumulative_trapezoid(np.append(0.0, stress), np.append(0.0, run.time))
+    memory = 2.0 * (strain * stress - rate * grown)
+    least = np.where(
+        early & (memory >= _MOSTLY_ELASTIC * most), memory / _ELASTIC_FACTOR, -0.5 * most
+    )
+    # of the noise of N1, and of the stress in what it foretells
+    error = np.hypot(local_noise(run.time, normal), local_noise(run.time, stress) * strain)
+    width = min(_AVERAGED, int(np.sum(early)))
+    excess = np.maximum(
+        _averaged(normal - _ELASTIC_FACTOR * most, width), _averaged(least - normal, width)
+    )
+    allowed = _STANDARD_ERRORS * error / np.sqrt(width)
+    bad = excess > np.maximum(allowed, _NOTICEABLE * np.max(np.abs(normal)))
+    if not bad[early].any():
+        return None
+    # on from there as long as it is wrong
+    last = int(np.flatnonzero(bad & early)[-1])
+    last += int(np.argmin(np.append(bad[last:], False))) - 1
+    until = float(run.time[last])
+    lasts = len(run) - last - 1 < _FEWEST_LEFT
+    return _Fault(
+        f"cannot be right early, up to {until:.4g} s (strain {strain[last]:.2g}): by more than "
+        f"its noise it is negative, above {_ELASTIC_FACTOR:g} times stress × strain, the elastic "
+        "limit, or below half of what the stress foretells. The normal force lags, gives way or "
+        "has a baseline. "
+        + ("Nothing is left of it." if lasts else "These samples are neither fitted nor judge."),
+        np.inf if lasts else until,
     )
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
+from discover.dataset.records.spikes import beside_a_step
 from discover.dataset.run import Run
 from discover.statistics.noise.held_values import read_times
 
@@ -20,6 +21,9 @@ _SPIKE_SHARE = 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
+# The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
+_SPREAD_OF_BENDS = 1.4826 / np.sqrt(1.5)
+_NEIGHBOURHOOD = 31
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 
 
@@ -96,7 +100,8 @@ def spikes(run: Run) -> Float[np.ndarray, " k"]:
     """Return the times, in s, of single samples of stress that stand out of their neighbours.
 
     A sample is compared with the straight line between its neighbours. A lone spike also bends
-    the lines at its neighbours the other way; a corner or a fast rise does not.
+    the lines at its neighbours the other way; a corner or a fast rise does not. Nor is a sample one
+    that is next to a step of the rate.
     """
     off = _bends(run.time, run.stress)
     if len(off) < 5:
@@ -112,14 +117,31 @@ def spikes(run: Run) -> Float[np.ndarray, " k"]:
     alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
     # the neighbours of a spike bend too, but less
     alone[1:-1] &= (np.abs(off[1:-1]) > np.abs(off[:-2])) & (np.abs(off[1:-1]) > np.abs(off[2:]))
-    return run.time[1:-1][large & alone]
+    return run.time[1:-1][large & alone & ~beside_a_step(run)[1:-1]]
 
 
 def stress_noise(run: Run) -> float:
     """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
     off = _bends(run.time, run.stress)
-    # a sample minus the mean of two neighbours: variance 1 + 1/4 + 1/4
-    return float(1.4826 * np.median(np.abs(off)) / np.sqrt(1.5)) if len(off) else 0.0
+    return float(_SPREAD_OF_BENDS * np.median(np.abs(off))) if len(off) else 0.0
+
+
+def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
+    """Return the standard deviation of the noise around each sample of a record, shape (n,).
+
+    Parameters
+    ----------
+    time
+        In s, increasing.
+    values
+        In any unit, which is that of the noise.
+    """
+    off = np.abs(_bends(time, values))
+    if not len(off):
+        return np.zeros(len(values))
+    width = min(_NEIGHBOURHOOD, len(off))
+    around = np.median(np.lib.stride_tricks.sliding_window_view(off, width), axis=1)
+    return _SPREAD_OF_BENDS * np.pad(around, (width // 2 + 1, width - width // 2), mode="edge")
 
 
 def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:

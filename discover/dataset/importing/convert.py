@@ -10,6 +10,7 @@ import numpy as np
 
 from discover.dataset.importing.file_blocks import blocks_of_file
 from discover.dataset.importing.folder_files import NamedRecord, files_of
+from discover.dataset.importing.intervals import joined_intervals
 from discover.dataset.importing.left_out import left_out, nothing, numbered, unread_columns
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
@@ -173,7 +174,7 @@ def import_files(
 
 def _read(path: Path, state: _Import) -> None:
     """Add the tests of a file."""
-    blocks = blocks_of_file(path, state.mapping)
+    blocks = joined_intervals(blocks_of_file(path, state.mapping), state.mapping, path.name)
     before: Record | None = None
     clock = 0.0
     reasons = []

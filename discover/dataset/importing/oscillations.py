@@ -16,6 +16,8 @@ _AT_ONCE = 0.02
 """Share of a period within which a fluid from rest has no stress yet, unless it answers at once."""
 
 _FAR = 0.3
+_WHOLE = 1e-3
+"""Share of a period up to which a record is as long as one."""
 
 Values = Float[np.ndarray, " n"]
 
@@ -50,7 +52,9 @@ def frequency_of(time: Values, values: Values) -> float:
     def misfit(omega: float) -> float:
         return float(np.sum((values - _series(time, values, omega, 1)[0]) ** 2))
 
-    trials = guess * np.linspace(0.5, 1.6, 111)
+    # between its turns and beyond them lies up to one more half cycle
+    most = max(1.6, 1.1 + 1.0 / max(len(turns), 1))
+    trials = guess * np.arange(0.5, most, 0.01)
     best = trials[int(np.argmin([misfit(omega) for omega in trials]))]
     step = 0.01 * guess
     return np.asarray(fminbound(misfit, best - step, best + step, xtol=1e-9 * best)).item()
@@ -94,14 +98,17 @@ def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
     """
     period = 2.0 * np.pi / frequency_of(time, imposed)
     size = float(np.max(np.abs(answer)))
-    if time[-1] - time[0] < period * (1.0 - 1e-3) or size == 0.0:
+    step = float(np.median(np.diff(time)))
+    if time[-1] - time[0] + step < period * (1.0 - _WHOLE) or size == 0.0:
         return False
     if time[0] < _AT_ONCE * period and abs(answer[0]) > _FAR * size:
         return True
     first = time - time[0] < 0.2 * period
     later = time[first] + period
     inside = later <= time[-1]
-    if not inside.any():  # one cycle alone: its ends meet
-        return bool(abs(answer[0] - answer[-1]) < _AS_BEFORE * size)
+    if not inside.any():  # one cycle alone: its ends meet, or would with the next sample
+        ahead = (time[0] + period - time[-1]) / step
+        end = answer[-1] + ahead * 0.5 * (3.0 * answer[-1] - 4.0 * answer[-2] + answer[-3])
+        return bool(abs(answer[0] - end) < _AS_BEFORE * size)
     again = np.interp(later[inside], time, answer)
     return bool(np.max(np.abs(answer[first][inside] - again)) < _AS_BEFORE * size)

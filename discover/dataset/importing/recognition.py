@@ -1,32 +1,27 @@
-"""Which test a block of numbers is, by what it holds, before any of it is used.
-
-Names of steps are the user's own words and decide only what numbers leave open: whether rates that
-rise from row to row are a ramp in time or steady states, and whether a flow at constant stress and
-constant rate is a creep test.
-"""
+"""Which test a block of numbers is, by what it holds, before any of it is used."""
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from discover.dataset.importing.in_time import APART, Course, kind_of_course, up_and_down
 from discover.dataset.importing.mapping import TestName
-from discover.dataset.importing.oscillations import alternates, purer
+from discover.dataset.importing.oscillations import alternates
 from discover.dataset.importing.readings import Readings
+from discover.dataset.importing.said_test import Said, said_of
+from discover.dataset.importing.text_rows import is_number
+from discover.dataset.tables.table import shown
+from discover.dataset.tables.unit_text import read_unit
+from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to
 from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02
 _SAME_AMPLITUDE = 1.2
 _SAME_TEMPERATURE = 1.5
 _FEWEST = 3
-
-_CONSTANT = 0.03
-"""Spread, of the middle nine tenths of the samples, up to which an imposed quantity is constant."""
-
-_RAMP = re.compile(r"ramp", re.IGNORECASE)  # rampe in German and French
-_CREEP = re.compile(r"creep|kriech|fluage|retardation", re.IGNORECASE)
-_STEADY = re.compile(r"flow (sweep|curve)|fließkurve|courbe", re.IGNORECASE)
 
 Rows = Bool[np.ndarray, " n"]
 
@@ -58,30 +53,29 @@ def recognise(readings: Readings) -> list[Recognised]:
     InputError
         If a unit is missing or wrong.
     """
+    said = said_of(readings.block, readings.name)
+    _find_time(readings)
+    _as_extension(readings, said)
     rows = np.ones(len(readings), bool)
+    in_time = readings.alone("time")
     if readings.has("omega", "Gp", "Gpp"):
         return [_oscillatory(readings)]
-    if readings.has("time", "tensile_stress"):
-        return [Recognised("run", rows, "an extension: it has a tensile stress over time")]
+    if in_time and readings.has("tensile_stress"):
+        flow = said.test if said is not None and said.test in ("planar", "biaxial") else "uniaxial"
+        return [Recognised("run", rows, f"an extension, {flow}: a tensile stress over time")]
     if readings.has("Gp", "Gpp") and not readings.has("omega") and readings.alone("strain"):
         return [Recognised("amplitude_sweep", rows, "moduli against strain, without a frequency")]
     in_flow = readings.has("stress") and (readings.has("shear_rate") or readings.has("strain"))
-    if readings.has("time") and in_flow:
+    if in_time and in_flow:
         # rows that lack a number are counted when the rest is taken
-        return [replace(_in_time(readings), rows=rows)]
-    if readings.has("time", "relaxation_modulus"):
+        return [replace(_in_time(readings, said), rows=rows)]
+    if in_time and readings.has("relaxation_modulus"):
         return [Recognised("relaxation", rows, "it has a relaxation modulus over time")]
-    if readings.has("time", "compliance"):
+    if in_time and readings.has("compliance"):
         return [Recognised("creep", rows, "it has a compliance over time")]
     if readings.has("stress", "shear_rate"):
-        return [Recognised("flow_curve", rows, "it has stress and rate, and no time")]
+        return [_without_time(readings)]
     return [Recognised("none", rows, "")]
-
-
-def spread(values: Float[np.ndarray, " n"]) -> float:
-    """Return the width of the middle nine tenths of values over their median; inf if that is 0."""
-    low, middle, high = np.percentile(values, [5.0, 50.0, 95.0])
-    return float((high - low) / abs(middle)) if middle else np.inf
 
 
 def _ratio(values: Float[np.ndarray, " n"]) -> float:
@@ -144,63 +138,104 @@ def _of(readings: Readings, key: str, rows: Rows) -> Float[np.ndarray, " m"]:
     return values[rows]
 
 
-def _in_time(readings: Readings) -> Recognised:
-    has_rate = readings.has("shear_rate")
-    kept = whole(readings, "time", "stress", "shear_rate" if has_rate else "strain")
+def _in_time(readings: Readings, said: Said | None) -> Recognised:
+    moved = [key for key in ("shear_rate", "strain") if readings.has(key)]
+    kept = whole(readings, "time", "stress", moved[0])
     if np.sum(kept) < _FEWEST:
         return Recognised("run", kept, "a record in time")
-    time, stress = _of(readings, "time", kept), _of(readings, "stress", kept)
-    strain = readings.get("strain")
-    strain = None if strain is None else strain[kept]
+    strain = _of(readings, "strain", kept) if "strain" in moved else None
     if strain is not None and not np.all(np.isfinite(strain)):
         strain = None
-    rate = _of(readings, "shear_rate", kept) if has_rate else None
-    name = readings.block.name or readings.name
-    if rate is None:
-        assert strain is not None
-        moved = np.gradient(strain, time) if np.all(np.diff(time) > 0.0) else np.diff(strain)
+    rate = _of(readings, "shear_rate", kept) if moved[0] == "shear_rate" else None
+    time, stress = (_of(readings, key, kept) for key in ("time", "stress"))
+    kind, why = kind_of_course(Course(time, stress, rate, strain), said)
+    return Recognised(kind, kept, why)
+
+
+def _without_time(readings: Readings) -> Recognised:
+    """Return a flow curve, or why stresses and rates without a time are none."""
+    rows = whole(readings, "stress", "shear_rate")
+    found = Recognised(
+        "flow_curve", np.ones(len(readings), bool), "it has stress and rate, and no time"
+    )
+    if np.sum(rows) < _FEWEST:
+        return found
+    rate, stress = _of(readings, "shear_rate", rows), _of(readings, "stress", rows)
+    ways = up_and_down(rate, stress)
+    if alternates(rate) or alternates(stress):
+        why = "an oscillation, as rate or stress swing to and fro"
+    elif not np.any(rate) or np.ptp(np.percentile(rate, [5.0, 95.0])) < 0.1 * np.max(np.abs(rate)):
+        why = "a record at one rate, and no flow curve"
+    elif _waits(rate, stress):
+        why = "records at one rate after the other, and no flow curve"
+    elif ways is not None and ways.apart:
+        why = f"a loop whose ways up and down are {ways.described} at the same rates, so no flow "
+        why += "curve of steady states"
     else:
-        moved = rate
-    if alternates(strain if strain is not None else moved) or alternates(stress):
-        if strain is not None and purer(time, stress, strain):
-            return Recognised("creep", kept, "the stress is a sine and the strain is not")
-        return Recognised("run", kept, "an oscillation, sample by sample")
-    if rate is not None and _steps(rate) and not _RAMP.search(name):
-        span = f"{np.min(np.abs(rate)):.3g} to {np.max(np.abs(rate)):.3g} 1/s"
-        return Recognised("flow_curve", kept, f"every row has another rate, {span}")
-    if rate is not None and _steps(stress) and _STEADY.search(name):
-        return Recognised("flow_curve", kept, "every row has another stress, and its name says so")
-    steady_rate = spread(moved) < _CONSTANT
-    if strain is not None and not (steady_rate and not _CREEP.search(name)):
-        steady_stress = spread(stress) < _CONSTANT
-        rises = np.ptp(strain) > _CONSTANT * np.max(np.abs(strain))
-        if rises and (steady_stress or _CREEP.search(name)):
-            return Recognised("creep", kept, "the stress is constant, and the strain grows")
-        if _RAMP.search(name) and _rougher(time, moved, stress):
-            return Recognised("creep", kept, "a ramp of stress, which the strain follows")
-        # held: what is left of the rise of the strain lies before the middle of the record
-        late = strain[len(strain) // 4 :]
-        if abs(np.median(strain)) > 0.0 and spread(late) < _CONSTANT and not steady_rate:
-            return Recognised("relaxation", kept, "the strain is held, and the stress relaxes")
-    return Recognised("run", kept, "a flow at a given rate, over time")
+        return found
+    unread = [
+        shown(name)
+        for i, (name, _) in enumerate(readings.block.columns)
+        if name and i not in readings.columns.values()
+    ]
+    why += ", and no column is known as its time. "
+    if unread:
+        why += f'Name it, as in --column time="{unread[0]}"; not read: {", ".join(unread[:8])}'
+    else:
+        why += "Export it with its time, or add a column of it"
+    return Recognised("none", found.rows, why)
 
 
-def _steps(rate: Float[np.ndarray, " n"]) -> bool:
-    """Return whether every row has another rate, in order, over a factor of three or more."""
-    size = np.abs(rate)
-    if len(rate) < _FEWEST or np.any(size == 0.0) or not (np.all(rate > 0) or np.all(rate < 0)):
-        return False
-    steps = np.diff(np.log(size))
-    larger = np.abs(steps) > 0.01
-    one_way = max(np.mean(steps[larger] > 0), np.mean(steps[larger] < 0)) if larger.any() else 0.0
-    return bool(np.mean(larger) > 0.9 and one_way > 0.9 and size.max() > 3.0 * size.min())
+def _waits(rate: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> bool:
+    """Return whether the stress changes while the rate is held, in several rows at each rate."""
+    size = np.max(np.abs(rate))
+    pieces = np.split(np.arange(len(rate)), np.flatnonzero(np.abs(np.diff(rate)) > 1e-3 * size) + 1)
+    long = [piece for piece in pieces if len(piece) > _FEWEST]
+    changes = [np.ptp(stress[piece]) > APART * np.max(np.abs(stress[piece])) for piece in long]
+    return sum(map(len, long)) > 0.8 * len(rate) and any(changes)
 
 
-def _rougher(time, answer, imposed) -> bool:
-    """Return whether one record is rougher than another by a factor of ten."""
+def _find_time(readings: Readings) -> None:
+    """Take for the time a column in a unit of time that nothing else is known by, if it rises."""
+    if readings.alone("time") or "time" in readings.mapping.columns:
+        return
+    for i in _unread_in(readings, TIME):
+        cells = [float(row[i]) for row in readings.block.cells if is_number(row[i])]
+        if len(cells) >= _FEWEST and np.all(np.diff(cells) > 0.0):
+            readings.columns["time"] = i
+            return
 
-    def roughness(values):
-        middle = np.interp(time[1:-1], time[::2], values[::2])
-        return np.median(np.abs(values[1:-1] - middle)) / (np.ptp(values) or 1.0)
 
-    return bool(roughness(answer) > 10.0 * roughness(imposed))
+_OF_TENSION = {
+    "stress": "tensile_stress", "shear_rate": "hencky_rate", "strain": "hencky_strain",
+}  # fmt: skip
+
+
+def _as_extension(readings: Readings, said: Said | None) -> None:
+    """Take stress, rate and strain for those of an extension, where words or other columns say so.
+
+    A column that is called one of shear stays it.
+    """
+    tensile = set(_OF_TENSION.values()) & set(readings.columns)
+    if not tensile and (said is None or said.test not in ("uniaxial", "planar", "biaxial")):
+        return
+    for shear, extension in _OF_TENSION.items():
+        at = readings.columns.get(shear)
+        if at is None and shear == "shear_rate":
+            at = next(_unread_in(readings, SHEAR_RATE), None)
+        if at is None or extension in readings.columns:
+            continue
+        if not _SHEAR.search(readings.block.columns[at][0]):
+            readings.columns.pop(shear, None)
+            readings.columns[extension] = at
+
+
+def _unread_in(readings: Readings, quantity: Quantity) -> Iterator[int]:
+    """Yield the columns with a name in a unit of a quantity that nothing is known by."""
+    for i, (name, unit) in enumerate(readings.block.columns):
+        known = read_unit(unit) if unit and i not in readings.columns.values() else None
+        if name and known is not None and factor_to(known, quantity) is not None:
+            yield i
+
+
+_SHEAR = re.compile(r"shear|scher|schub|cisaill|cizall|cortante|taglio|xy|12", re.IGNORECASE)

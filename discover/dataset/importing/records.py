@@ -5,21 +5,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.importing.in_time import AT_REST, CONSTANT, spread, strain_of, up_and_down
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, goes_on
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.recognition import Recognised, spread, whole
+from discover.dataset.importing.recognition import Recognised, whole
 from discover.errors import InputError
 
 Values = Float[np.ndarray, " n"]
 
 _REACHED = 0.95
 """Share of a step of strain from which on it counts as put on."""
-
-_CONSTANT = 0.03
-_AT_REST = 0.02
-"""Rate or stress over that of the step before, below which it is none."""
 
 
 @dataclass
@@ -149,6 +146,9 @@ def _flow_curve(readings: Readings, found: Recognised) -> Record:
         made.table |= {"shear_rate": -rate, "stress": -stress}
         made.notes.append("rate and stress, both negative, are taken without their signs")
     _keep(made, (made.table["shear_rate"] > 0.0) & (made.table["stress"] > 0.0), "no steady flow")
+    ways = up_and_down(made.table["shear_rate"], made.table["stress"])
+    if ways is not None:
+        made.notes.append(f"the ways up and down in rate are {ways.described}")
     if time is not None and len(time) > 1:
         strains = np.abs(made.table["shear_rate"]) * np.median(np.abs(np.diff(time)))
         few = int(np.sum(strains < 2.0))
@@ -176,12 +176,16 @@ def _run(readings: Readings, found: Recognised) -> Record:
         made = _table(
             readings,
             found,
-            ("time", "tensile_stress"),
-            ("hencky_rate",) if readings.has("hencky_rate") else ("hencky_strain",),
+            (
+                "time",
+                "tensile_stress",
+                "hencky_rate" if readings.has("hencky_rate") else "hencky_strain",
+            ),
         )
         _begin(made, readings)
-        made.conditions["flow"] = "uniaxial"
-        made.notes.append("taken as uniaxial; write planar or biaxial in runs.csv if it is not")
+        flow = next((word for word in ("planar", "biaxial") if word in found.why), "uniaxial")
+        made.conditions["flow"] = flow
+        made.notes.append(f"taken as {flow}; write another flow in runs.csv if it is not")
         return made
     moved = ("shear_rate",) if readings.has("shear_rate") else ("strain",)
     besides = ("N1", "N2", "strain") if moved[0] == "shear_rate" else ("N1", "N2")
@@ -206,13 +210,31 @@ def _start(made: Record) -> None:
 
 
 def _creep(readings: Readings, found: Recognised) -> Record:
-    if not readings.has("stress", "strain"):
+    moved = "strain" if readings.has("strain") else "shear_rate"
+    if not readings.has("stress", moved):
         return _function_of_time(readings, found, "compliance")
-    made = _table(readings, found, ("time", "stress", "strain"))
+    made = _table(readings, found, ("time", "stress", moved))
     _begin(made, readings)
+    # the clock of a recovery in the same block may start again
+    starts = np.flatnonzero(np.diff(made.table["time"]) < -0.5 * made.table["time"][:-1]) + 1
+    first, *others = (
+        dict(zip(made.table, piece, strict=True))
+        for piece in zip(*(np.split(v, starts) for v in made.table.values()), strict=True)
+    )
+    made.table = _with_strain(first)
+    if moved == "shear_rate":
+        made.notes.append("the strain is the integral of the rate from t = 0 on")
     made.conditions["control"] = "stress"
+    for other in others:
+        made = _followed(made, _with_strain(other))
     _start(made)
     return made
+
+
+def _with_strain(table: dict[str, Values]) -> dict[str, Values]:
+    """Return time, stress and strain, which is the integral of the rate where that stands."""
+    strain = table["strain"] if "strain" in table else strain_of(table["time"], table["shear_rate"])
+    return {"time": table["time"], "stress": table["stress"], "strain": strain}
 
 
 def _relaxation(readings: Readings, found: Recognised) -> Record:
@@ -250,15 +272,15 @@ def _after(made: Record, before: Record) -> Record:
     rate = made.table.get("shear_rate", np.zeros(1))
     if "rate_before_1_s" in before.conditions:
         level = float(before.conditions["rate_before_1_s"])
-        if made.kind == "run" and np.median(np.abs(rate)) < _AT_REST * abs(level):
+        if made.kind == "run" and np.median(np.abs(rate)) < AT_REST * abs(level):
             made.kind, made.notes = "none", ["a rest: it goes on from the relaxation before it"]
         return made
     if before.conditions or rate_before is None or not np.median(rate_before):
         return made
-    if spread(rate_before) >= _CONSTANT:
+    if spread(rate_before) >= CONSTANT:
         return made
     level = float(np.median(rate_before))
-    if np.median(np.abs(rate)) < _AT_REST * abs(level):
+    if np.median(np.abs(rate)) < AT_REST * abs(level):
         share = made.table["stress"][0] / before.table["stress"][-1]
         if 0.3 < share < 1.2:
             zeros = np.zeros(len(made.table["time"]))
@@ -299,25 +321,37 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
 
 def joined(creep: Record, recovery: Readings) -> Record | None:
     """Return creep and the recovery after it as one test; None if a block is no such recovery."""
-    if creep.conditions.get("control") != "stress" or not recovery.has("time", "stress", "strain"):
+    moved = "strain" if recovery.has("strain") else "shear_rate"
+    keys = ("time", "stress", moved)
+    if creep.conditions.get("control") != "stress" or not recovery.has(*keys):
         return None
-    rows = whole(recovery, "time", "stress", "strain")
+    rows = whole(recovery, *keys)
     if not rows.any():
         return None
-    time, stress, strain = (recovery.get(key)[rows] for key in ("time", "stress", "strain"))  # type: ignore[index]
-    time = time - recovery.begins
+    table = {key: recovery.get(key)[rows] for key in keys}  # type: ignore[index]
     level = float(np.median(np.abs(creep.table["stress"])))
-    if np.percentile(np.abs(stress), 90.0) > _AT_REST * level:
+    if np.percentile(np.abs(table["stress"]), 90.0) > AT_REST * level:
         return None
+    table["time"] = table["time"] - recovery.begins
+    table["stress"] = np.zeros(int(np.sum(rows)))
+    return _followed(creep, _with_strain(table))
+
+
+def _followed(creep: Record, after: dict[str, Values]) -> Record:
+    """Return a test at given stress with what follows it, whose clock and strain may start again.
+
+    Parameters
+    ----------
+    after
+        Time in s, stress in Pa and strain of what follows.
+    """
+    time, strain = after["time"], after["strain"]
     end, last = float(creep.table["time"][-1]), float(creep.table["strain"][-1])
     if abs(strain[0]) < 0.2 * abs(last):  # counted from the start of the recovery
         strain = last + strain if np.median(strain) * last < 0.0 else last - strain
     time = time + end if time[0] < end else time
     later = time > end
-    table = {
-        "time": np.concatenate([creep.table["time"], time[later]]),
-        "stress": np.concatenate([creep.table["stress"], np.zeros(int(np.sum(later)))]),
-        "strain": np.concatenate([creep.table["strain"], strain[later]]),
-    }
+    more = {"time": time, "stress": after["stress"], "strain": strain}
+    table = {key: np.concatenate([creep.table[key], v[later]]) for key, v in more.items()}
     notes = [*creep.notes, f"with the recovery after {end:.4g} s as one run"]
     return Record("creep", table, creep.conditions, creep.temperature, creep.dropped, notes)

@@ -78,4 +78,6 @@ def read_reptate(path: Path) -> list[Block]:
             f"{path.name} does not say its {needed[0]} on the first line, as a {suffix} file of "
             f"RepTate does. Write {needed[0]}=…; there."
         )
-    return [Block(suffix[1:], (*wanted, *further), cells, data[0] + 1, constants)]
+    # of a creep file `rec` says that the strain is the recovered one
+    name = "recovery" if float(given.get("rec", 0)) else suffix[1:]
+    return [Block(name, (*wanted, *further), cells, data[0] + 1, constants)]

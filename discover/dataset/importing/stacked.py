@@ -149,7 +149,9 @@ def _by_set_value(readings: Readings, piece: _Piece) -> list[_Piece]:
         rises = all(np.all(np.diff(time[np.isin(piece.rows, part.rows)]) > 0.0) for part in parts)
         if len(parts) > 1 and rises and (len(best) == 1 or len(parts) < len(best)):
             best = parts
-    return best
+    # one after the other, as creep and recovery are, they may be one sample's
+    in_turn = all(np.all(np.diff(part.rows) == 1) for part in best)
+    return [replace(part, apart=piece.apart) for part in best] if in_turn else best
 
 
 def _by_restart(readings: Readings, piece: _Piece) -> list[_Piece]:

@@ -75,6 +75,8 @@ class Block:
         Whether what stands before it in the file is another sample, or another temperature.
     told_by
         Names of the columns that tell it from the other tests of one table.
+    above
+        Those lines: of the file's head, and since the block before, the nearest last.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Block:
     over: tuple[str, ...] = ()
     apart: bool = False
     told_by: tuple[str, ...] = ()
+    above: tuple[tuple[str, ...], ...] = ()
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
@@ -149,6 +152,7 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     over: tuple[str, ...] = ()
     above: list[Sequence[str]] = list(rows[: header_row or 0])
     read, i = 0, header_row or 0
+    head: Rows = ()
     while i < len(rows):
         if not _is_numbers(rows[i]):
             above.append(rows[i])
@@ -161,8 +165,10 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
         if any(any(row) for row in rows[read:i]) or not read:
             header, over = _header(rows, i, header_row)
         if header is not None:
+            head = head or rows[:i]
+            words = (*head, *rows[read:i]) if read else head
             made = _by_label(rows, i, end, header, constants_of(above))
-            blocks += (replace(block, over=over) for block in made)
+            blocks += (replace(block, over=over, above=tuple(map(tuple, words))) for block in made)
         elif end - i >= _FEWEST:  # without names: to be left out with a word
             width = max(map(len, rows[i:end]))
             blocks.append(Block("", (("", ""),) * width, _padded(rows[i:end], width), i + 1))
