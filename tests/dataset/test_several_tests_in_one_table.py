@@ -247,4 +247,5 @@ def test_creep_and_recovery_in_one_table_stay_one_run(tmp_path):
     out, _ = imported(tmp_path, "a.csv", rows)
     (test,) = load_dataset(out)
     assert test.protocol.control == "stress"
+    assert test.strain is not None
     np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
