@@ -53,7 +53,7 @@ def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
     """
     readings = Readings.of(block, mapping, name)
     pieces = [_Piece(np.arange(len(readings)), block.apart)]
-    for split in (_by_words, _by_temperature, _by_set_value, _by_restart):
+    for split in (_by_words, _by_temperature, _by_restart, _by_set_value):
         pieces = [part for piece in pieces for part in split(readings, piece)]
     if len(pieces) == 1:
         return [block]
