@@ -1,4 +1,4 @@
-"""What errors of the declared moduli, as a linear sweep leaves them, change in records and fits."""
+"""Changes of records and fits with errors of moduli and solvent, as a linear sweep leaves them."""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,7 +14,8 @@ _SHIFT = 0.1
 def modulus_shifts(
     model: AugmentedModel, theta: Float[np.ndarray, " p"], batch: Batch
 ) -> Float[np.ndarray, "k runs n"]:
-    """Return the change of the weighted residuals with each independent error of the moduli.
+    """Return the change of the weighted residuals with each independent error of the moduli, and of
+    the solvent where the sweep has one.
 
     An error of each has unit variance. Empty where the moduli are exact.
     """
@@ -22,8 +23,11 @@ def modulus_shifts(
     if declared.modulus_covariance is None:
         return np.zeros((0, *np.shape(batch.weight)))
 
-    def residuals(step: Float[np.ndarray, " k"]) -> np.ndarray:
-        return model.at_moduli(declared.modulus + step).residuals([theta], batch)[0]
+    k = len(declared.modulus)
+
+    def residuals(step: Float[np.ndarray, " c"]) -> np.ndarray:
+        solvent = declared.solvent_viscosity + step[k] if len(step) > k else None
+        return model.at_moduli(declared.modulus + step[:k], solvent).residuals([theta], batch)[0]
 
     steps = _SHIFT * root_of(declared.modulus_covariance).T
     found = [(residuals(step) - residuals(-step)) / (2.0 * _SHIFT) for step in steps]

@@ -38,7 +38,7 @@ def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
         raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
 
 
-def _as_covariance(value: ArrayLike | None) -> Float[Array, "k k"] | None:
+def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
     return None if value is None else jnp.asarray(value, dtype=jnp.result_type(float))
 
 
@@ -51,7 +51,8 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-        The dimensionless law; a `LawOfEachMode` where its constants differ from mode to mode.
+        The dimensionless law, by default upper convected Maxwell; a `LawOfEachMode` where its
+        constants differ from mode to mode.
     modulus
         G_k, shape (k,), in Pa.
     relaxation_time
@@ -59,8 +60,9 @@ class Fluid(eqx.Module):
     solvent_viscosity
         η_s, in Pa s.
     modulus_covariance
-        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; None where
-        they are exact. Learners widen their intervals by it; no flow depends on it.
+        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; of one with a
+        solvent its row and column come last, shape (k + 1, k + 1). None where they are exact.
+        Learners widen their intervals by it; no flow depends on it.
 
     Examples
     --------
@@ -70,11 +72,11 @@ class Fluid(eqx.Module):
     2
     """
 
-    law: AbstractConstitutiveLaw
-    modulus: Float[Array, " k"] = eqx.field(converter=_as_modes)
-    relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes)
+    law: AbstractConstitutiveLaw = eqx.field(default_factory=UpperConvectedMaxwell)
+    modulus: Float[Array, " k"] = eqx.field(converter=_as_modes, default=1.0)
+    relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes, default=1.0)
     solvent_viscosity: Float[Array, ""] = eqx.field(converter=as_parameter, default=0.0)
-    modulus_covariance: Float[Array, "k k"] | None = eqx.field(
+    modulus_covariance: Float[Array, "c c"] | None = eqx.field(
         converter=_as_covariance, default=None
     )
 
@@ -121,10 +123,12 @@ class Fluid(eqx.Module):
         cls,
         sweep: HasSpectrum | None,
         law: AbstractConstitutiveLaw | None = None,
-        solvent_viscosity: float = 0.0,
         **options: Any,
     ) -> "Fluid":
-        """Return the fluid with the modes of a linear sweep, as ``modes = "lve"`` in a study.
+        """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
+
+        An elastic constant is its last and slowest mode, of the shortest time that the sweep
+        cannot tell from a constant.
 
         Parameters
         ----------
@@ -132,10 +136,9 @@ class Fluid(eqx.Module):
             Small-amplitude data, such as `Dataset.linear_sweep`.
         law
             The law of every mode; by default upper convected Maxwell.
-        solvent_viscosity
-            η_s, in Pa s.
         **options
-            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+            As of `discover.dataset.relaxation_spectrum`: `modes`, `most_modes`, `tolerance`, and
+            `solvent_viscosity` and `elastic_modulus` where they are known.
 
         Raises
         ------
@@ -157,7 +160,7 @@ class Fluid(eqx.Module):
             UpperConvectedMaxwell() if law is None else law,
             spectrum.modulus,
             spectrum.relaxation_time,
-            solvent_viscosity,
+            getattr(spectrum, "solvent_viscosity", 0.0),
             getattr(spectrum, "modulus_covariance", None),
         )
 

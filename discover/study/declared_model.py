@@ -20,7 +20,11 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
-from discover.study.schema import Study
+from discover.study.schema import Model, Study
+from discover.words import counted
+
+_UNRELAXED = 1e3
+"""Longest runs, and slowest modes, within which a declared elastic constant does not relax."""
 
 MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 """Constants of the modes that may be left to be fitted."""
@@ -75,13 +79,18 @@ class DeclaredModel:
 
     @property
     def modulus_covariance(self) -> np.ndarray | None:
-        """Of the moduli in Pa², shape (k, k), as the sweep leaves them; None without one."""
+        """Of the moduli in Pa², and of a solvent behind them, as the sweep leaves them.
+
+        None without a sweep.
+        """
         spectrum = self.spectrum
         if spectrum is None or spectrum.modulus_covariance is None:
             return None
         if spectrum.modulus.shape != self.modulus.shape:
             return None
         factor = self.modulus / spectrum.modulus  # a gain that was fitted, or another loading
+        if len(spectrum.modulus_covariance) > len(factor):
+            factor = np.append(factor, self.solvent_viscosity / spectrum.solvent_viscosity)
         return spectrum.modulus_covariance * np.outer(factor, factor)
 
     @property
@@ -141,24 +150,27 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     law = make_law(name, parameters)
     if not model.known_relaxation:
         law = UpperConvectedMaxwell(linear_relaxation=False)
-    spectrum = None
-    if model.modes == "lve":
-        if dataset.linear_sweep is None:
-            raise InputError(
-                f'modes = "lve" needs a linear sweep, but {dataset.name!r} has no lve.csv. Give '
-                "modulus_Pa and relaxation_time_s, or add the file."
-            )
-        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, model.sweep_rad_s))
+    spectrum, solvent = None, model.solvent_viscosity_Pa_s
+    if model.modes is not None:
+        spectrum = _of_sweep(model, dataset)
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
+        solvent = spectrum.solvent_viscosity
     else:
         start = _linear_start(dataset)
         modulus, relaxation_time = (
-            np.array([start[key] if value == "fit" else float(value)])
+            np.atleast_1d(np.asarray(start[key] if value == "fit" else value, dtype=float))
             for key, value in (
                 ("modulus_Pa", model.modulus_Pa),
                 ("relaxation_time_s", model.relaxation_time_s),
             )
         )
+        if model.elastic_modulus_Pa:
+            still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
+            modulus = np.append(modulus, model.elastic_modulus_Pa)
+            relaxation_time = np.append(relaxation_time, still)
+        if solvent == "fit":
+            effects = (*effects, *known_effects({"solvent_viscosity": "fit"}, "[model]"))
+            solvent = 0.0
     # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
     free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     return DeclaredModel(
@@ -169,7 +181,7 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         relaxation_time,
         tuple(free),
         spectrum,
-        model.solvent_viscosity_Pa_s,
+        float(solvent or 0.0),
         effects,
         by_mode=model.by_mode,
         choice=model.choice,
@@ -198,6 +210,32 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
         fit_relaxation_time="relaxation_time_s" in declared.free,
         **options,
     )
+
+
+def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
+    """Return the spectrum that a study asks of the linear sweep."""
+    if dataset.linear_sweep is None:
+        raise InputError(
+            f"modes = {model.modes!r} needs a linear sweep, but {dataset.name!r} has no lve.csv. "
+            "Give modulus_Pa and relaxation_time_s, or add the file."
+        )
+    spectrum = relaxation_spectrum(
+        _usable(dataset.linear_sweep, model.sweep_rad_s),
+        modes=None if model.modes == "lve" else model.modes,
+        solvent_viscosity=model.solvent_viscosity_Pa_s,
+        elastic_modulus=model.elastic_modulus_Pa,
+    )
+    if model.modes != "lve" and len(spectrum) != model.modes:
+        raise InputError(
+            f"The sweep supports {counted(len(spectrum), 'mode')}, and modes = {model.modes} asks "
+            'for that many exactly. Write fewer, or modes = "lve".'
+        )
+    return spectrum
+
+
+def _longest(dataset: Dataset) -> float:
+    """Return the longest duration of a run in s."""
+    return max((float(run.time[-1]) for run in dataset if run.protocol.control != "steady"), default=1.0)
 
 
 FOUND_LAW = "a law found before"
@@ -279,14 +317,18 @@ def _spectrum_of(
     times = np.array(found.equation.relaxation_time)
     if dataset.linear_sweep is None:
         return None
-    try:
-        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window))
-    except InputError:
-        return None  # a sweep too short for modes, which were given as numbers then
-    if spectrum.relaxation_time.shape != times.shape:
-        return None
-    factor = times / spectrum.relaxation_time
-    return spectrum if np.ptp(factor) <= _SAME_MODES * np.max(factor) else None
+    solvent = found.equation.solvent_viscosity
+    # of the sweep alone, beside a solvent that was declared, and with a number of modes given
+    for options in ({}, {"solvent_viscosity": solvent}, {"modes": len(times)}):
+        try:
+            spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window), **options)
+        except InputError:
+            return None  # a sweep too short for modes, which were given as numbers then
+        if spectrum.relaxation_time.shape == times.shape:
+            factor = times / spectrum.relaxation_time
+            if np.ptp(factor) <= _SAME_MODES * np.max(factor):
+                return spectrum
+    return None
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:
