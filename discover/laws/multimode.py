@@ -38,6 +38,16 @@ def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
         raise InputError(f"The modes of a fluid are numbers, in Pa and s; got {value!r}.") from None
 
 
+def moduli_and_solvent(
+    amounts: Float[Array, " c"], n_modes: int, solvent_viscosity: ArrayLike
+) -> tuple[Float[Array, " k"], ArrayLike]:
+    """Return moduli, and the solvent viscosity where it stands behind them; else as it is given.
+
+    Errors of a sweep are of both, and laws are drawn with both.
+    """
+    return amounts[:n_modes], amounts[n_modes] if len(amounts) > n_modes else solvent_viscosity
+
+
 def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
     return None if value is None else jnp.asarray(value, dtype=jnp.result_type(float))
 

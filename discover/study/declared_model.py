@@ -235,7 +235,9 @@ def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
 
 def _longest(dataset: Dataset) -> float:
     """Return the longest duration of a run in s."""
-    return max((float(run.time[-1]) for run in dataset if run.protocol.control != "steady"), default=1.0)
+    return max(
+        (float(run.time[-1]) for run in dataset if run.protocol.control != "steady"), default=1.0
+    )
 
 
 FOUND_LAW = "a law found before"

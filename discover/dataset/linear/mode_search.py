@@ -70,7 +70,9 @@ def relative_moduli(
     """
     x = frequency[:, None] * times
     storage, loss = measured
-    columns = [np.concatenate([x**2 / (1 + x**2) / storage[:, None], x / (1 + x**2) / loss[:, None]])]
+    columns = [
+        np.concatenate([x**2 / (1 + x**2) / storage[:, None], x / (1 + x**2) / loss[:, None]])
+    ]
     zero = np.zeros_like(frequency)
     if solvent:
         columns.append(np.concatenate([zero, frequency / loss])[:, None])
@@ -243,15 +245,19 @@ class ModeSearch:
         def slopes(logs: np.ndarray) -> np.ndarray:
             times, amounts = np.exp(np.clip(logs[:k], low, high)), np.exp(logs[k:])
             x = self.frequency[:, None] * times
-            per_time = np.concatenate([
-                2 * x**2 / (1 + x**2) ** 2 / self.measured[0][:, None],
-                x * (1 - x**2) / (1 + x**2) ** 2 / self.measured[1][:, None],
-            ])
+            per_time = np.concatenate(
+                [
+                    2 * x**2 / (1 + x**2) ** 2 / self.measured[0][:, None],
+                    x * (1 - x**2) / (1 + x**2) ** 2 / self.measured[1][:, None],
+                ]
+            )
             inside = (logs[:k] > low) & (logs[:k] < high)
-            return np.hstack([
-                np.where(inside, per_time * amounts[:k], 0.0),
-                self._design(times, *kinds) * amounts,
-            ])
+            return np.hstack(
+                [
+                    np.where(inside, per_time * amounts[:k], 0.0),
+                    self._design(times, *kinds) * amounts,
+                ]
+            )
 
         start = np.log(np.concatenate([fit.relaxation_time, amounts]))
         with np.errstate(over="ignore", invalid="ignore"):
