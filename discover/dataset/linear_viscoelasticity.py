@@ -20,6 +20,12 @@ MOST_MODES = 30
 FLOOR = 0.01
 """A relative error below which no pattern is worth a word: rheometers are not that accurate."""
 
+_SOLID = (
+    "the material is a solid down to {:.4g} rad/s, with an elastic constant of {:.4g} Pa. A law of "
+    "a fluid holds it as a mode of {:.3g} s, the shortest that the sweep allows: do not use what "
+    "it says of steady flow, or of times as long."
+)
+
 Constant = float | Literal["fit"] | None
 """A constant that is known, that is fitted, or that evidence asks for."""
 
@@ -123,8 +129,10 @@ class RelaxationSpectrum:
     solvent_viscosity
         η_s in Pa s; 0 where there is none.
     elastic_modulus
-        G_e in Pa of a solid; 0 where there is none. A fluid holds it as the last and slowest mode,
-        whose time is the shortest that the sweep cannot tell from a constant.
+        G_e in Pa; 0 where there is none. A fluid holds it as the last and slowest mode, whose time
+        is the shortest that the sweep cannot tell from a constant.
+    solid
+        What is to be known where it is more than G″ at the lowest frequency; else empty.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -136,6 +144,7 @@ class RelaxationSpectrum:
     pattern: float | None = 0.0
     solvent_viscosity: float = 0.0
     elastic_modulus: float = 0.0
+    solid: str = ""
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -273,9 +282,11 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
     if elastic > 0.0:
         modulus = np.append(modulus, elastic)
         times = np.append(times, search.elastic_time(fit))
-    found = RelaxationSpectrum(
-        modulus, times, 0.0, 0.0, {}, solvent_viscosity=solvent, elastic_modulus=elastic
-    )
+    slowest = int(np.argmin(sweep.angular_frequency))
+    solid = ""
+    if elastic > sweep.loss_modulus[slowest]:
+        solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
+    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, 0.0, solvent, elastic, solid)
     return replace(found, relative_error=rms(_misfit(sweep, found)))
 
 

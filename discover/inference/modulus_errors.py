@@ -14,10 +14,10 @@ _SHIFT = 0.1
 def modulus_shifts(
     model: AugmentedModel, theta: Float[np.ndarray, " p"], batch: Batch
 ) -> Float[np.ndarray, "k runs n"]:
-    """Return the change of the weighted residuals with each independent error of the moduli, and of
-    the solvent where the sweep has one.
+    """Return the change of the weighted residuals with each independent error of the moduli.
 
-    An error of each has unit variance. Empty where the moduli are exact.
+    Of the solvent too, where the sweep has one. An error of each has unit variance. Empty where the
+    moduli are exact.
     """
     declared = model.declared
     if declared.modulus_covariance is None:

@@ -1,5 +1,6 @@
 """A fluid: one law in each of several relaxation modes, with units."""
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -166,6 +167,8 @@ class Fluid(eqx.Module):
                 f"{type(sweep).__name__}."
             )
         spectrum = sweep.relaxation_spectrum(**options)
+        if solid := getattr(spectrum, "solid", ""):
+            warnings.warn(f"Linear sweep: {solid}", stacklevel=2)
         return cls(
             UpperConvectedMaxwell() if law is None else law,
             spectrum.modulus,

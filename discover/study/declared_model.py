@@ -1,5 +1,6 @@
 """From a study to its declared fluid."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,7 @@ from discover.laws.registry import LAWS, make_law, starting_value
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Model, Study
-from discover.words import counted
+from discover.words import counted, percent_of
 
 _UNRELAXED = 1e3
 """Longest runs, and slowest modes, within which a declared elastic constant does not relax."""
@@ -56,6 +57,8 @@ class DeclaredModel:
         Parameters of the law, and effects, that may differ from mode to mode.
     choice
         Named laws to choose the law from; none where it is declared.
+    solid
+        What is to be known of an elastic constant among the modes; empty where there is none.
     """
 
     law: AbstractConstitutiveLaw
@@ -70,6 +73,17 @@ class DeclaredModel:
     source: str = ""
     by_mode: tuple[str, ...] = ()
     choice: tuple[str, ...] = ()
+    solid: str = ""
+
+    @property
+    def modes_in_words(self) -> str:
+        """Relaxation modes and solvent, and where they come from."""
+        text = counted(len(self.modulus), "relaxation mode")
+        if self.solvent_viscosity:
+            text += f" and a solvent of {self.solvent_viscosity:.4g} Pa s"
+        if self.spectrum is not None:
+            text += f" from the linear sweep (error {percent_of(self.spectrum.relative_error)})"
+        return f"{text}; {self.solid.rstrip('.')}" if self.solid else text
 
     @property
     def free_constants(self) -> tuple[str, ...]:
@@ -150,11 +164,11 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     law = make_law(name, parameters)
     if not model.known_relaxation:
         law = UpperConvectedMaxwell(linear_relaxation=False)
-    spectrum, solvent = None, model.solvent_viscosity_Pa_s
+    spectrum, solvent, solid = None, model.solvent_viscosity_Pa_s, ""
     if model.modes is not None:
         spectrum = _of_sweep(model, dataset)
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
-        solvent = spectrum.solvent_viscosity
+        solvent, solid = spectrum.solvent_viscosity, spectrum.solid
     else:
         start = _linear_start(dataset)
         modulus, relaxation_time = (
@@ -166,11 +180,18 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         )
         if model.elastic_modulus_Pa:
             still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
+            solid = (
+                f"the material is a solid, with an elastic constant of {model.elastic_modulus_Pa:g}"
+                f" Pa. A law of a fluid holds it as a mode of {still:.3g} s: do not use what it "
+                "says of steady flow, or of times as long."
+            )
             modulus = np.append(modulus, model.elastic_modulus_Pa)
             relaxation_time = np.append(relaxation_time, still)
         if solvent == "fit":
             effects = (*effects, *known_effects({"solvent_viscosity": "fit"}, "[model]"))
             solvent = 0.0
+    if solid:
+        warnings.warn(f"Declared model: {solid}", stacklevel=2)
     # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
     free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     return DeclaredModel(
@@ -185,6 +206,7 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         effects,
         by_mode=model.by_mode,
         choice=model.choice,
+        solid=solid,
     )
 
 
@@ -235,9 +257,8 @@ def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
 
 def _longest(dataset: Dataset) -> float:
     """Return the longest duration of a run in s."""
-    return max(
-        (float(run.time[-1]) for run in dataset if run.protocol.control != "steady"), default=1.0
-    )
+    timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
+    return max((float(run.time[-1]) for run in timed), default=1.0)
 
 
 FOUND_LAW = "a law found before"
@@ -321,7 +342,8 @@ def _spectrum_of(
         return None
     solvent = found.equation.solvent_viscosity
     # of the sweep alone, beside a solvent that was declared, and with a number of modes given
-    for options in ({}, {"solvent_viscosity": solvent}, {"modes": len(times)}):
+    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
+    for options in asked:
         try:
             spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window), **options)
         except InputError:

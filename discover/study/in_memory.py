@@ -180,7 +180,9 @@ def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
         return None
     solvent, modes = float(base.solvent_viscosity), base.n_modes
     modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
-    for options in ({}, {"solvent_viscosity": solvent}, {"modes": modes}, {"most_modes": modes}):
+    known = {"solvent_viscosity": solvent}
+    asked: tuple[dict[str, Any], ...] = ({}, known, {"modes": modes}, {"most_modes": modes})
+    for options in asked:
         try:
             found = relaxation_spectrum(data.linear_sweep, **options)
         except InputError:

@@ -192,8 +192,8 @@ class Model(Section):
             )
         if self.elastic_modulus_Pa == "fit" and self.modes is None:
             raise ValueError(
-                'elastic_modulus_Pa = "fit" is fitted to the sweep, which modes = "lve" or a number '
-                "of modes reads; write one of them, or the value in Pa"
+                'elastic_modulus_Pa = "fit" is fitted to the sweep, which modes = "lve" or a '
+                "number of modes reads; write one of them, or the value in Pa"
             )
         if self.sweep_rad_s is not None and not self.sweep_rad_s[0] < self.sweep_rad_s[1]:
             raise ValueError(f"sweep_rad_s must be [low, high]; got {list(self.sweep_rad_s)}")

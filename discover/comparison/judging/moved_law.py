@@ -113,9 +113,7 @@ class MovedLaw:
         return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
 
     def of_moduli(self, flow: Flow) -> Float[np.ndarray, "c n"] | None:
-        """Return the change of the record in a flow per relative change of each mode's modulus, and
-        of the solvent where there is one.
-        """
+        """Return the change of the record per relative change of each modulus and a solvent."""
         return self._once("moduli", flow, self._moved_moduli)
 
     def of_further_modes(

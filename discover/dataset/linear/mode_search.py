@@ -65,8 +65,9 @@ def relative_moduli(
     solvent: bool = False,
     elastic: bool = False,
 ) -> Float[np.ndarray, "rows c"]:
-    """Return G′ and G″ of modes of 1 Pa, a solvent of 1 Pa s and 1 Pa of elasticity over those
-    measured, one column each.
+    """Return G′ and G″ over those measured, a column for each mode, solvent and elastic constant.
+
+    Modes and elastic constant are of 1 Pa, the solvent is of 1 Pa s.
     """
     x = frequency[:, None] * times
     storage, loss = measured
@@ -273,8 +274,7 @@ class ModeSearch:
         return self._named(times[order], amounts, *kinds, float(np.sum(misfit(end) ** 2)))
 
     def _criterion(self, fit: ModeFit) -> float:
-        """Return twice the negative log evidence, by Schwarz's approximation   [Schwarz 1978,
-        Ann. Stat. 6, 461].
+        """Return twice the negative log evidence   [Schwarz 1978, Ann. Stat. 6, 461].
 
         Solvent and elastic constant have a prior that is even from zero to the most that the sweep
         leaves room for, the smallest G″/ω and G′; where they are told well, the share of it that

@@ -27,7 +27,8 @@ class DenseDraws:
     weights
         Adding up to one, shape (draws,).
     moduli
-        In Pa, shape (draws, k), the solvent behind them where a sweep told it; None where all have those declared.
+        In Pa, shape (draws, k), the solvent behind them where a sweep told it; None where all have
+        those declared.
     relaxation
         One where the reference laws bring −σ along, else zero.
     optima

@@ -187,7 +187,8 @@ def predict_many(
     """Return the weighted predictions of many laws of the same terms, without sensitivities.
 
     Parameters as in `observe`, with a leading axis of laws, and moduli of each law in Pa, the
-    solvent viscosity behind them or not, by default those of the problem. Not finite where a law runs away.
+    solvent viscosity behind them or not, by default those of the problem. Not finite where a law
+    runs away.
     """
 
     def run(problem, numbers, protocol, grid):
