@@ -231,7 +231,7 @@ def relaxation_spectrum(
         )
     known = {"solvent_viscosity": solvent_viscosity, "elastic_modulus": elastic_modulus}
     for name, value in known.items():
-        if value not in (None, "fit") and not (_is_number(value) and 0.0 <= value < np.inf):
+        if value is not None and value != "fit" and not _is_amount(value):
             raise InputError(f'{name} must be a number, not negative, or "fit"; got {value!r}.')
     measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
     search = ModeSearch(sweep.angular_frequency, measured, solvent_viscosity, elastic_modulus)
@@ -265,19 +265,21 @@ def relaxation_spectrum(
     )
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
+def _is_amount(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and 0.0 <= float(value) < np.inf
+
+
+def _value(known: Constant, fitted: float | None) -> float:
+    """Return a constant that was fitted, or else is known, or else is not there."""
+    if fitted is not None:
+        return fitted
+    return 0.0 if known is None or isinstance(known, str) else float(known)
 
 
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
     """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
-    solvent, elastic = (
-        float(value or 0.0) if isinstance(value, Real | None) and of_fit is None else float(of_fit)
-        for value, of_fit in (
-            (search.solvent_viscosity, fit.solvent_viscosity),
-            (search.elastic_modulus, fit.elastic_modulus),
-        )
-    )
+    solvent = _value(search.solvent_viscosity, fit.solvent_viscosity)
+    elastic = _value(search.elastic_modulus, fit.elastic_modulus)
     modulus, times = fit.modulus, fit.relaxation_time
     if elastic > 0.0:
         modulus = np.append(modulus, elastic)

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -102,8 +103,8 @@ class ModeSearch:
 
     frequency: Float[np.ndarray, " n"]
     measured: Float[np.ndarray, "2 n"]
-    solvent_viscosity: float | str | None = None
-    elastic_modulus: float | str | None = None
+    solvent_viscosity: float | Literal["fit"] | None = None
+    elastic_modulus: float | Literal["fit"] | None = None
     bounds: tuple[float, float] = field(init=False)
 
     def __post_init__(self):
@@ -118,7 +119,7 @@ class ModeSearch:
         return 1.0 - self._design(np.zeros(0), True, True) @ np.array(held)
 
     @property
-    def _asked(self) -> tuple[float | str | None, float | str | None]:
+    def _asked(self) -> tuple[Any, Any]:
         return self.solvent_viscosity, self.elastic_modulus
 
     def fits(self, fewest: int = 0) -> Iterator[ModeFit]:
@@ -262,10 +263,9 @@ class ModeSearch:
 
         start = np.log(np.concatenate([fit.relaxation_time, amounts]))
         with np.errstate(over="ignore", invalid="ignore"):
-            end = least_squares(
-                misfit, start, slopes, method="lm", ftol=tolerance, xtol=tolerance, gtol=tolerance,
-                max_nfev=evaluations,
-            ).x  # fmt: skip
+            limits_of = {"ftol": tolerance, "xtol": tolerance, "gtol": tolerance}
+            options: dict[str, Any] = {"jac": slopes, "method": "lm", "max_nfev": evaluations}
+            end = least_squares(misfit, start, **limits_of, **options).x
         if not np.all(np.isfinite(misfit(end))):
             return fit
         times, amounts = np.exp(np.clip(end[:k], low, high)), np.exp(end[k:])
