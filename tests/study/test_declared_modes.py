@@ -1,5 +1,7 @@
 """Modes, solvent and elastic constant as a study declares them, beside a sweep written by hand."""
 
+import tomllib
+
 import numpy as np
 import pytest
 
@@ -21,8 +23,8 @@ def sweep(elastic=0.0):
 
 
 def declared(*lines, elastic=0.0):
-    text = "\n".join(['[data]\nfolder = "x"\n[model]', *lines])
-    return declared_model(parse_study(text), Dataset("x", (), sweep(elastic)))
+    content = tomllib.loads("\n".join(["[data]", 'folder = "x"', "[model]", *lines]))
+    return declared_model(parse_study(content), Dataset("x", (), sweep(elastic)))
 
 
 def test_the_solvent_of_the_sweep_is_found_and_its_error_handed_on():
@@ -48,9 +50,7 @@ def test_modes_may_be_listed_or_counted():
     assert model.solvent_viscosity == 0.0
     assert len(declared("modes = 3").modulus) == 3
     free = declared("modulus_Pa = 3.0", 'solvent_viscosity_Pa_s = "fit"')
-    assert [(one.name, one.free) for one in free.effects] == [("solvent_viscosity", ("eta",))] or (
-        free.effects[0].name == "solvent_viscosity" and free.effects[0].free
-    )
+    assert [one.name for one in free.effects if one.free] == ["solvent_viscosity"]
 
 
 def test_a_solid_is_a_mode_that_does_not_relax_and_is_named():
@@ -76,7 +76,7 @@ def test_a_solid_is_a_mode_that_does_not_relax_and_is_named():
         (['elastic_modulus_Pa = "fit"'], "modes"),
         (["solvent_viscosity_Pa_s = -1"], "solvent_viscosity_Pa_s"),
         (["modulus_Pa = []", "relaxation_time_s = []"], "modulus_Pa"),
-        (["modes = 20"], "supports"),
+        (["modes = 40"], "modes"),
     ],
 )
 def test_modes_that_cannot_be_are_refused_by_name(lines, said):
