@@ -69,7 +69,7 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
         yield Finding("note", "samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
     yield from _inertia(sweep)
     if spectrum.solid:
-        yield Finding("warning", "sweep", SWEEP_FILE, f"{SWEEP_FILE}: {spectrum.solid}")
+        yield Finding("note", "sweep", SWEEP_FILE, f"{SWEEP_FILE}: {spectrum.solid}")
     if len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency):
         yield Finding(
             "note", "sweep", SWEEP_FILE, f"{SWEEP_FILE} holds some frequencies more than once."
