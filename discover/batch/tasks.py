@@ -12,7 +12,7 @@ from discover.progress import Progress
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
-from discover.words import counted, percent_of
+from discover.words import counted
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -161,14 +161,12 @@ def run_close_loop(
     progress("drawing", 0.97)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
-    modes = counted(len(model.modulus), "relaxation mode")
-    if model.spectrum is not None:
-        modes += f" from the linear sweep (error {percent_of(model.spectrum.relative_error)})"
     summary = (
         f"Data: {data_of_study.dataset.name}, {counted(len(data_of_study.fit), 'run')} fitted, "
         f"{'each' if each else len(data_of_study.held_out)} held out"
         f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {_chosen(result) or model.described}, {modes}{_beside(model)}. "
+        f"Declared model: {_chosen(result) or model.described}, {model.modes_in_words}"
+        f"{_beside(model)}. "
         f"{f'{model.source} ' if model.source else ''}"
         f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
     ).strip()

@@ -54,4 +54,7 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     title = model.law_name if named is None else named.described(model.parameters)
     modes = len(model.modulus)
     source = " from the linear sweep" if study.model.from_ is None else ""
-    return title if modes == 1 else f"{title}, {modes} relaxation modes{source}"
+    text = title if modes == 1 else f"{title}, {modes} relaxation modes{source}"
+    if model.solvent_viscosity:
+        text += f", a solvent of {model.solvent_viscosity:.4g} Pa s"
+    return f"{text}; {model.solid.rstrip('.')}" if model.solid else text

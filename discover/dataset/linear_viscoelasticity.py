@@ -1,15 +1,14 @@
 """A linear frequency sweep, and a spectrum of relaxation modes from it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
-from typing import Any
+from numbers import Real
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
-from scipy.optimize import nnls
 
+from discover.dataset.linear.mode_search import ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.columns import as_column
 from discover.errors import InputError
 from discover.statistics.noise.independent_samples import independent_samples
@@ -18,13 +17,17 @@ from discover.statistics.projection import rms
 from discover.statistics.residual import slow_part
 
 MOST_MODES = 30
-TOLERANCE = 1.5
 FLOOR = 0.01
-"""A relative error below which no sweep is worth fitting: rheometers are not that accurate."""
+"""A relative error below which no pattern is worth a word: rheometers are not that accurate."""
 
-MARGINS = (0.0, 0.25, 0.5)
+_SOLID = (
+    "the material is a solid down to {:.4g} rad/s, with an elastic constant of {:.4g} Pa. A law of "
+    "a fluid holds it as a mode of {:.3g} s, the shortest that the sweep allows: do not use what "
+    "it says of steady flow, or of times as long."
+)
 
-_Fit = Callable[[int, float], tuple[np.ndarray, np.ndarray, float]]
+Constant = float | Literal["fit"] | None
+"""A constant that is known, that is fitted, or that evidence asks for."""
 
 _SEEMS_NOISE = 0.05
 """Probability that noise leaves such a misfit, up to which it is taken to be none."""
@@ -84,7 +87,7 @@ class LinearSweep:
         Parameters
         ----------
         **options
-            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+            As of `discover.dataset.relaxation_spectrum`.
         """
         return relaxation_spectrum(self, **options)
 
@@ -101,7 +104,7 @@ class LinearSweep:
 
 @dataclass(frozen=True)
 class RelaxationSpectrum:
-    """Discrete relaxation spectrum, G(t) = Σ G_k exp(−t/λ_k).
+    """Discrete relaxation spectrum, G(t) = Σ G_k exp(−t/λ_k), with a solvent.
 
     Attributes
     ----------
@@ -117,12 +120,19 @@ class RelaxationSpectrum:
         Error against the number of modes, the best for each number.
     modulus_covariance
         Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
-        leaves them, with frequencies that err alike counted as one; None where they do not come
-        from one.
+        leaves them, with frequencies that err alike counted as one; with a solvent its row and
+        column come last, in Pa s. None where they do not come from a sweep.
     pattern
         Root mean square of what in that misfit is no noise, and may be of modes too few to follow
         the sweep; 0 where all of it may be noise. None where no number of modes follows it: it is
         off by itself, and excuses no pattern in records.
+    solvent_viscosity
+        η_s in Pa s; 0 where there is none.
+    elastic_modulus
+        G_e in Pa; 0 where there is none. A fluid holds it as the last and slowest mode, whose time
+        is the shortest that the sweep cannot tell from a constant.
+    solid
+        What is to be known where it is more than G″ at the lowest frequency; else empty.
     """
 
     modulus: Float[np.ndarray, " k"]
@@ -130,159 +140,188 @@ class RelaxationSpectrum:
     relative_error: float
     best_error: float
     errors: dict[int, float]
-    modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    modulus_covariance: Float[np.ndarray, "c c"] | None = None
     pattern: float | None = 0.0
+    solvent_viscosity: float = 0.0
+    elastic_modulus: float = 0.0
+    solid: str = ""
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
 
     @property
     def zero_shear_viscosity(self) -> float:
-        """η₀ = Σ G_k λ_k, in Pa s."""
-        return float(np.sum(self.modulus * self.relaxation_time))
+        """η₀ = Σ G_k λ_k + η_s of the modes that relax, in Pa s."""
+        modulus, time = self._relaxing
+        return float(np.sum(modulus * time)) + self.solvent_viscosity
+
+    @property
+    def mean_relaxation_time(self) -> float:
+        """Σ G_k λ_k² / η₀ of the modes that relax, in s."""
+        modulus, time = self._relaxing
+        return float(np.sum(modulus * time**2)) / self.zero_shear_viscosity if len(time) else 0.0
+
+    @property
+    def _relaxing(self) -> tuple[np.ndarray, np.ndarray]:
+        last = len(self) - (self.elastic_modulus > 0.0)
+        return self.modulus[:last], self.relaxation_time[:last]
 
     def moduli(
         self, angular_frequency: Float[np.ndarray, " n"]
     ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """Return G′ and G″ in Pa at frequencies in rad/s."""
         x = angular_frequency[:, None] * self.relaxation_time
-        return (x**2 / (1 + x**2)) @ self.modulus, (x / (1 + x**2)) @ self.modulus
+        storage, loss = (x**2 / (1 + x**2)) @ self.modulus, (x / (1 + x**2)) @ self.modulus
+        return storage, loss + self.solvent_viscosity * angular_frequency
 
 
 def relaxation_spectrum(
-    sweep: LinearSweep, most_modes: int = MOST_MODES, tolerance: float = TOLERANCE
+    sweep: LinearSweep,
+    most_modes: int = MOST_MODES,
+    tolerance: float = 1.0,
+    *,
+    modes: int | None = None,
+    solvent_viscosity: Constant = None,
+    elastic_modulus: Constant = None,
 ) -> RelaxationSpectrum:
-    """Return the spectrum with the fewest modes that fits nearly as well as any.
+    """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
-    Relaxation times are spaced evenly in log time over the range of the sweep, widened by up to
-    half a decade on each side; moduli come from non-negative least squares on the relative misfit
-    of G′ and G″   [Baumgärtel & Winter 1989, Rheol. Acta 28, 511, for the aim; NNLS: Lawson &
-    Hanson 1974]. Grids of 1 to `most_modes` times are tried; moduli that come out zero are not
-    modes. Chosen is the spectrum with the fewest modes whose error is within the factor
-    `tolerance` of the smallest error found, or below 1 %, whichever is the larger.
+    G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k and all
+    constants positive are fitted to the relative misfit of G′ and G″. Relaxation times are fitted
+    along, up to a decade beyond the sweep. How many modes there are, and whether there is a
+    solvent and an elastic constant, evidence decides (`ModeSearch`).
 
     Parameters
     ----------
     sweep
         G′ and G″.
     most_modes
-        Largest number of relaxation times tried.
+        Largest number of modes, that of an elastic constant included.
     tolerance
-        How much worse than the best a spectrum may be, as a factor of 1 or more.
+        By which factor a spectrum of fewer modes may fit worse than that of the highest evidence,
+        1 or more.
+    modes
+        Exact number of modes, that of an elastic constant included; None leaves it to evidence.
+    solvent_viscosity, elastic_modulus
+        In Pa s and Pa where known beforehand; ``"fit"`` includes it without asking for evidence.
 
     Raises
     ------
     InputError
         If the sweep is too short or an argument is out of range.
     """
-    if len(sweep.angular_frequency) < 2:
+    count = len(sweep)
+    if count < 2:
         raise InputError(
-            "A relaxation spectrum needs a sweep of at least 2 frequencies; got "
-            f"{len(sweep.angular_frequency)}."
+            f"A relaxation spectrum needs a sweep of at least 2 frequencies; got {count}."
         )
     if most_modes < 1 or tolerance < 1.0:
         raise InputError(
             f"most_modes must be at least 1 and tolerance at least 1; got {most_modes} and "
             f"{tolerance}."
         )
+    if modes is not None and not 1 <= modes <= count:
+        raise InputError(
+            f"modes must be from 1 to the number of frequencies, {count}; got {modes}."
+        )
     if np.any(sweep.storage_modulus <= 0) or np.any(sweep.loss_modulus <= 0):
         raise InputError(
             "A relaxation spectrum needs moduli that are positive at every frequency. Remove the "
             "others."
         )
-    # more unknowns than data would fit the noise
-    count, fit = len(sweep.angular_frequency), cache(partial(_fit, sweep))
-    found = fewest_modes(fit, min(most_modes, count), tolerance)
-    modulus, time, error = min(_trials(fit, min(MOST_MODES, count)), key=lambda one: one[2])
-    best = replace(found, modulus=modulus, relaxation_time=time, relative_error=error)
+    known = {"solvent_viscosity": solvent_viscosity, "elastic_modulus": elastic_modulus}
+    for name, value in known.items():
+        if value is not None and value != "fit" and not _is_amount(value):
+            raise InputError(f'{name} must be a number, not negative, or "fit"; got {value!r}.')
+    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
+    search = ModeSearch(sweep.angular_frequency, measured, solvent_viscosity, elastic_modulus)
+    held = 0 if elastic_modulus in (None, "fit", 0.0) else 1  # a known constant is a mode too
+    fits = list(search.fits(0 if modes is None else modes - held))
+    possible = [fit for fit in fits if fit.n_modes + held <= most_modes] or [
+        min(fits, key=lambda fit: fit.n_modes)
+    ]
+    if modes is not None:
+        possible = [fit for fit in possible if fit.n_modes + held == modes] or possible
+    likeliest = min(possible, key=lambda fit: fit.criterion)
+    within = [fit for fit in possible if fit.squared <= tolerance**2 * likeliest.squared]
+    if tolerance > 1.0:
+        likeliest = min(within, key=lambda fit: (fit.n_modes, fit.criterion))
+    found = _as_spectrum(sweep, search, search.closely(likeliest))
+    best = _as_spectrum(sweep, search, min(fits, key=lambda fit: fit.squared))
+    errors: dict[int, float] = {}
+    for fit in fits:
+        error = float(np.sqrt(fit.squared / measured.size))
+        errors[fit.n_modes + held] = min(error, errors.get(fit.n_modes + held, np.inf))
     rows = _misfit(sweep, found)
     is_noise = _seems_noise(rows)
+    least = min(fit.squared / max(measured.size - fit.n_constants, 1) for fit in fits)
+    coarse = rms(rows) ** 2 * rows.size / max(rows.size - likeliest.n_constants, 1) - least
     return replace(
         found,
+        best_error=best.relative_error,
+        errors=dict(sorted(errors.items())),
         modulus_covariance=_covariance(sweep, found, rows, is_noise),
-        pattern=_pattern(found, rows, is_noise, _misfit(sweep, best)),
+        pattern=_pattern(rows, is_noise, coarse, _misfit(sweep, best)),
     )
 
 
-def fewest_modes(
-    fit: _Fit,
-    most: int,
-    tolerance: float = TOLERANCE,
-) -> RelaxationSpectrum:
-    """Return the spectrum with the fewest modes of those that fit nearly as well as any.
-
-    Parameters
-    ----------
-    fit
-        Moduli in Pa, relaxation times in s and relative error, of a number of modes and of how far
-        their times go beyond the data, in decades.
-    most
-        Largest number of modes.
-    tolerance
-        How much worse than the best a spectrum may be, as a factor of 1 or more.
-    """
-    trials = _trials(fit, most)
-    best = min(error for _, _, error in trials)
-    errors: dict[int, float] = {}
-    for modulus, _, error in trials:
-        errors[len(modulus)] = min(error, errors.get(len(modulus), np.inf))
-    within = [trial for trial in trials if trial[2] <= max(tolerance * best, FLOOR)]
-    modulus, relaxation_time, error = min(within, key=lambda trial: (len(trial[0]), trial[2]))
-    return RelaxationSpectrum(modulus, relaxation_time, error, best, dict(sorted(errors.items())))
+def _is_amount(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool) and 0.0 <= float(value) < np.inf
 
 
-def _trials(fit: _Fit, most: int) -> list[tuple[np.ndarray, np.ndarray, float]]:
-    return [fit(n, margin) for n in range(1, most + 1) for margin in MARGINS[: 2 * n]]
+def _value(known: Constant, fitted: float | None) -> float:
+    """Return a constant that was fitted, or else is known, or else is not there."""
+    if fitted is not None:
+        return fitted
+    return 0.0 if known is None or isinstance(known, str) else float(known)
 
 
-def _fit(sweep: LinearSweep, n: int, margin: float) -> tuple[np.ndarray, np.ndarray, float]:
-    frequency = sweep.angular_frequency
-    longest = 10.0**margin / frequency.min()
-    shortest = 10.0**-margin / frequency.max()
-    times = np.geomspace(shortest, longest, n) if n > 1 else np.array([(longest * shortest) ** 0.5])
-    design = _relative_moduli(sweep, times)
-    # columns of similar size: moduli may span many decades
-    scale = np.linalg.norm(design, axis=0)
-    modulus, _ = nnls(design / scale, np.ones(len(design)), maxiter=100 * n + 100)
-    modulus = modulus / scale
-    error = rms(design @ modulus - 1.0)
-    keep = modulus > 0
-    return modulus[keep], times[keep], error
+def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
+    """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
+    solvent = _value(search.solvent_viscosity, fit.solvent_viscosity)
+    elastic = _value(search.elastic_modulus, fit.elastic_modulus)
+    modulus, times = fit.modulus, fit.relaxation_time
+    if elastic > 0.0:
+        modulus = np.append(modulus, elastic)
+        times = np.append(times, search.elastic_time(fit))
+    slowest = int(np.argmin(sweep.angular_frequency))
+    solid = ""
+    if elastic > sweep.loss_modulus[slowest]:
+        solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
+    found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, 0.0, solvent, elastic, solid)
+    return replace(found, relative_error=rms(_misfit(sweep, found)))
 
 
-def _relative_moduli(sweep: LinearSweep, times: Float[np.ndarray, " k"]) -> np.ndarray:
-    """Return G′ and G″ of modes of 1 Pa over those measured, shape (2n, k), in 1/Pa."""
-    x = sweep.angular_frequency[:, None] * times
-    return np.concatenate(
-        [
-            x**2 / (1 + x**2) / sweep.storage_modulus[:, None],
-            x / (1 + x**2) / sweep.loss_modulus[:, None],
-        ]
-    )
+def _relative_moduli(sweep: LinearSweep, found: RelaxationSpectrum, solvent: bool) -> np.ndarray:
+    """Return G′ and G″ of each constant over those measured, shape (2n, constants)."""
+    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
+    return relative_moduli(sweep.angular_frequency, measured, found.relaxation_time, solvent)
 
 
 def _covariance(
     sweep: LinearSweep, found: RelaxationSpectrum, rows: Float[np.ndarray, "2 n"], is_noise: bool
-) -> Float[np.ndarray, "k k"]:
-    """Return s² (AᵀA)⁻¹ of the moduli, s² the misfit for each degree of freedom that is left.
+) -> Float[np.ndarray, "c c"]:
+    """Return s² (AᵀA)⁻¹ of moduli and solvent, s² the misfit for each degree of freedom left.
 
     Where the misfit is no noise, neighbouring frequencies err alike, and so many of them count as
     one as the autocorrelation of the misfit says: a sweep at a strain that is not small, or of a
     tool with inertia, is off by something smooth, which the moduli take up as far as they can.
+    At given times: a change of a time and of its modulus moves G′ and G″ as these errors do.
     """
-    design = _relative_moduli(sweep, found.relaxation_time) * found.modulus
-    free = max(len(design) - len(found), 1)
-    variance = np.sum((np.sum(design, axis=1) - 1.0) ** 2) / free
+    has_solvent = found.solvent_viscosity > 0.0
+    amounts = np.append(found.modulus, [found.solvent_viscosity] if has_solvent else [])
+    design = _relative_moduli(sweep, found, has_solvent) * amounts
+    variance = np.sum(rows**2) / max(rows.size - design.shape[1], 1)
     if not is_noise:
         variance *= rows.size / sum(independent_samples(row) for row in rows)
-    return variance * np.linalg.pinv(design.T @ design) * np.outer(found.modulus, found.modulus)
+    return variance * np.linalg.pinv(design.T @ design) * np.outer(amounts, amounts)
 
 
 def _misfit(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "2 n"]:
-    """Return what modes miss G′ and G″ by, relative, along increasing frequency."""
-    design = _relative_moduli(sweep, found.relaxation_time)
+    """Return what a spectrum misses G′ and G″ by, relative, along increasing frequency."""
     order = np.argsort(sweep.angular_frequency)
-    return (design @ found.modulus - 1.0).reshape(2, -1)[:, order]
+    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
+    return (np.stack(found.moduli(sweep.angular_frequency)) / measured - 1.0)[:, order]
 
 
 def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
@@ -295,28 +334,20 @@ def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
 
 
 def _pattern(
-    found: RelaxationSpectrum,
-    rows: Float[np.ndarray, "2 n"],
-    is_noise: bool,
-    left: Float[np.ndarray, "2 n"],
+    rows: Float[np.ndarray, "2 n"], is_noise: bool, coarse: float, left: Float[np.ndarray, "2 n"]
 ) -> float | None:
     """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
     Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
-    leave less than these by more than the freedom that they have. Of a sweep too short to tell it
-    is all of the misfit. None if no number of modes leaves noise: `left` is of the best.
+    leave less than these by more than the freedom that they have, `coarse`, squared. Of a sweep too
+    short to tell it is all of the misfit. None if no number of modes leaves noise: `left` is of the
+    best.
     """
+    error = rms(rows)
     if rows.shape[1] < FEWEST_FAST:
-        return found.relative_error
-    count = rows.size
-
-    def variance(modes: int, error: float) -> float:
-        return error**2 * count / max(count - modes, 1)
-
-    least = min(variance(modes, error) for modes, error in found.errors.items())
-    coarse = np.sqrt(max(variance(len(found), found.relative_error) - least, 0.0))
+        return error
     slow = 0.0 if is_noise else _slow(rows)
-    pattern = min(max(slow, float(coarse)), found.relative_error)
+    pattern = min(max(slow, float(np.sqrt(max(coarse, 0.0)))), error)
     return None if _slow(left) > FLOOR and not _seems_noise(left) else pattern
 
 

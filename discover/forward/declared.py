@@ -52,7 +52,8 @@ class DeclaredModel:
         Relative size of what in that error is no noise of the linear data; 0 where all may be, None
         where no number of modes follows them.
     modulus_covariance
-        Of the moduli in Pa², shape (k, k), as those data leave them; None where they are exact.
+        Of the moduli in Pa², shape (k, k), as those data leave them, and of the solvent behind
+        them, shape (k + 1, k + 1), where it comes from them; None where they are exact.
     effects
         What is known beside the law: effects of fluid and instrument, with values or to be fitted.
     step_instants
@@ -84,7 +85,7 @@ class DeclaredModel:
     linear_pattern: float | None = 0.0
     effects: tuple[KnownEffect, ...] = ()
     by_mode: tuple[str, ...] = ()
-    modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    modulus_covariance: Float[np.ndarray, "c c"] | None = None
     step_instants: int = 0
     added_modes: int = 0
 

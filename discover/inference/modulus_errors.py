@@ -1,4 +1,4 @@
-"""What errors of the declared moduli, as a linear sweep leaves them, change in records and fits."""
+"""Changes of records and fits with errors of moduli and solvent, as a linear sweep leaves them."""
 
 import numpy as np
 from jaxtyping import Float
@@ -16,14 +16,18 @@ def modulus_shifts(
 ) -> Float[np.ndarray, "k runs n"]:
     """Return the change of the weighted residuals with each independent error of the moduli.
 
-    An error of each has unit variance. Empty where the moduli are exact.
+    Of the solvent too, where the sweep has one. An error of each has unit variance. Empty where the
+    moduli are exact.
     """
     declared = model.declared
     if declared.modulus_covariance is None:
         return np.zeros((0, *np.shape(batch.weight)))
 
-    def residuals(step: Float[np.ndarray, " k"]) -> np.ndarray:
-        return model.at_moduli(declared.modulus + step).residuals([theta], batch)[0]
+    k = len(declared.modulus)
+
+    def residuals(step: Float[np.ndarray, " c"]) -> np.ndarray:
+        solvent = declared.solvent_viscosity + step[k] if len(step) > k else None
+        return model.at_moduli(declared.modulus + step[:k], solvent).residuals([theta], batch)[0]
 
     steps = _SHIFT * root_of(declared.modulus_covariance).T
     found = [(residuals(step) - residuals(-step)) / (2.0 * _SHIFT) for step in steps]

@@ -1,5 +1,6 @@
 """A fluid: one law in each of several relaxation modes, with units."""
 
+import warnings
 from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
@@ -42,7 +43,17 @@ def _holds_traced(value: Any) -> bool:
     )
 
 
-def _as_covariance(value: ArrayLike | None) -> Float[Array, "k k"] | None:
+def moduli_and_solvent(
+    amounts: Float[Array, " c"], n_modes: int, solvent_viscosity: ArrayLike
+) -> tuple[Float[Array, " k"], ArrayLike]:
+    """Return moduli, and the solvent viscosity where it stands behind them; else as it is given.
+
+    Errors of a sweep are of both, and laws are drawn with both.
+    """
+    return amounts[:n_modes], amounts[n_modes] if len(amounts) > n_modes else solvent_viscosity
+
+
+def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
     return None if value is None else as_parameter(value)
 
 
@@ -55,7 +66,8 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-        The dimensionless law; a `LawOfEachMode` where its constants differ from mode to mode.
+        The dimensionless law, by default upper convected Maxwell; a `LawOfEachMode` where its
+        constants differ from mode to mode.
     modulus
         G_k, shape (k,), in Pa.
     relaxation_time
@@ -63,8 +75,9 @@ class Fluid(eqx.Module):
     solvent_viscosity
         η_s, in Pa s.
     modulus_covariance
-        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; None where
-        they are exact. Learners widen their intervals by it; no flow depends on it.
+        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; of one with a
+        solvent its row and column come last, shape (k + 1, k + 1). None where they are exact.
+        Learners widen their intervals by it; no flow depends on it.
 
     Examples
     --------
@@ -74,11 +87,11 @@ class Fluid(eqx.Module):
     2
     """
 
-    law: AbstractConstitutiveLaw
-    modulus: Float[Array, " k"] = eqx.field(converter=_as_modes)
-    relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes)
+    law: AbstractConstitutiveLaw = eqx.field(default_factory=UpperConvectedMaxwell)
+    modulus: Float[Array, " k"] = eqx.field(converter=_as_modes, default=1.0)
+    relaxation_time: Float[Array, " k"] = eqx.field(converter=_as_modes, default=1.0)
     solvent_viscosity: Float[Array, ""] = eqx.field(converter=as_parameter, default=0.0)
-    modulus_covariance: Float[Array, "k k"] | None = eqx.field(
+    modulus_covariance: Float[Array, "c c"] | None = eqx.field(
         converter=_as_covariance, default=None
     )
 
@@ -90,13 +103,12 @@ class Fluid(eqx.Module):
             )
         shape = self.relaxation_time.shape
         covariance = self.modulus_covariance
-        if self.solvent_viscosity.ndim or (
-            covariance is not None and covariance.shape != (*shape, *shape)
-        ):
+        amounts = {(k, k) for k in (*shape, *(n + 1 for n in shape))}  # a solvent's is the last
+        if self.solvent_viscosity.ndim or not (covariance is None or covariance.shape in amounts):
             raise InputError(
-                "The solvent viscosity of a fluid must be one number, and the covariance of its "
-                f"moduli a matrix of {len(shape) and shape[0]} rows; got the shapes "
-                f"{self.solvent_viscosity.shape} and {getattr(covariance, 'shape', None)}."
+                "A fluid needs one solvent viscosity, and a covariance of its moduli with a row "
+                f"and a column for each; got the shapes {self.solvent_viscosity.shape} and "
+                f"{None if covariance is None else covariance.shape}."
             )
         if self.modulus.shape != shape or len(shape) != 1 or not shape[0]:
             raise InputError(
@@ -134,10 +146,12 @@ class Fluid(eqx.Module):
         cls,
         sweep: HasSpectrum | None,
         law: AbstractConstitutiveLaw | None = None,
-        solvent_viscosity: float = 0.0,
         **options: Any,
     ) -> "Fluid":
-        """Return the fluid with the modes of a linear sweep, as ``modes = "lve"`` in a study.
+        """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
+
+        An elastic constant is its last and slowest mode, of the shortest time that the sweep
+        cannot tell from a constant.
 
         Parameters
         ----------
@@ -145,10 +159,9 @@ class Fluid(eqx.Module):
             Small-amplitude data, such as `Dataset.linear_sweep`.
         law
             The law of every mode; by default upper convected Maxwell.
-        solvent_viscosity
-            η_s, in Pa s.
         **options
-            `most_modes` and `tolerance` of `discover.dataset.relaxation_spectrum`.
+            As of `discover.dataset.relaxation_spectrum`: `modes`, `most_modes`, `tolerance`, and
+            `solvent_viscosity` and `elastic_modulus` where they are known.
 
         Raises
         ------
@@ -166,11 +179,13 @@ class Fluid(eqx.Module):
                 f"{type(sweep).__name__}."
             )
         spectrum = sweep.relaxation_spectrum(**options)
+        if solid := getattr(spectrum, "solid", ""):
+            warnings.warn(f"Linear sweep: {solid}", stacklevel=2)
         return cls(
             UpperConvectedMaxwell() if law is None else law,
             spectrum.modulus,
             spectrum.relaxation_time,
-            solvent_viscosity,
+            getattr(spectrum, "solvent_viscosity", 0.0),
             getattr(spectrum, "modulus_covariance", None),
         )
 

@@ -51,7 +51,7 @@ class KnownPart:
     relaxation_time: Float[np.ndarray, " k"]
     solvent_viscosity: float
     linear_relaxation: bool
-    modulus_covariance: Float[np.ndarray, "k k"] | None = None
+    modulus_covariance: Float[np.ndarray, "c c"] | None = None
 
     @property
     def fluid(self) -> Fluid:

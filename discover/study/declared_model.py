@@ -1,5 +1,6 @@
 """From a study to its declared fluid."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -20,7 +21,11 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
-from discover.study.schema import Study
+from discover.study.schema import Model, Study
+from discover.words import counted, percent_of
+
+_UNRELAXED = 1e3
+"""Longest runs, and slowest modes, within which a declared elastic constant does not relax."""
 
 MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 """Constants of the modes that may be left to be fitted."""
@@ -52,6 +57,8 @@ class DeclaredModel:
         Parameters of the law, and effects, that may differ from mode to mode.
     choice
         Named laws to choose the law from; none where it is declared.
+    solid
+        What is to be known of an elastic constant among the modes; empty where there is none.
     """
 
     law: AbstractConstitutiveLaw
@@ -66,6 +73,17 @@ class DeclaredModel:
     source: str = ""
     by_mode: tuple[str, ...] = ()
     choice: tuple[str, ...] = ()
+    solid: str = ""
+
+    @property
+    def modes_in_words(self) -> str:
+        """Relaxation modes and solvent, and where they come from."""
+        text = counted(len(self.modulus), "relaxation mode")
+        if self.solvent_viscosity:
+            text += f" and a solvent of {self.solvent_viscosity:.4g} Pa s"
+        if self.spectrum is not None:
+            text += f" from the linear sweep (error {percent_of(self.spectrum.relative_error)})"
+        return f"{text}; {self.solid.rstrip('.')}" if self.solid else text
 
     @property
     def free_constants(self) -> tuple[str, ...]:
@@ -75,13 +93,18 @@ class DeclaredModel:
 
     @property
     def modulus_covariance(self) -> np.ndarray | None:
-        """Of the moduli in Pa², shape (k, k), as the sweep leaves them; None without one."""
+        """Of the moduli in Pa², and of a solvent behind them, as the sweep leaves them.
+
+        None without a sweep.
+        """
         spectrum = self.spectrum
         if spectrum is None or spectrum.modulus_covariance is None:
             return None
         if spectrum.modulus.shape != self.modulus.shape:
             return None
         factor = self.modulus / spectrum.modulus  # a gain that was fitted, or another loading
+        if len(spectrum.modulus_covariance) > len(factor):
+            factor = np.append(factor, self.solvent_viscosity / spectrum.solvent_viscosity)
         return spectrum.modulus_covariance * np.outer(factor, factor)
 
     @property
@@ -141,24 +164,34 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     law = make_law(name, parameters)
     if not model.known_relaxation:
         law = UpperConvectedMaxwell(linear_relaxation=False)
-    spectrum = None
-    if model.modes == "lve":
-        if dataset.linear_sweep is None:
-            raise InputError(
-                f'modes = "lve" needs a linear sweep, but {dataset.name!r} has no lve.csv. Give '
-                "modulus_Pa and relaxation_time_s, or add the file."
-            )
-        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, model.sweep_rad_s))
+    spectrum, solvent, solid = None, model.solvent_viscosity_Pa_s, ""
+    if model.modes is not None:
+        spectrum = _of_sweep(model, dataset)
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
+        solvent, solid = spectrum.solvent_viscosity, spectrum.solid
     else:
         start = _linear_start(dataset)
         modulus, relaxation_time = (
-            np.array([start[key] if value == "fit" else float(value)])
+            np.atleast_1d(np.asarray(start[key] if value == "fit" else value, dtype=float))
             for key, value in (
                 ("modulus_Pa", model.modulus_Pa),
                 ("relaxation_time_s", model.relaxation_time_s),
             )
         )
+        if model.elastic_modulus_Pa:
+            still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
+            solid = (
+                f"the material is a solid, with an elastic constant of {model.elastic_modulus_Pa:g}"
+                f" Pa. A law of a fluid holds it as a mode of {still:.3g} s: do not use what it "
+                "says of steady flow, or of times as long."
+            )
+            modulus = np.append(modulus, model.elastic_modulus_Pa)
+            relaxation_time = np.append(relaxation_time, still)
+        if solvent == "fit":
+            effects = (*effects, *known_effects({"solvent_viscosity": "fit"}, "[model]"))
+            solvent = 0.0
+    if solid:
+        warnings.warn(f"Declared model: {solid}", stacklevel=2)
     # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
     free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
     return DeclaredModel(
@@ -169,10 +202,11 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         relaxation_time,
         tuple(free),
         spectrum,
-        model.solvent_viscosity_Pa_s,
+        float(solvent or 0.0),
         effects,
         by_mode=model.by_mode,
         choice=model.choice,
+        solid=solid,
     )
 
 
@@ -198,6 +232,33 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
         fit_relaxation_time="relaxation_time_s" in declared.free,
         **options,
     )
+
+
+def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
+    """Return the spectrum that a study asks of the linear sweep."""
+    if dataset.linear_sweep is None:
+        raise InputError(
+            f"modes = {model.modes!r} needs a linear sweep, but {dataset.name!r} has no lve.csv. "
+            "Give modulus_Pa and relaxation_time_s, or add the file."
+        )
+    spectrum = relaxation_spectrum(
+        _usable(dataset.linear_sweep, model.sweep_rad_s),
+        modes=None if model.modes == "lve" else model.modes,
+        solvent_viscosity=model.solvent_viscosity_Pa_s,
+        elastic_modulus=model.elastic_modulus_Pa,
+    )
+    if model.modes != "lve" and len(spectrum) != model.modes:
+        raise InputError(
+            f"The sweep supports {counted(len(spectrum), 'mode')}, and modes = {model.modes} asks "
+            'for that many exactly. Write fewer, or modes = "lve".'
+        )
+    return spectrum
+
+
+def _longest(dataset: Dataset) -> float:
+    """Return the longest duration of a run in s."""
+    timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
+    return max((float(run.time[-1]) for run in timed), default=1.0)
 
 
 FOUND_LAW = "a law found before"
@@ -279,14 +340,19 @@ def _spectrum_of(
     times = np.array(found.equation.relaxation_time)
     if dataset.linear_sweep is None:
         return None
-    try:
-        spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window))
-    except InputError:
-        return None  # a sweep too short for modes, which were given as numbers then
-    if spectrum.relaxation_time.shape != times.shape:
-        return None
-    factor = times / spectrum.relaxation_time
-    return spectrum if np.ptp(factor) <= _SAME_MODES * np.max(factor) else None
+    solvent = found.equation.solvent_viscosity
+    # of the sweep alone, beside a solvent that was declared, and with a number of modes given
+    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
+    for options in asked:
+        try:
+            spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window), **options)
+        except InputError:
+            return None  # a sweep too short for modes, which were given as numbers then
+        if spectrum.relaxation_time.shape == times.shape:
+            factor = times / spectrum.relaxation_time
+            if np.ptp(factor) <= _SAME_MODES * np.max(factor):
+                return spectrum
+    return None
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:

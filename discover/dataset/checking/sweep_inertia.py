@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
-from discover.dataset.linear_viscoelasticity import MARGINS, LinearSweep
+from discover.dataset.linear.mode_search import BEYOND, relative_moduli, solved
+from discover.dataset.linear_viscoelasticity import LinearSweep
 
 # Modes enough for any sweep of so many points; more would only fit its noise
 _POINTS_PER_MODE = 1.5
@@ -38,10 +38,11 @@ class SweepInertia:
 
 
 def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
-    """Return how much of G′ is inertia, with a sum of Maxwell modes as the fluid.
+    """Return how much of G′ is inertia, with Maxwell modes, a solvent and an elastic constant.
 
     The torque on tool and sample is G* − I ω² times the strain   [Krieger 1990, J. Rheol. 34, 471].
-    A sum of modes with positive moduli only rises in G′, so a G′ that falls with ω² is no fluid's.
+    Modes with positive moduli only rise in G′, so a G′ that falls with ω² is no material's; a
+    solvent raises G″ alone, and an elastic constant raises G′ at every frequency alike.
 
     Parameters
     ----------
@@ -55,12 +56,11 @@ def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
     falling = np.concatenate([-(omega**2) / size, zero])[:, None]
     n_modes = max(1, int(len(omega) / _POINTS_PER_MODE))
     trials = []
-    for margin in MARGINS:
+    for margin in np.linspace(0.0, BEYOND, 4):
         times = np.geomspace(10.0**-margin / omega.max(), 10.0**margin / omega.min(), n_modes)
-        x = omega[:, None] * times
-        modes = np.concatenate([x**2 / (1 + x**2), x / (1 + x**2)]) / np.tile(size, 2)[:, None]
+        modes = relative_moduli(omega, np.stack([size, size]), times, solvent=True, elastic=True)
         # either sign: the correction may have been too small or too large
-        trials.append((_fit(modes, data), _fit(np.hstack([modes, falling, -falling]), data)))
+        trials.append((solved(modes, data), solved(np.hstack([modes, falling, -falling]), data)))
     before = min((without for without, _ in trials), key=lambda fit: fit[1])
     after = min((with_it for _, with_it in trials), key=lambda fit: fit[1])
     inertia = float(after[0][-2] - after[0][-1])
@@ -75,11 +75,3 @@ def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
         float(np.sqrt(after[1] / n)),
         float(gain),
     )
-
-
-def _fit(design: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return coefficients of non-negative least squares, and the squared misfit."""
-    scale = np.linalg.norm(design, axis=0)
-    scale = np.where(scale > 0, scale, 1.0)
-    solution, residual = nnls(design / scale, data, maxiter=100 * design.shape[1] + 100)
-    return solution / scale, float(residual**2)

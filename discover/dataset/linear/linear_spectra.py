@@ -1,5 +1,6 @@
 """A spectrum of relaxation modes from any linear test, and what it says of the others."""
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,6 @@ from discover.dataset.linear_viscoelasticity import (
     FLOOR,
     MOST_MODES,
     RelaxationSpectrum,
-    fewest_modes,
     relaxation_spectrum,
 )
 
@@ -22,13 +22,45 @@ what is faster than its first sample it does not see."""
 
 Values = Float[np.ndarray, " n"]
 
+_MARGINS = (0.0, 0.25, 0.5)
+"""Decades by which relaxation times go beyond the samples."""
+
+_TOLERANCE = 1.5
+"""How much worse than the best a spectrum may be, as a factor."""
+
+_FASTER = 1e-3
+"""Of one over the highest frequency: the time of a mode that stands for a solvent."""
+
 
 def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
     """Return the modes of a linear test, the fewest that fit nearly as well as any."""
     if test.kind == SWEEP:
         return relaxation_spectrum(test.sweep)
     fit = _from_relaxation if test.kind == RELAXATION else _from_creep
-    return fewest_modes(partial(fit, test), min(MOST_MODES, len(test) // 2))
+    return _fewest_modes(partial(fit, test), min(MOST_MODES, len(test) // 2))
+
+
+def _fewest_modes(
+    fit: Callable[[int, float], tuple[np.ndarray, np.ndarray, float]], most: int
+) -> RelaxationSpectrum:
+    """Return the spectrum with the fewest modes of those that fit nearly as well as any.
+
+    Parameters
+    ----------
+    fit
+        Moduli in Pa, relaxation times in s and relative error, of a number of modes and of how far
+        their times go beyond the data, in decades.
+    most
+        Largest number of modes.
+    """
+    trials = [fit(n, margin) for n in range(1, most + 1) for margin in _MARGINS[: 2 * n]]
+    best = min(error for _, _, error in trials)
+    errors: dict[int, float] = {}
+    for modulus, _, error in trials:
+        errors[len(modulus)] = min(error, errors.get(len(modulus), np.inf))
+    within = [trial for trial in trials if trial[2] <= max(_TOLERANCE * best, FLOOR)]
+    modulus, relaxation_time, error = min(within, key=lambda trial: (len(trial[0]), trial[2]))
+    return RelaxationSpectrum(modulus, relaxation_time, error, best, dict(sorted(errors.items())))
 
 
 def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.ndarray:
@@ -50,7 +82,7 @@ def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.n
 
 
 def relaxation_modulus(spectrum: RelaxationSpectrum, time: Values) -> Values:
-    """Return G(t) = Σ G_k exp(−t/λ_k) in Pa at times in s."""
+    """Return G(t) = Σ G_k exp(−t/λ_k) in Pa at times in s; a solvent has none after t = 0."""
     return np.exp(-time[:, None] / spectrum.relaxation_time) @ spectrum.modulus
 
 

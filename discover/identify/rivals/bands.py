@@ -109,8 +109,8 @@ def prediction_bands(
         Draws of each law's parameters.
     """
     rng = np.random.default_rng(seed)
-    modulus = np.asarray(declared.modulus)
-    drawn = [draws(law, n_draws, rng, modulus) for law in (chosen, *rivals)]
+    amounts = np.append(np.asarray(declared.modulus), float(declared.solvent_viscosity))
+    drawn = [draws(law, n_draws, rng, amounts) for law in (chosen, *rivals)]
     flat = [law for group in drawn for law in group]
     predicted = predict_laws(fluid_of(flat, declared), protocols, times)
     sizes = [len(group) for group in drawn]

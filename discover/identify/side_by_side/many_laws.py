@@ -16,7 +16,7 @@ from discover.forward.enough_steps import in_enough_steps
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
+from discover.laws.multimode import Fluid, moduli_and_solvent
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
@@ -45,7 +45,8 @@ class Contender:
     modulus_errors
         Errors of the moduli that the covariance allows for; None where they are exact.
     modulus
-        Of this law in Pa, shape (k,); None for those declared.
+        Of this law in Pa, shape (k,), and behind them the solvent viscosity in Pa s where it is
+        not that declared; None for those declared.
     without_band
         Why nothing is known of the parameters' uncertainty; empty where something is.
     """
@@ -56,7 +57,7 @@ class Contender:
     drawn: Float[np.ndarray, "draws p"] | None = None
     without_band: str = ""
     modulus_errors: ModulusErrors | None = None
-    modulus: Float[np.ndarray, " k"] | None = None
+    modulus: Float[np.ndarray, " c"] | None = None
 
 
 def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
@@ -75,8 +76,9 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
     rows = [c.law.over(library) for c in contenders]
     coefficients, inner = (np.stack(part) for part in zip(*rows, strict=True))
 
-    declared_modulus = np.asarray(declared.modulus)
-    moduli = [declared_modulus if c.modulus is None else c.modulus for c in contenders]
+    amounts = np.append(np.asarray(declared.modulus), float(declared.solvent_viscosity))
+    own = [np.zeros(0) if c.modulus is None else c.modulus for c in contenders]
+    moduli = [np.append(given, amounts[len(given) :]) for given in own]
 
     def make(coefficients, inner, modulus):
         law = LibraryExpansion(
@@ -86,7 +88,8 @@ def fluid_of(contenders: Sequence[Contender], declared: Fluid) -> Fluid:
             linear_relaxation=declared.law.linear_relaxation,
             base=declared.law,
         )
-        return Fluid(law, modulus, declared.relaxation_time, declared.solvent_viscosity)
+        modes = moduli_and_solvent(modulus, declared.n_modes, 0.0)
+        return Fluid(law, modes[0], declared.relaxation_time, modes[1])
 
     stacked = (on_device(part) for part in (coefficients, inner, np.stack(moduli)))
     return eqx.filter_vmap(make)(*stacked)
@@ -96,11 +99,12 @@ def draws(
     contender: Contender,
     n_draws: int,
     rng: np.random.Generator,
-    modulus: Float[np.ndarray, " k"] | None = None,
+    modulus: Float[np.ndarray, " c"] | None = None,
 ) -> tuple[Contender, ...]:
     """Return laws with parameters drawn from the contender's uncertainty; itself comes first.
 
-    Moduli about `modulus` in Pa are drawn with them where they are uncertain too.
+    Moduli about `modulus` in Pa, and the solvent behind them, are drawn with them where they are
+    uncertain too.
 
     From a covariance by Latin hypercubes   [McKay, Beckman & Conover 1979, Technometrics 21, 239].
     """
@@ -117,7 +121,7 @@ def draws(
     errors, moduli = contender.modulus_errors, None
     if errors is not None and modulus is not None and contender.covariance is not None:
         moved = drawn - contender.law.values
-        moduli = modulus + errors.draw(moved, contender.covariance, rng)
+        moduli = modulus[: len(errors.root)] + errors.draw(moved, contender.covariance, rng)
     return (contender, *_with_parameters(contender, drawn, moduli))
 
 
@@ -156,7 +160,7 @@ def _is_uncertain(contender: Contender) -> bool:
 def _with_parameters(
     contender: Contender,
     values: Float[np.ndarray, "draws p"],
-    moduli: Float[np.ndarray, "draws k"] | None = None,
+    moduli: Float[np.ndarray, "draws c"] | None = None,
 ) -> list[Contender]:
     """Return the law with other parameters and, where they are given, other moduli."""
     own = [None] * len(values) if moduli is None else moduli

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, Int
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
+from discover.laws.multimode import Fluid, moduli_and_solvent
 from discover.programs import compiled
 from discover.statistics.one_more import one_more
 from discover.statistics.weighted_quantiles import weighted_quantiles
@@ -49,7 +49,7 @@ class WeightedLaws:
 
     laws: AbstractConstitutiveLaw
     weights: Float[np.ndarray, " laws"]
-    moduli: Float[np.ndarray, "laws k"] | None = None
+    moduli: Float[np.ndarray, "laws c"] | None = None
     kinds: Int[np.ndarray, " laws"] | None = None
 
     def bands(
@@ -111,7 +111,8 @@ def _predict(
 
     def of_law(numbers):
         law, modulus = numbers
-        fluid = Fluid(eqx.combine(law, rest), modulus, relaxation_time, solvent_viscosity)
+        modes = moduli_and_solvent(modulus, len(relaxation_time), solvent_viscosity)
+        fluid = Fluid(eqx.combine(law, rest), modes[0], relaxation_time, modes[1])
         return flows.over(partial(observed_on_grid, fluid))
 
     return jax.lax.map(of_law, (arrays, moduli), batch_size=_LAWS_AT_ONCE)

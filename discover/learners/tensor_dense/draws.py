@@ -27,7 +27,8 @@ class DenseDraws:
     weights
         Adding up to one, shape (draws,).
     moduli
-        In Pa, shape (draws, k); None where all have those declared.
+        In Pa, shape (draws, k), the solvent behind them where a sweep told it; None where all have
+        those declared.
     relaxation
         One where the reference laws bring −σ along, else zero.
     optima
@@ -39,7 +40,7 @@ class DenseDraws:
     coefficients: Float[np.ndarray, "draws n"]
     weights: Float[np.ndarray, " draws"]
     relaxation: float
-    moduli: Float[np.ndarray, "draws k"] | None = None
+    moduli: Float[np.ndarray, "draws c"] | None = None
     optima: Int[np.ndarray, " draws"] | None = None
 
     def laws(self, library: TermLibrary, base: AbstractConstitutiveLaw) -> WeightedLaws:

@@ -138,7 +138,7 @@ class TensorDense(RunPrediction):
         random_state: int | None = 0,
         progress: Progress | None = None,
         base: Fluid | None = None,
-        modulus_covariance: Float[np.ndarray, "k k"] | None = None,
+        modulus_covariance: Float[np.ndarray, "c c"] | None = None,
     ):
         self.library = library
         self.modulus = modulus

@@ -25,7 +25,7 @@ from discover.learners.tensor_dense.reference_laws import (
     left_beside_modes,
     with_reference,
 )
-from discover.learners.trajectories.modulus_errors import modulus_columns
+from discover.learners.trajectories.modulus_errors import amounts_of, modulus_columns
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.learners.trajectories.sensitivities import predict_many
 from discover.statistics.noise.noise_model import noise_model
@@ -126,7 +126,7 @@ class Mixture:
     scale: Float[np.ndarray, " n"]
     optimum_of_draw: Int[np.ndarray, " draws"]
     coefficients: Float[np.ndarray, "draws n"]
-    moduli: Float[np.ndarray, "draws k"]
+    moduli: Float[np.ndarray, "draws c"]
     weights_of_draws: Float[np.ndarray, " draws"]
     named_law_fits: bool
 
@@ -274,7 +274,7 @@ def _fitting(found: list[Optimum], noise: float, records: float) -> list[Optimum
 
 def _draws(
     problem, optimum: Optimum, scale, noise, records, rng
-) -> tuple[Float[np.ndarray, "m n"], Float[np.ndarray, "m k"]]:
+) -> tuple[Float[np.ndarray, "m n"], Float[np.ndarray, "m c"]]:
     """Return an optimum and draws about it that fit as it does: scaled coefficients, and moduli.
 
     The covariance is that of the linearisation, which long directions leave: each draw is moved
@@ -283,7 +283,7 @@ def _draws(
     """
     # a misfit beyond the noise counts as more noise
     size = max(noise, optimum.misfit)
-    modulus, error = np.asarray(problem.modulus), np.asarray(problem.modulus_error)
+    modulus, error = amounts_of(problem), np.asarray(problem.modulus_error)
     columns = optimum.columns
     if np.any(error):
         # of the unit that the coefficients' prior has
@@ -324,7 +324,7 @@ def _draws(
     return found[:, :n], moduli(found)
 
 
-def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "rows k"]:
+def _modulus_columns(problem, optimum: Optimum, scale) -> Float[np.ndarray, "rows c"]:
     """Return the change of an optimum's weighted predictions with each error of the moduli."""
     at, places = with_reference(problem, optimum.constants), range(len(scale))
     inner = np.zeros(0)

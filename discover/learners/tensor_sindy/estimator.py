@@ -197,7 +197,7 @@ class TensorSINDy(RunPrediction):
         random_state: int | None = 0,
         progress: Progress | None = None,
         base: Fluid | None = None,
-        modulus_covariance: Float[np.ndarray, "k k"] | None = None,
+        modulus_covariance: Float[np.ndarray, "c c"] | None = None,
         screening: str = "auto",
     ):
         self.library = library

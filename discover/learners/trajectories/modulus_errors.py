@@ -1,4 +1,4 @@
-"""What errors of the moduli, as a linear sweep leaves them, do to a law's predictions and fit.
+"""What errors of moduli and solvent, as a sweep leaves them, do to a law's predictions and fit.
 
 With moduli G + R u, u of unit variance, data of the law differ from its prediction by Z u, and
 parameters fitted with u = 0 are off by (SᵀS)⁻¹SᵀZ u: one more correlated error of the data.
@@ -25,21 +25,22 @@ class ModulusErrors:
     Attributes
     ----------
     root
-        R with moduli G + R u, u of unit variance, shape (k, k), in Pa.
+        R with moduli G + R u, u of unit variance, shape (k, k), in Pa; with a solvent its row is
+        the last.
     response
         B with parameters θ − B u, shape (p, k).
     """
 
-    root: Float[np.ndarray, "k k"]
-    response: Float[np.ndarray, "p k"]
+    root: Float[np.ndarray, "c c"]
+    response: Float[np.ndarray, "p c"]
 
     def draw(
         self,
         offset: Float[np.ndarray, "draws p"],
         covariance: Float[np.ndarray, "p p"],
         rng: np.random.Generator,
-    ) -> Float[np.ndarray, "draws k"]:
-        """Return changes of the moduli in Pa that go with drawn parameters.
+    ) -> Float[np.ndarray, "draws c"]:
+        """Return changes of the moduli in Pa, and of the solvent, that go with drawn parameters.
 
         Parameters
         ----------
@@ -59,13 +60,19 @@ class ModulusErrors:
         return (offset @ slope + open_ @ axes.T) @ self.root.T
 
 
+def amounts_of(problem: TrajectoryProblem) -> Float[np.ndarray, " c"]:
+    """Return the moduli in Pa, and the solvent viscosity behind them where a sweep told both."""
+    amounts = np.append(np.asarray(problem.modulus), float(problem.solvent_viscosity))
+    return amounts[: len(problem.modulus_error)]
+
+
 def modulus_columns(
     problem: TrajectoryProblem,
     support: Sequence[int],
     slots: int,
     coefficients: Float[np.ndarray, " q"],
     inner: Float[np.ndarray, " m"],
-) -> Float[np.ndarray, "rows k"]:
+) -> Float[np.ndarray, "rows c"]:
     """Return Z, the change of a law's weighted predictions with each direction of modulus errors.
 
     Parameters
@@ -84,7 +91,7 @@ def modulus_columns(
         return np.zeros((problem.records.weight.size, len(root)))
     active, filled = np.zeros(slots, dtype=int), np.zeros(slots)
     active[: len(support)], filled[: len(support)] = support, coefficients
-    moduli = np.asarray(problem.modulus) + _SHIFT * np.concatenate([root.T, -root.T])
+    moduli = amounts_of(problem) + _SHIFT * np.concatenate([root.T, -root.T])
     laws = len(moduli)
     predicted = predict_many(
         problem,

@@ -38,8 +38,8 @@ class TrajectoryProblem(eqx.Module):
     solvent_viscosity
         In Pa s.
     modulus_error
-        R with moduli G + R u, u of unit variance, as a sweep leaves them, shape (k, k), in Pa; zero
-        where they are exact.
+        R with moduli G + R u, u of unit variance, as a sweep leaves them, shape (k, k), in Pa; of
+        one with a solvent its row comes last. Zero where they are exact.
     flows
         The runs and their grids.
     records
@@ -53,7 +53,7 @@ class TrajectoryProblem(eqx.Module):
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
     solvent_viscosity: Float[Array, ""]
-    modulus_error: Float[Array, "k k"]
+    modulus_error: Float[Array, "c c"]
     flows: FlowBatch
     records: Records
     order_of_time: Float[Array, "runs n"]
@@ -149,10 +149,10 @@ def _root(covariance: Any, n_modes: int) -> np.ndarray:
     if covariance is None:
         return np.zeros((n_modes, n_modes))
     values = np.asarray(covariance, dtype=float)
-    usable = values.shape == (n_modes, n_modes) and np.all(np.isfinite(values))
+    usable = values.shape in ((n_modes,) * 2, (n_modes + 1,) * 2) and np.all(np.isfinite(values))
     if not usable or not np.allclose(values, values.T):
         raise InputError(
-            "modulus_covariance must be a symmetric matrix in Pa² with one row for each mode; got "
-            f"the shape {values.shape} for {n_modes} modes."
+            "modulus_covariance must be a symmetric matrix in Pa² with one row for each mode, and "
+            f"one for a solvent or none; got the shape {values.shape} for {n_modes} modes."
         )
     return root_of(values)

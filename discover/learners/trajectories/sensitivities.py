@@ -23,7 +23,7 @@ from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
 from discover.forward.integrators.at_given_rate import follow, without_derivatives
 from discover.laws.base import as_state, stress_in
 from discover.laws.each_mode import over_modes
-from discover.laws.multimode import Fluid
+from discover.laws.multimode import Fluid, moduli_and_solvent
 from discover.learners.trajectories.active_terms import evaluate_active
 from discover.learners.trajectories.problem import TrajectoryProblem
 from discover.programs import compiled
@@ -182,12 +182,13 @@ def predict_many(
     active: Int[Array, " q"],
     coefficients: Float[Array, "laws q"],
     inner: Float[Array, "laws m"],
-    modulus: Float[Array, "laws k"] | None = None,
+    modulus: Float[Array, "laws c"] | None = None,
 ) -> Float[Array, "laws rows"]:
     """Return the weighted predictions of many laws of the same terms, without sensitivities.
 
-    Parameters as in `observe`, with a leading axis of laws, and moduli of each law in Pa, by
-    default those of the problem. Not finite where a law runs away.
+    Parameters as in `observe`, with a leading axis of laws, and moduli of each law in Pa, the
+    solvent viscosity behind them or not, by default those of the problem. Not finite where a law
+    runs away.
     """
 
     def run(problem, numbers, protocol, grid):
@@ -195,7 +196,11 @@ def predict_many(
 
     def law(numbers):
         coefficients, inner, modulus = numbers
-        at = problem if modulus is None else eqx.tree_at(lambda p: p.modulus, problem, modulus)
+        at = problem
+        if modulus is not None:
+            k, solvent = len(problem.modulus), problem.solvent_viscosity
+            both = moduli_and_solvent(modulus, k, solvent)
+            at = eqx.tree_at(lambda p: (p.modulus, p.solvent_viscosity), problem, both)
         predicted = problem.flows.over(partial(run, at, (coefficients, inner)))
         return problem.records.weighted(predicted).reshape(-1)
 

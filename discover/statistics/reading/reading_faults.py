@@ -137,6 +137,43 @@ class Estimate:
     effective_samples: float
 
 
+_FLOORS = (0.03, 0.1, 0.3)
+"""Of noise in proportion to the stress: its least size, at the size of that at the root mean square
+of the record."""
+
+
+def _weights(runs: Sequence[Reading]) -> list[Float[np.ndarray, " n"]]:
+    """Return by what each run is multiplied so that its noise is of one size.
+
+    Many instruments are off by a share of what they read. A sample that is twice as loud counts as
+    one that is not, and the loud end of a start-up reads as a drift: of right laws in noise of 1 %
+    of each sample one in fourteen had one, and none in two hundred with these weights. Whether the
+    noise is in proportion, and down to where, Schwarz's criterion says by the differences of
+    neighbours, of all runs together.
+    """
+    plain = [run.weight for run in runs]
+    sizes = [np.abs(run.predicted) * weight for run, weight in zip(runs, plain, strict=True)]
+    rough = [np.diff(run.residual * weight) for run, weight in zip(runs, plain, strict=True)]
+
+    def cost(floor: float | None) -> float:
+        total = 0.0
+        for size, steps in zip(sizes, rough, strict=True):
+            noise = np.ones(len(size)) if floor is None else np.hypot(floor, size)
+            variance = noise[1:] ** 2 + noise[:-1] ** 2
+            spread = max(float(np.mean(steps**2 / variance)), 1e-300)
+            total += len(steps) * np.log(spread) + float(np.sum(np.log(variance)))
+        return total + (0.0 if floor is None else np.log(sum(map(len, rough))))
+
+    best = min((None, *_FLOORS), key=cost)
+    if best is None:
+        return plain
+    found = []
+    for run, weight, size in zip(runs, plain, sizes, strict=True):
+        own = weight / np.hypot(best, size)
+        found.append(own / rms(own * (run.predicted - run.residual)))
+    return found
+
+
 class Session:
     """Runs as a law predicts them, weighed so that the noise of each is a like share of it.
 
@@ -152,7 +189,7 @@ class Session:
         self.is_told = bool(self.runs) and all(bool(np.all(np.isfinite(row))) for row in rows)
         if not self.is_told:
             return
-        self.weights = [run.weight for run in self.runs]
+        self.weights = _weights(self.runs)
         ends = np.cumsum([0, *(len(run.times) for run in self.runs)])
         self.rows: list[Int[np.ndarray, " _"]] = [np.arange(a, b) for a, b in pairwise(ends)]
         pairs = list(zip(self.runs, self.weights, strict=True))

@@ -241,13 +241,15 @@ def _of_law(law: MovedLaw, flow: Flow) -> Reading | None:
 def _reading(run: AsPredicted, law: MovedLaw | None) -> Reading:
     """Return a run for the question how it was read."""
     modes, shared = None, None
-    if law is not None and len(law.declared.modulus) > 1:
-        modes = law.of_moduli(run.flow)
-        modes = None if modes is None else modes[:, run.kept]
-        errors = law.declared.modulus_covariance
-        if modes is not None and errors is not None:
-            root = root_of(errors) / np.asarray(law.declared.modulus, dtype=float)[:, None]
-            shared = root.T @ modes
+    errors = None if law is None else law.declared.modulus_covariance
+    if law is not None and (errors is not None or len(law.declared.modulus) > 1):
+        known, changes = law.declared, law.of_moduli(run.flow)
+        if changes is not None:
+            changes = changes[:, run.kept]
+            modes = changes[: len(known.modulus)] if len(known.modulus) > 1 else None
+        if changes is not None and errors is not None:
+            both = np.append(known.modulus, known.solvent_viscosity)[: len(errors), None]
+            shared = (root_of(errors) / both).T @ changes[: len(errors)]
     return Reading(
         np.asarray(run.times, dtype=float),
         run.predicted,

@@ -1,0 +1,321 @@
+"""Relaxation modes, solvent viscosity and elastic constant that a linear sweep supports."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import least_squares, nnls
+
+BEYOND = 1.0
+"""Decades beyond the window in which a mode may lie. Further out it is a solvent or an elastic
+constant: at a decade its curvature is 1 % of its modulus."""
+
+REPEATABILITY = 0.002
+"""Relative error of a modulus below which no fit is better than another: that of sound rheometers
+in repeated sweeps, and of digits in exported files."""
+
+_PER_DECADE = 12
+_ROUGHLY, _CLOSELY = (1e-6, 20), (1e-12, 200)
+_LONGEST = 1e12
+
+
+@dataclass(frozen=True)
+class ModeFit:
+    """Least-squares fit of modes, a solvent and an elastic constant to a sweep.
+
+    Attributes
+    ----------
+    relaxation_time
+        In s, shape (k,), increasing.
+    modulus
+        In Pa, shape (k,).
+    solvent_viscosity, elastic_modulus
+        In Pa s and Pa; None where it is not among what was fitted.
+    squared
+        Sum of the squared relative misfits of G′ and G″.
+    criterion
+        Twice the negative log evidence; the smallest is the best.
+    """
+
+    relaxation_time: Float[np.ndarray, " k"]
+    modulus: Float[np.ndarray, " k"]
+    solvent_viscosity: float | None = None
+    elastic_modulus: float | None = None
+    squared: float = np.inf
+    criterion: float = np.inf
+
+    @property
+    def n_constants(self) -> int:
+        """Number of fitted constants."""
+        both = (self.solvent_viscosity, self.elastic_modulus)
+        return 2 * len(self.modulus) + sum(value is not None for value in both)
+
+    @property
+    def n_modes(self) -> int:
+        """Number of modes, that of an elastic constant included."""
+        return len(self.modulus) + (self.elastic_modulus is not None)
+
+
+def relative_moduli(
+    frequency: Float[np.ndarray, " n"],
+    measured: Float[np.ndarray, "2 n"],
+    times: Float[np.ndarray, " k"],
+    solvent: bool = False,
+    elastic: bool = False,
+) -> Float[np.ndarray, "rows c"]:
+    """Return G′ and G″ over those measured, a column for each mode, solvent and elastic constant.
+
+    Modes and elastic constant are of 1 Pa, the solvent is of 1 Pa s.
+    """
+    x = frequency[:, None] * times
+    storage, loss = measured
+    columns = [
+        np.concatenate([x**2 / (1 + x**2) / storage[:, None], x / (1 + x**2) / loss[:, None]])
+    ]
+    zero = np.zeros_like(frequency)
+    if solvent:
+        columns.append(np.concatenate([zero, frequency / loss])[:, None])
+    if elastic:
+        columns.append(np.concatenate([1.0 / storage, zero])[:, None])
+    return np.hstack(columns)
+
+
+@dataclass(frozen=True)
+class ModeSearch:
+    """Search for modes with free relaxation times in one sweep.
+
+    Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
+    [Lawson & Hanson 1974]. Their times are then fitted along, and modes merged or left out one by
+    one, the least missed first, down to one. Solvent and elastic constant are with and without.
+
+    Attributes
+    ----------
+    frequency
+        In rad/s, shape (n,).
+    measured
+        G′ and G″ in Pa, shape (2, n).
+    solvent_viscosity, elastic_modulus
+        Values known beforehand; ``"fit"`` is always fitted, None only where evidence asks for it.
+    """
+
+    frequency: Float[np.ndarray, " n"]
+    measured: Float[np.ndarray, "2 n"]
+    solvent_viscosity: float | Literal["fit"] | None = None
+    elastic_modulus: float | Literal["fit"] | None = None
+    bounds: tuple[float, float] = field(init=False)
+
+    def __post_init__(self):
+        margin = 10.0**BEYOND
+        ends = 1.0 / margin / self.frequency.max(), margin / self.frequency.min()
+        object.__setattr__(self, "bounds", ends)
+
+    @cached_property
+    def _target(self) -> Float[np.ndarray, " rows"]:
+        """What the fitted constants have to give: one, less what known ones give."""
+        held = [0.0 if isinstance(v, str) or v is None else v for v in self._asked]
+        return 1.0 - self._design(np.zeros(0), True, True) @ np.array(held)
+
+    @property
+    def _asked(self) -> tuple[Any, Any]:
+        return self.solvent_viscosity, self.elastic_modulus
+
+    def fits(self, fewest: int = 0) -> Iterator[ModeFit]:
+        """Yield fits of every number of modes, with and without solvent and elastic constant.
+
+        Parameters
+        ----------
+        fewest
+            Number of modes that there has to be a fit of, though fewer may do.
+        """
+        choices = [
+            (True,) if value == "fit" else (False, True) if value is None else (False,)
+            for value in self._asked
+        ]
+        for solvent in choices[0]:
+            for elastic in choices[1]:
+                yield from self._path(solvent, elastic, fewest)
+
+    def closely(self, fit: ModeFit) -> ModeFit:
+        """Return a fit carried on until nothing changes."""
+        return self._fitted(fit, _CLOSELY) if len(fit.modulus) else fit
+
+    def elastic_time(self, fit: ModeFit) -> float:
+        """Return the shortest time in s of a mode that the sweep cannot tell from the constant.
+
+        It raises the misfit by no more than one standard deviation, the other constants fitted
+        along at their times.
+        """
+        solvent, target = fit.solvent_viscosity is not None, self._target
+        if not isinstance(self.elastic_modulus, str) and self.elastic_modulus is not None:
+            column = self._design(np.zeros(0), False, True)[:, 0]
+            target = target + column * self.elastic_modulus
+        allowed = fit.squared + self._variance(fit)
+        times = np.geomspace(1.0, _LONGEST, 4 * int(np.log10(_LONGEST)) + 1) / self.frequency.min()
+        for time in times:
+            modes = np.append(fit.relaxation_time, time)
+            if solved(self._design(modes, solvent, False), target)[1] <= allowed:
+                return float(time)
+        return float(times[-1])
+
+    def _variance(self, fit: ModeFit) -> float:
+        """Return the variance of the misfit, no less than what sweeps repeat to."""
+        return fit.squared / max(self.measured.size - fit.n_constants, 1) + REPEATABILITY**2
+
+    def _design(self, times, solvent: bool, elastic: bool) -> Float[np.ndarray, "rows c"]:
+        return relative_moduli(self.frequency, self.measured, times, solvent, elastic)
+
+    def _path(self, solvent: bool, elastic: bool, fewest: int) -> Iterator[ModeFit]:
+        low, high = self.bounds
+        grid = np.geomspace(low, high, int(np.log10(high / low) * _PER_DECADE) + 1)
+        amounts, _ = solved(self._design(grid, solvent, elastic), self._target)
+        times = self._merged(grid, amounts[: len(grid)])
+        while len(times) + elastic < fewest:
+            times = _split(times, self.bounds)
+        most = max((len(self.frequency) - solvent - elastic) // 2, fewest - elastic, 1)
+        least = max(fewest - elastic, 0 if elastic else 1)
+        while True:
+            fit = self._at(times, solvent, elastic)
+            if len(times) <= most:
+                fit = self._fitted(fit, _ROUGHLY)
+                if np.all(np.append(fit.modulus, _linear(fit)) > 0.0):
+                    yield fit
+            if len(times) <= least:
+                return
+            times = self._with_one_less(fit)
+
+    def _merged(self, grid: np.ndarray, modulus: np.ndarray) -> np.ndarray:
+        """Return times of modes; neighbours on the grid stand for one between them."""
+        there = np.flatnonzero(modulus > 0.0)
+        if not len(there):
+            return np.array([np.sqrt(self.bounds[0] * self.bounds[1])])
+        parts = np.split(there, np.flatnonzero(np.diff(there) > 1) + 1)
+        return np.array([_mean(grid[part], modulus[part]) for part in parts])
+
+    def _with_one_less(self, fit: ModeFit) -> np.ndarray:
+        """Return times with one mode left out, or two made one, at the least cost."""
+        times, modulus = fit.relaxation_time, fit.modulus
+        trials = [np.delete(times, i) for i in range(len(times))]
+        for i in range(len(times) - 1):
+            between = _mean(times[i : i + 2], modulus[i : i + 2])
+            trials.append(np.concatenate([times[:i], [between], times[i + 2 :]]))
+        extra = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
+        costs = [
+            solved(self._design(t, *extra), self._target)[1] if len(t) or any(extra) else np.inf
+            for t in trials
+        ]
+        return trials[int(np.argmin(costs))]
+
+    def _at(self, times: np.ndarray, solvent: bool, elastic: bool) -> ModeFit:
+        amounts, squared = solved(self._design(times, solvent, elastic), self._target)
+        return self._named(np.sort(times), amounts, solvent, elastic, squared)
+
+    def _named(self, times, amounts, solvent: bool, elastic: bool, squared: float) -> ModeFit:
+        k = len(times)
+        fit = ModeFit(
+            times,
+            amounts[:k],
+            float(amounts[k]) if solvent else None,
+            float(amounts[-1]) if elastic else None,
+            float(squared),
+        )
+        return replace(fit, criterion=self._criterion(fit))
+
+    def _fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
+        """Return the fit with the relaxation times fitted along, in logarithms.
+
+        Parameters
+        ----------
+        limits
+            Relative change at which it ends, and most evaluations.
+        """
+        tolerance, evaluations = limits
+        k, extra = len(fit.modulus), _linear(fit)
+        if not k:
+            return fit
+        kinds = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
+        low, high = np.log(self.bounds)
+        amounts = np.append(fit.modulus, extra)
+        amounts = np.maximum(amounts, 1e-6 * np.max(amounts[:k], initial=1e-300))
+
+        def misfit(logs: np.ndarray) -> np.ndarray:
+            times = np.exp(np.clip(logs[:k], low, high))
+            return self._design(times, *kinds) @ np.exp(logs[k:]) - self._target
+
+        def slopes(logs: np.ndarray) -> np.ndarray:
+            times, amounts = np.exp(np.clip(logs[:k], low, high)), np.exp(logs[k:])
+            x = self.frequency[:, None] * times
+            per_time = np.concatenate(
+                [
+                    2 * x**2 / (1 + x**2) ** 2 / self.measured[0][:, None],
+                    x * (1 - x**2) / (1 + x**2) ** 2 / self.measured[1][:, None],
+                ]
+            )
+            inside = (logs[:k] > low) & (logs[:k] < high)
+            return np.hstack(
+                [
+                    np.where(inside, per_time * amounts[:k], 0.0),
+                    self._design(times, *kinds) * amounts,
+                ]
+            )
+
+        start = np.log(np.concatenate([fit.relaxation_time, amounts]))
+        with np.errstate(over="ignore", invalid="ignore"):
+            limits_of = {"ftol": tolerance, "xtol": tolerance, "gtol": tolerance}
+            options: dict[str, Any] = {"jac": slopes, "method": "lm", "max_nfev": evaluations}
+            end = least_squares(misfit, start, **limits_of, **options).x
+        if not np.all(np.isfinite(misfit(end))):
+            return fit
+        times, amounts = np.exp(np.clip(end[:k], low, high)), np.exp(end[k:])
+        order = np.argsort(times)
+        amounts = np.append(amounts[:k][order], amounts[k:])
+        return self._named(times[order], amounts, *kinds, float(np.sum(misfit(end) ** 2)))
+
+    def _criterion(self, fit: ModeFit) -> float:
+        """Return twice the negative log evidence   [Schwarz 1978, Ann. Stat. 6, 461].
+
+        Solvent and elastic constant have a prior that is even from zero to the most that the sweep
+        leaves room for, the smallest G″/ω and G′; where they are told well, the share of it that
+        their errors fill counts against them. So a fluid is no solid by one low G′.
+        """
+        count = self.measured.size
+        variance = self._variance(fit)
+        total = count * np.log(variance) + 2 * len(fit.modulus) * np.log(count)
+        extra = _linear(fit)
+        if not len(extra):
+            return float(total)
+        kinds = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
+        design = self._design(fit.relaxation_time, *kinds)
+        scale = np.linalg.norm(design, axis=0)
+        inverse = np.linalg.pinv((design / scale).T @ (design / scale), hermitian=True)
+        errors = np.sqrt(variance * np.diag(inverse)) / scale
+        room = np.array([np.min(self.measured[1] / self.frequency), np.min(self.measured[0])])
+        share = room[np.array(kinds)] / (np.sqrt(2 * np.pi) * errors[-len(extra) :])
+        return float(total + np.sum(np.maximum(2.0 * np.log(share), np.log(count))))
+
+
+def _linear(fit: ModeFit) -> np.ndarray:
+    both = (fit.solvent_viscosity, fit.elastic_modulus)
+    return np.array([value for value in both if value is not None])
+
+
+def _mean(times: np.ndarray, weights: np.ndarray) -> float:
+    weights = weights if np.sum(weights) > 0.0 else np.ones_like(times)
+    return float(np.exp(np.average(np.log(times), weights=weights)))
+
+
+def _split(times: np.ndarray, bounds: tuple[float, float]) -> np.ndarray:
+    """Return times with one more, in the middle of the widest gap."""
+    places = np.concatenate([[bounds[0]], times, [bounds[1]]])
+    widest = int(np.argmax(np.diff(np.log(places))))
+    return np.insert(times, widest, np.sqrt(places[widest] * places[widest + 1]))
+
+
+def solved(design: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return coefficients of non-negative least squares, and the squared misfit."""
+    scale = np.linalg.norm(design, axis=0)  # columns of similar size: moduli may span many decades
+    scale = np.where(scale > 0.0, scale, 1.0)
+    found, left = nnls(design / scale, target, maxiter=100 * design.shape[1] + 100)
+    return found / scale, float(left**2)
