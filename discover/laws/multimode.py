@@ -54,7 +54,10 @@ def moduli_and_solvent(
 
 
 def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
-    return None if value is None else as_parameter(value)
+    if value is None or isinstance(value, Array):
+        return value
+    numbers = as_numbers("The covariance of moduli", value, finite=False)
+    return jnp.asarray(numbers, dtype=jnp.result_type(float))
 
 
 class Fluid(eqx.Module):
