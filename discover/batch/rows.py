@@ -1,6 +1,5 @@
 """What the studies of a batch found, one row each, from their result files."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import pandas as pd
 
 from discover.dataset.tables.table import read_bytes
+from discover.plain_json import parse_json
 
 QUANTITIES = ("sigma12", "N1", "N2")
 
@@ -80,7 +80,7 @@ def read_row(folder: Path) -> StudyRow:
     try:
         for name, reader in (("comparison.json", _comparison), ("loop.json", _loop)):
             if (folder / name).is_file():
-                return reader(json.loads(read_bytes(folder / name, name)))
+                return reader(parse_json(read_bytes(folder / name, name)))
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         pass  # a table over thousands of studies does not fall over one of them
     return StudyRow()

@@ -1,6 +1,7 @@
 """Load a folder of measured runs: ``runs.csv``, one CSV a run, and tables beside them."""
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_bytes, read_table, shown
 from discover.errors import InputError
+from discover.plain_numbers import as_number, short
 
 DATA_VARIABLE = "DISCOVER_DATA"
 """Environment variable that names the folder of data folders."""
@@ -147,6 +149,10 @@ def load_dataset(
     >>> data = dc.load_dataset("melt")  # doctest: +SKIP
     >>> train, test = data.split(held_out=["fast.csv"])  # doctest: +SKIP
     """
+    _require_options(
+        {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence},
+        rate_is_measured, rate_window, amplitude_sweep_rad_s,
+    )  # fmt: skip
     root = resolve_folder(folder, base)
     index = read_index(root)
     names = index.columns["file"]
@@ -187,6 +193,20 @@ def load_dataset(
         },
         material_functions=tables,
     )
+
+
+def _require_options(
+    columns: Mapping[str, object], measured: object, window: object, frequency: object
+) -> None:
+    for option, column in columns.items():
+        if not isinstance(column, str | None):
+            raise InputError(f"{option} is the name of a column; got {short(column)}.")
+    if not isinstance(measured, bool | np.bool_):
+        raise InputError(f"rate_is_measured must be True or False; got {short(measured)}.")
+    if isinstance(window, bool) or not isinstance(window, int | np.integer) or window < 1:
+        raise InputError(f"rate_window must be a whole number of samples; got {short(window)}.")
+    if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
+        raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
 
 
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:

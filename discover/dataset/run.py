@@ -1,5 +1,6 @@
 """Runs and data sets as the rest of the software sees them: SI units, checked."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
@@ -164,7 +165,7 @@ class Run:
                 f"time of the run {self.name!r} must start at or after 0 and increase strictly. "
                 "Sort the samples and remove repeated times."
             )
-        if not self.clock_factor > 0:
+        if not 0 < self.clock_factor < math.inf:
             raise InputError(
                 f"The clock factor of the run {self.name!r} must be positive; got "
                 f"{self.clock_factor}."

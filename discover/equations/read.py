@@ -1,6 +1,5 @@
 """The laws that a folder of results holds."""
 
-import json
 import os
 from pathlib import Path
 from typing import Any
@@ -9,6 +8,7 @@ from discover.dataset.tables.table import read_bytes
 from discover.equations.equation import Equation
 from discover.equations.formats.json_format import equation_from_json
 from discover.errors import InputError
+from discover.plain_json import parse_json
 
 COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"
 AUGMENTED = "augmented"
@@ -77,14 +77,10 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
 def read_json(path: Path) -> Any:
     """Return what a JSON file of results holds."""
     try:
-        return json.loads(read_bytes(path, path.name))
-    except RecursionError:
+        return parse_json(read_bytes(path, path.name))
+    except InputError:
+        raise
+    except ValueError as error:
         raise InputError(
-            f"{path.name} is nested too deeply to be a result. Run again with --overwrite."
-        ) from None
-    except (ValueError, UnicodeDecodeError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"{path.name} is not valid JSON ({error}). Run again with --overwrite."
+            f"{path.name} is no JSON of a result ({error}). Run again with --overwrite."
         ) from None

@@ -11,6 +11,7 @@ from typing import Any
 
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
+from discover.plain_json import parse_json
 from discover.study.atomic import PART_SUFFIX, make_folder, require_ours, write_text
 from discover.study.lock import lock_folder
 
@@ -167,7 +168,7 @@ def _sweep_up(folder: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        content = json.loads(read_bytes(path, path.name, is_input=False))
-    except (OSError, ValueError, RecursionError):
+        content = parse_json(read_bytes(path, path.name))
+    except ValueError:
         return None  # absent or damaged: computed again
     return content if isinstance(content, dict) else None

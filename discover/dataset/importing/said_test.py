@@ -38,7 +38,9 @@ _WORDS: dict[SaidTest, str] = {
     "planar": r"planar (ext|elong)\w*",
     "biaxial": r"(equi)?biax\w*",
 }  # fmt: skip
-_PATTERNS = {test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()}
+_PATTERNS: dict[SaidTest, re.Pattern[str]] = {
+    test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()
+}
 
 _SAY_THE_TEST = re.compile(
     r"test|type|mode|experiment|method|procedure|measurement|title|name|step|segment|action"

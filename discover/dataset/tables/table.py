@@ -162,21 +162,29 @@ def read_bytes(
         than it may be.
     """
     try:
-        status = os.stat(path)
-        if stat.S_ISDIR(status.st_mode):
-            raise InputError(f"{name} is a folder; a file is wanted there. Name the file itself.")
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(f"{name} is a pipe or device, not a file. Save the data in a file.")
-        if status.st_size > largest:
+        # what was opened is what is asked; opening must not wait for the other end of a pipe
+        with open(path, "rb", opener=_at_once) as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise InputError(
+                    f"{name} is a pipe or device, not a file. Save the data in a file."
+                )
+            # a file that grows, or says 0 bytes and never ends, is no larger than the limit either
+            content = file.read(largest + 1) if status.st_size <= largest else b""
+        size = max(status.st_size, len(content))
+        if size > largest:
             raise InputError(
-                f"{name} has {status.st_size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. "
-                f"{too_large}"
+                f"{name} has {size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. {too_large}"
             )
         if is_input:
             note_input(path, status)
-        return Path(path).read_bytes()
+        return content
     except InputError:
         raise
+    except IsADirectoryError:
+        raise InputError(
+            f"{name} is a folder; a file is wanted there. Name the file itself."
+        ) from None
     except (FileNotFoundError, NotADirectoryError):
         folder = path.parent.name
         place = f" in {folder}" if folder and str(path) != name else ""
@@ -187,6 +195,10 @@ def read_bytes(
         ) from None
     except ValueError:
         raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+
+
+def _at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:

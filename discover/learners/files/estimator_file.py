@@ -16,6 +16,7 @@ from discover._version import __version__
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.learners.files.plain_values import PlainReader, PlainWriter
+from discover.plain_json import parse_json
 
 FORMAT, VERSION = "discover estimator", 1
 _HEADER = "estimator.json"
@@ -112,7 +113,7 @@ class EstimatorFile:
     def _read_header(self, file: zipfile.ZipFile) -> dict[str, Any]:
         if _HEADER not in file.namelist():
             raise self._other()
-        header = json.loads(_read(file, file.getinfo(_HEADER)))
+        header = parse_json(_read(file, file.getinfo(_HEADER)))
         if not isinstance(header, dict) or header.get("format") != FORMAT:
             raise self._other()
         if header.get("version") != VERSION:

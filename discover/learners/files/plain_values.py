@@ -177,12 +177,14 @@ class PlainReader:
         return self._types[kind](**fields)
 
     def _network(self, plain: Mapping[str, Any], fields: dict[str, Any]) -> TensorBasisNetwork:
-        made = TensorBasisNetwork.initialise(
-            jax.random.key(0), int(plain["width"]), int(plain["depth"])
-        )
+        weights = self.value(plain["weights"])
+        width, depth = int(plain["width"]), int(plain["depth"])
+        # a network is not made larger than the weights that the file has for it
+        if len(weights) != 2 * (depth + 1) or len(weights[0]) != width:
+            raise ValueError("weights do not fit the network")
+        made = TensorBasisNetwork.initialise(jax.random.key(0), width, depth)
         dynamic, static = eqx.partition(made.network, eqx.is_array)
         leaves, structure = jax.tree.flatten(dynamic)
-        weights = self.value(plain["weights"])
         if [w.shape for w in weights] != [leaf.shape for leaf in leaves]:
             raise ValueError("weights do not fit the network")
         network = eqx.combine(structure.unflatten(map(jnp.asarray, weights)), static)
