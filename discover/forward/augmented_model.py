@@ -251,6 +251,18 @@ class AugmentedModel:
         self, thetas, piece: "_Piece", limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials runs *columns"]:
         program, (part, judging) = self._program, piece
+        if isinstance(part, TransientFlows):
+            assert judging is not None
+            kernel = program.side_by_side(self._numbers, part)
+            if kernel is not None:
+                vectors = np.asarray(thetas, dtype=float)
+                wanted = np.full(len(vectors), np.inf)
+                if limits is not None:
+                    kept = np.array([program.is_judged_by_modes(theta) for theta in vectors])
+                    wanted[kept] = np.asarray(limits)[kept]
+                return kernel.predict(
+                    self._numbers, vectors, part, judging, len(part.times), wanted
+                )
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial
