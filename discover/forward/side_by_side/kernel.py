@@ -14,9 +14,9 @@ import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
 from discover.forward.structure import Numbers
-from discover.programs.lanes import Arithmetic, Translation, Writing
+from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
@@ -25,6 +25,7 @@ _COUNTS = ("runs", "steps", "modes", "tabled")
 _WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "scratch")
 _WHOLE = ("last", "flags", "goes_on")
 _SCALAR = ("width", "table", "flow", "jump", "weight", "recorded")
+_ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 _EIGHT_BITS = ir.IntType(8)
 
@@ -52,6 +53,7 @@ class Kernel:
 
     def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
         self.flags = Flags(fluid)
+        self._times_at = self.flags.names.index("times")
         theta = jax.ShapeDtypeStruct((fluid.size,), float)
         found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
         of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
@@ -63,14 +65,43 @@ class Kernel:
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self.scratch = lambda modes: self._state_at + modes * (4 + self._variables)
-        arrays = (*_WIDE, *_WHOLE, *_SCALAR)
-        self._w = Writing(_COUNTS, arrays, _WIDE, _WHOLE)
+        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
         self._arithmetic = Arithmetic(self._w.builder)
         self._write = Translation(self._arithmetic)
         self._runs()
-        self.call = self._w.compiled()
-        self.arrays = arrays
+        self._call = self._w.compiled()
+        # what was written is large, and the code is made
+        del self._w, self._arithmetic, self._write, self._parameters, self._on
+
+    def __call__(
+        self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Return stress and felt rate at step ends, and whether any vector was still of use.
+
+        Both have the shape (runs, ends, lanes); the stress is not a number where none was computed.
+
+        Parameters
+        ----------
+        runs
+            How many runs are followed.
+        tabled
+            Modes whose weights stand in the table.
+        used
+            Parts of the program that one of the vectors needs; see `Flags`.
+        given
+            The arrays beside these, by name.
+        """
+        steps, modes = given["width"].shape[1], len(given["mode"])
+        stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
+        felt, goes_on = np.zeros_like(stress), np.ones(1, np.int64)
+        flags = used.astype(np.int64)
+        flags[-1] = used[self._times_at]
+        scratch = np.empty((self._state_at + modes * (4 + self._variables), LANES))
+        arrays = given | {
+            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
+        }  # fmt: skip
+        self._call(runs, steps, modes, tabled, *(arrays[name].ctypes.data for name in _ARRAYS))
+        return stress, felt, bool(goes_on[0])
 
     def packed(self, tree: Any, of_mode: bool) -> jax.Array:
         """Return a part of `laid_out` as one array, of modes with these first."""

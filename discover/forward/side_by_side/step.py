@@ -96,14 +96,15 @@ class Flags:
         setting["times"] = [first[e.name][0] for e in fluid.states if e.changes_times]
         setting["series"] = [first[e.name][0] for e in fluid.series]
         setting["by mode"] = [] if fluid.by_mode is None else first[fluid.by_mode.name]
-        # set by the caller, whatever the parameters: weights of steps are not those of the table
-        self._setting = list(setting.values())
+        # the last is set by what is called, for weights of steps that are not those of the table
         self.names = [*setting, "own weights"]
+        self._set_by = np.zeros((fluid.size, len(self.names)))
+        for i, positions in enumerate(setting.values()):
+            self._set_by[positions, i] = 1.0
 
     def of(self, thetas: np.ndarray) -> np.ndarray:
         """Return which parts each vector needs, shape (trials, flags); the last is left unset."""
-        set_by = [np.any(thetas[:, at] != 0.0, axis=1) for at in self._setting]
-        return np.stack([*set_by, np.zeros(len(thetas), bool)], axis=1)
+        return (thetas != 0.0) @ self._set_by > 0.0
 
 
 def beside_modes(fluid: AugmentedFluid) -> list[ConstitutiveEffect]:

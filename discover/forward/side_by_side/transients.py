@@ -5,7 +5,7 @@ for all of them. The rate that an instrument shapes and the signal that it disto
 which is called only where a vector asks for it.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
@@ -27,17 +27,43 @@ from discover.programs.lanes import LANES
 # Vectors of the same times from which on weights of the steps are worth a table
 _MANY = 8
 
+# Of the runs that were laid out for the kernel
+_KEPT = 8
+
+_OF_RUNS = ("last", "width", "jump", "flow", "weight", "recorded")
+
 
 class _Runs(NamedTuple):
-    """Runs as the kernel takes them, in arrays of NumPy."""
+    """Runs as the kernel takes them, in arrays of NumPy.
+
+    Attributes
+    ----------
+    last
+        How many steps of each are taken.
+    width, jump
+        Of the steps, and the width up to which one only marks a jump of the rate, in s.
+    flow
+        Kinematics of each run.
+    sample
+        Positions of the samples among step ends.
+    weight, recorded
+        What was measured, at step ends.
+    rate, tool_rate
+        Without effects of the instrument, with the lanes first.
+    in_lanes
+        The rate with the lanes last.
+    """
 
     last: np.ndarray
     width: np.ndarray
     jump: np.ndarray
     flow: np.ndarray
     sample: np.ndarray
+    weight: np.ndarray
+    recorded: np.ndarray
     rate: np.ndarray
     tool_rate: np.ndarray
+    in_lanes: np.ndarray
 
 
 class SideBySide:
@@ -87,7 +113,7 @@ class SideBySide:
         of_runs = jax.vmap(recorded, in_axes=(None, 0, 0, 0, 0))
         of_trials = jax.vmap(of_runs, in_axes=(0, None, 0, 0, 0))
         self._recorded = compiled(of_trials, ("recorded", *made_from))
-        self._known_runs: list[tuple[TransientFlows, _Runs]] = []
+        self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
 
     def predict(
@@ -113,11 +139,7 @@ class SideBySide:
         """
         flags = self._kernel.flags.of(thetas)
         order = np.lexsort([thetas[:, 1], *flags.T])
-        laid_out = self._runs(part, thetas[0])
-        weight, recorded = np.zeros((2, *laid_out.rate[:, ::2].shape))
-        places = (np.arange(len(weight))[:, None], laid_out.sample)
-        np.add.at(weight, places, np.asarray(judging.weight))
-        np.add.at(recorded, places, np.asarray(judging.recorded))
+        laid_out = self._runs(part, judging, thetas[0])
         times, counts = np.unique(thetas[:, 1], return_counts=True)
         table = self._table(numbers, part, float(times[np.argmax(counts)]), int(np.max(counts)))
         out = np.empty((len(thetas), runs, laid_out.sample.shape[1]))
@@ -126,87 +148,85 @@ class SideBySide:
             lanes = trials[np.minimum(np.arange(LANES), len(trials) - 1)]
             limit = np.where(np.arange(LANES) < len(trials), limits[lanes], -np.inf)
             used = np.any(flags[trials], axis=0)
-            found = self._eight(
-                numbers, thetas[lanes], part, laid_out, runs, used, table, limit, weight, recorded
-            )
+            found = self._eight(numbers, thetas[lanes], part, laid_out, runs, used, table, limit)
             out[trials] = np.moveaxis(found, -1, 0)[: len(trials)]
 
         in_threads(eight, np.split(order, range(LANES, len(order), LANES)))
         return out
 
     def _eight(
-        self, numbers, thetas, part, laid_out: _Runs, runs, used, table, limit, weight, recorded
+        self,
+        numbers: Numbers,
+        thetas: np.ndarray,
+        part: TransientFlows,
+        laid_out: _Runs,
+        runs: int,
+        used: np.ndarray,
+        table: tuple[float, np.ndarray | None],
+        limit: np.ndarray,
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (runs, n, lanes)."""
-        kernel = self._kernel
         modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas))
         declared = len(numbers.modulus)
-        # what effects add is left out where none of the eight has it
-        absent = np.all(modes[:, 0] == 0.0, axis=-1) & (np.arange(len(modes)) >= declared)
-        modes = np.ascontiguousarray(modes[~absent])
-        shaped = self._fits_instants or bool(np.any(thetas[:, self._shaping]))
-        if shaped:
+        if len(modes) > declared:
+            # what effects add is left out where none of the eight has it
+            absent = np.all(modes[:, 0] == 0.0, axis=-1) & (np.arange(len(modes)) >= declared)
+            modes = np.ascontiguousarray(modes[~absent])
+        rate, tool_rate, in_lanes = laid_out.rate, laid_out.tool_rate, laid_out.in_lanes
+        if self._fits_instants or np.any(thetas[:, self._shaping]):
             rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, part))
-        else:
-            rate, tool_rate = (
-                np.broadcast_to(array, (LANES, *array.shape))
-                for array in (laid_out.rate, laid_out.tool_rate)
-            )
-        in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
+            in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
         time, tabled = table
-        tabled_modes = declared
         if tabled is None or np.any(thetas[:, 1] != time):
-            tabled, tabled_modes = np.zeros(WEIGHTS), 0
-        used = used.copy()
-        flags = used.astype(np.int64)
-        flags[-1] = flags[kernel.flags.names.index("times")]
-        steps = laid_out.width.shape[1]
-        stress = np.full((len(weight), steps + 1, LANES), np.nan)
-        felt = np.zeros_like(stress)
-        goes_on = np.ones(1, np.int64)
-        given = {
-            "rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "stress": stress,
-            "felt": felt, "scratch": np.empty((kernel.scratch(len(modes)), LANES)),
-            "last": laid_out.last, "flags": flags, "goes_on": goes_on, "width": laid_out.width,
-            "table": tabled, "flow": laid_out.flow, "jump": laid_out.jump, "weight": weight,
-            "recorded": recorded,
-        }  # fmt: skip
-        addresses = (given[name].ctypes.data for name in kernel.arrays)
-        kernel.call(runs, steps, len(modes), tabled_modes, *addresses)
-        if not goes_on[0]:
+            tabled, declared = np.zeros(WEIGHTS), 0
+        stress, felt, goes_on = self._kernel(
+            runs,
+            declared,
+            used,
+            {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
+            | {name: getattr(laid_out, name) for name in _OF_RUNS},
+        )
+        if not goes_on:
             stress[:] = np.inf
+        rows = np.arange(runs)[:, None]
         if not np.any(thetas[:, self._distorting]):
-            return np.take_along_axis(stress, laid_out.sample[..., None], axis=1)[:runs]
-        beyond = np.arange(steps + 1) > laid_out.last[:, None]
-        felt = np.where(beyond[..., None], in_lanes[:, ::2], felt)
-        stress = np.where(beyond[..., None], 0.0, stress)
+            return stress[rows, laid_out.sample[:runs]]
+        beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
+        felt = np.where(beyond, in_lanes[:, ::2], felt)
+        stress = np.where(beyond, 0.0, stress)
         first = (np.moveaxis(array, -1, 0) for array in (stress, felt))
-        return np.moveaxis(np.asarray(self._recorded(thetas, part, *first, tool_rate)), 0, -1)[
-            :runs
-        ]
+        found = np.asarray(self._recorded(thetas, part, *first, tool_rate))
+        return np.moveaxis(found, 0, -1)[:runs]
 
-    def _runs(self, part: TransientFlows, theta: np.ndarray) -> _Runs:
+    def _runs(self, part: TransientFlows, judging: Records, theta: np.ndarray) -> _Runs:
         """Return runs as the kernel takes them, laid out once."""
-        for known, found in self._known_runs:
-            if known is part:
+        for known, by, found in self._known_runs:
+            if known is part and by is judging:
                 return found
         plain = np.tile(theta, (LANES, 1))
         plain[:, self._shaping] = 0.0
-        rate, tool_rate = (np.asarray(array)[0] for array in self._rates(plain, part))
-        times = np.asarray(part.times)[:, ::2]
+        rate, tool_rate = (np.asarray(array) for array in self._rates(plain, part))
+        times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
+        weight, recorded = np.zeros(times.shape), np.zeros(times.shape)
+        places = (np.arange(len(times))[:, None], sample)
+        np.add.at(weight, places, np.asarray(judging.weight))
+        np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
         found = _Runs(
-            # one step more than its samples need, as of the rate it is there
+            # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
             np.diff(times),
             JUMP * times[:, -1],
             self._kernel.flows(part.kinematics),
-            np.asarray(part.sample_index),
+            sample,
+            weight,
+            recorded,
             rate,
             tool_rate,
+            np.ascontiguousarray(np.moveaxis(rate, 0, -1)),
         )
-        self._known_runs.append((part, found))
-        del self._known_runs[:-8]
+        self._known_runs.append((part, judging, found))
+        del self._known_runs[:-_KEPT]
         return found
 
     def _table(

@@ -56,13 +56,13 @@ class Arithmetic:
         """Return whether values are numbers already."""
         return not any(isinstance(value, ir.Value) for value in values)
 
-    def lanes(self, value: Value) -> ir.Value:
+    def lanes(self, value: Value) -> Value:
         """Return a value as eight doubles."""
         if self.is_known(value):
             return ir.Constant(DOUBLES, [float(value)] * LANES)
         return value if value.type == DOUBLES else self.chosen(value, 1.0, 0.0)
 
-    def splat(self, value: ir.Value) -> ir.Value:
+    def splat(self, value: Value) -> Value:
         """Return one double in all lanes."""
         blank = ir.Constant(DOUBLES, ir.Undefined)
         first = self.builder.insert_element(blank, value, ir.IntType(32)(0))
@@ -140,7 +140,7 @@ class Arithmetic:
         """
         if self.is_known(x, y):
             pairs = {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y, "==": x == y}
-            return pairs[how] if how in pairs else x != y
+            return pairs.get(how, x != y)
         compared = self.builder.fcmp_unordered if of_nothing else self.builder.fcmp_ordered
         name = f"{how}{of_nothing}"
         return self._once(name, (x, y), lambda: compared(how, self.lanes(x), self.lanes(y)))
@@ -201,7 +201,7 @@ class Arithmetic:
             return math.sqrt(x) if x >= 0 else math.nan
         return self._intrinsic("sqrt", x)
 
-    def _intrinsic(self, name: str, x: ir.Value) -> Value:
+    def _intrinsic(self, name: str, x: Value) -> Value:
         def write():
             full, module = f"llvm.{name}.v{LANES}f64", self.builder.module
             kind = ir.FunctionType(DOUBLES, [DOUBLES])
@@ -228,7 +228,7 @@ class Arithmetic:
         name = "expm1" if less_one else "exp"
         return self._once(name, (x,), lambda: self._exponential(x, less_one))
 
-    def _exponential(self, x: ir.Value, less_one: bool) -> Value:
+    def _exponential(self, x: Value, less_one: bool) -> Value:
         b = self.builder
         inside = self.larger(self.smaller(x, 709.0), -708.0)
         shifted = b.fadd(b.fmul(inside, self.lanes(math.log2(math.e))), self.lanes(_TO_INTEGER))
@@ -252,7 +252,7 @@ class Arithmetic:
             return math.log(x) if x > 0 else (-math.inf if x == 0 else math.nan)
         return self._once("log", (x,), lambda: self._logarithm(x))
 
-    def _logarithm(self, x: ir.Value) -> Value:
+    def _logarithm(self, x: Value) -> Value:
         b = self.builder
         bits = b.bitcast(x, INTEGERS)
         # the mantissa between √½ and √2, so that the series is of small numbers

@@ -3,11 +3,15 @@
 import ctypes
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 import llvmlite.binding as llvm
 import llvmlite.ir as ir
 
 from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
+
+Place = Any
+"""Where something lies: a whole number, known or of LLVM."""
 
 # arrays of NumPy begin at any double
 _ALIGNED = 8
@@ -39,26 +43,26 @@ class Writing:
             address.add_attribute("noalias")
         self.builder = ir.IRBuilder(function.append_basic_block("entry"))
 
-    def load(self, name: str, place: ir.Value | int) -> ir.Value:
+    def load(self, name: str, place: Place) -> Any:
         """Return what an array holds at a place."""
-        found = self.builder.load(self._address(name, place))
+        found: Any = self.builder.load(self._address(name, place))
         if found.type == DOUBLES:
             found.align = _ALIGNED
         return found
 
-    def store(self, value: ir.Value, name: str, place: ir.Value | int) -> None:
+    def store(self, value: Any, name: str, place: Place) -> None:
         """Let an array hold a value at a place."""
-        stored = self.builder.store(value, self._address(name, place))
+        stored: Any = self.builder.store(value, self._address(name, place))
         if value.type == DOUBLES:
             stored.align = _ALIGNED
 
-    def _address(self, name: str, place: ir.Value | int) -> ir.Value:
+    def _address(self, name: str, place: Place) -> Any:
         place = INTEGER(place) if isinstance(place, int) else place
         return self.builder.gep(self.arrays[name], [place], inbounds=True)
 
-    def at(self, *places: tuple[ir.Value | int, ir.Value | int]) -> ir.Value:
+    def at(self, *places: tuple[Place, Place]) -> Any:
         """Return the sum of indices times the strides of their axes."""
-        total: ir.Value = INTEGER(0)
+        total: Any = INTEGER(0)
         for index, stride in places:
             index = INTEGER(index) if isinstance(index, int) else index
             stride = INTEGER(stride) if isinstance(stride, int) else stride
@@ -67,8 +71,8 @@ class Writing:
 
     @contextmanager
     def loop(
-        self, count: ir.Value | int, goes_on: Callable[[], ir.Value] | None = None
-    ) -> Iterator[ir.Value]:
+        self, count: Place, goes_on: Callable[[], Any] | None = None
+    ) -> Iterator[Any]:
         """Write what is done for each number below a count, as long as something holds."""
         builder = self.builder
         count = INTEGER(count) if isinstance(count, int) else count

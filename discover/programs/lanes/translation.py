@@ -94,13 +94,14 @@ class Translation:
 
     def _branches(self, branches, index: Values, inputs: list[Values]) -> list[Values]:
         """Return what the branch of an index gives; a branch that all lanes share is jumped to."""
-        arithmetic, which = self.arithmetic, index[()]
+        arithmetic = self.arithmetic
+        which: Value = index[()]
         if arithmetic.is_known(which):
             place = min(max(int(which), 0), len(branches) - 1)
             return self._inner(branches[place], inputs)
         if len(branches) != 2:
             raise NotTranslatable("a choice between several branches")
-        if which.type.is_pointer or which.type == DOUBLES:
+        if which.type == DOUBLES:
             raise NotTranslatable("a branch by a number")
         no, yes = branches
         if isinstance(which.type, ir.VectorType):
@@ -109,7 +110,7 @@ class Translation:
             return [_elementwise(choose, *pair) for pair in zip(*either, strict=True)]
         return self._jump(which, lambda: self._inner(yes, inputs), lambda: self._inner(no, inputs))
 
-    def _jump(self, which: ir.Value, yes: Callable, no: Callable) -> list[Values]:
+    def _jump(self, which: Value, yes: Callable, no: Callable) -> list[Values]:
         builder, ends = self.arithmetic.builder, []
         blocks = [builder.append_basic_block(name) for name in ("yes", "no", "after")]
         builder.cbranch(which, blocks[0], blocks[1])
@@ -152,7 +153,7 @@ class Translation:
 
 def _kind(values: Values) -> Any:
     """Return the type of JAX of an array of values."""
-    first = values.flat[0] if values.size else 0.0
+    first: Value = values.flat[0] if values.size else 0.0
     if isinstance(first, ir.Value):
         return jnp.bool_ if first.type != DOUBLES else jnp.float64
     return np.asarray(first).dtype
