@@ -122,7 +122,10 @@ def main() -> None:
     """Print the table."""
     trees = [str(Path(__file__).parents[1]), *sys.argv[1:2]]
     turns = [[of_tree(tree) for tree in trees] for _ in range(TURNS)]
-    print(f"{'ms a vector, of ' + str(BATCHES):30}" + "   ".join(f"{tree[-20:]:>20}" for tree in trees))
+    print(
+        f"{'ms a vector, of ' + str(BATCHES):30}"
+        + "   ".join(f"{tree[-20:]:>20}" for tree in trees)
+    )
     for case in CASES:
         medians = [
             np.median([turn[i][case]["ms"] for turn in turns], axis=0) for i in range(len(trees))

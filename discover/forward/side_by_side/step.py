@@ -147,7 +147,7 @@ class Step:
 
     def _added(self, shared: Shared, mode: Mode, on, stress, rate):
         library, values = self.fluid.added.library, self.fluid.values
-        total = jnp.zeros(4)
+        total: Any = jnp.zeros(4)
         if library.tensors:
             total = _if(on["library"], lambda: self._of_library(shared, on, stress, rate), total)
         for effect in self.fluid.added.others:
@@ -164,7 +164,8 @@ class Step:
     def _of_library(self, shared: Shared, on, stress, rate):
         library = self.fluid.added.library
         monomials, basis = library.monomials(stress, rate), integrity_basis(stress, rate)
-        matrix, total = library.matrix(shared.theta), jnp.zeros(4)
+        matrix = library.matrix(shared.theta)
+        total: Any = jnp.zeros(4)
         for tensor in library.tensors:
 
             def more(tensor=tensor, total=total):
@@ -238,7 +239,7 @@ class Step:
     def beside(self, shared: Shared, on, flow, rate):
         """Return the recorded stress beside the modes; see `AugmentedFluid.beside`."""
         intensity, viscous = (1.0, 1.0) if flow is None else (flow.intensity, flow.viscous)
-        total = shared.solvent_viscosity * viscous * rate
+        total: Any = shared.solvent_viscosity * viscous * rate
         for effect in beside_modes(self.fluid):
 
             def more(effect=effect, total=total):
@@ -251,7 +252,7 @@ class Step:
 
     def _factor(self, name: str, shared, on, levels):
         """Return the product of a factor of all states; see `Dynamics.combined`."""
-        total = jnp.ones(())
+        total: Any = jnp.ones(())
         for effect, level in zip(self.fluid.states, levels, strict=True):
             if getattr(type(effect), name) is getattr(StateEffect, name):
                 continue

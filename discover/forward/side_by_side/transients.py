@@ -187,7 +187,7 @@ class SideBySide:
             | {name: getattr(laid_out, name) for name in _OF_RUNS},
         )
         if not goes_on:
-            stress[:] = np.inf
+            stress[:] = np.nan
         rows = np.arange(runs)[:, None]
         if not np.any(thetas[:, self._distorting]):
             return stress[rows, laid_out.sample[:runs]]

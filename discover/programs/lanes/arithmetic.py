@@ -56,6 +56,11 @@ class Arithmetic:
         """Return whether values are numbers already."""
         return not any(isinstance(value, ir.Value) for value in values)
 
+    @staticmethod
+    def is_truth(value: Value) -> bool:
+        """Return whether a value is a truth yet to be found."""
+        return isinstance(value, ir.Value) and getattr(value, "type", None) != DOUBLES
+
     def lanes(self, value: Value) -> Value:
         """Return a value as eight doubles."""
         if self.is_known(value):
@@ -151,7 +156,7 @@ class Arithmetic:
             return yes if which else no
         if yes is no or (self.is_known(yes, no) and yes == no):
             return yes
-        if any(isinstance(x, ir.Value) and x.type != DOUBLES for x in (yes, no)):
+        if self.is_truth(yes) or self.is_truth(no):
             raise NotTranslatable("a choice between truths")
         return self._once(
             "select",

@@ -70,9 +70,7 @@ class Writing:
         return total
 
     @contextmanager
-    def loop(
-        self, count: Place, goes_on: Callable[[], Any] | None = None
-    ) -> Iterator[Any]:
+    def loop(self, count: Place, goes_on: Callable[[], Any] | None = None) -> Iterator[Any]:
         """Write what is done for each number below a count, as long as something holds."""
         builder = self.builder
         count = INTEGER(count) if isinstance(count, int) else count

@@ -155,7 +155,7 @@ def _kind(values: Values) -> Any:
     """Return the type of JAX of an array of values."""
     first: Value = values.flat[0] if values.size else 0.0
     if isinstance(first, ir.Value):
-        return jnp.bool_ if first.type != DOUBLES else jnp.float64
+        return jnp.bool_ if Arithmetic.is_truth(first) else jnp.float64
     return np.asarray(first).dtype
 
 
