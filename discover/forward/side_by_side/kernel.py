@@ -34,7 +34,12 @@ _MISSING, _EARLIER, _SHEARED, _MISSED, _TAKEN, _SUM, _OTHER_SUM, _LEVELS = range
 
 
 class Kernel:
-    """Machine code for one structure of law and effects. See `written`.
+    """Machine code for one structure of law and effects, with numbers and runs as data.
+
+    Attributes
+    ----------
+    flags
+        Which parts of it a vector needs.
 
     Parameters
     ----------
@@ -100,7 +105,9 @@ class Kernel:
         arrays = given | {
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
         }  # fmt: skip
-        self._call(runs, steps, modes, tabled, *(arrays[name].ctypes.data for name in _ARRAYS))
+        # contiguous already; were one of them not, the code would read what is not its own
+        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
+        self._call(runs, steps, modes, tabled, *(array.ctypes.data for array in laid))
         return stress, felt, bool(goes_on[0])
 
     def packed(self, tree: Any, of_mode: bool) -> jax.Array:
