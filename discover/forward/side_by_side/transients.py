@@ -151,7 +151,8 @@ class SideBySide:
             found = self._eight(numbers, thetas[lanes], part, laid_out, runs, used, table, limit)
             out[trials] = np.moveaxis(found, -1, 0)[: len(trials)]
 
-        in_threads(eight, np.split(order, range(LANES, len(order), LANES)))
+        # to compile is behind a lock, so that no first call is needed alone
+        in_threads(eight, np.split(order, range(LANES, len(order), LANES)), is_compiled=True)
         return out
 
     def _eight(
@@ -233,14 +234,14 @@ class SideBySide:
         self, numbers: Numbers, part: TransientFlows, time: float, count: int
     ) -> tuple[float, np.ndarray | None]:
         """Return the weights of the steps for trials of the same times, and what tells these."""
-        known = self._known_table
-        if known is not None and known[0] is numbers and known[1] is part and known[2] == time:
+        known, own = self._known_table, numbers.relaxation_time
+        if known is not None and known[0] is own and known[1] is part and known[2] == time:
             return time, known[3]
         if count < _MANY and time != 0.0:
             return time, None
-        times = np.asarray(numbers.relaxation_time) * np.exp(time)
+        times = np.asarray(own) * np.exp(time)
         decay = jnp.asarray(float(numbers.law.linear_relaxation))
         weights = np.asarray(declared_weights(part.times, jnp.asarray(times), decay))
         found = np.ascontiguousarray(np.swapaxes(weights[:, :, 0, :WEIGHTS], 2, 3))
-        self._known_table = numbers, part, time, found
+        self._known_table = own, part, time, found
         return time, found

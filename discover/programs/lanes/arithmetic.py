@@ -125,6 +125,8 @@ class Arithmetic:
 
     def divide(self, x: Value, y: Value) -> Value:
         """Return x / y."""
+        if isinstance(x, int) and isinstance(y, int):
+            raise NotTranslatable("a division of whole numbers")
         if self.is_known(x, y) and y != 0:
             return x / y
         if self.is_known(y) and y == 1:
@@ -168,6 +170,8 @@ class Arithmetic:
         """Return the logical ``and`` or ``or`` of truths."""
         for known, other in ((x, y), (y, x)):
             if self.is_known(known):
+                if not isinstance(known, bool):
+                    raise NotTranslatable("bits of whole numbers")
                 decides = bool(known) == (name == "or")
                 return bool(known) if decides else other
         if x.type != y.type:

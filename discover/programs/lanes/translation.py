@@ -64,7 +64,11 @@ class Translation:
         known.update(zip(jaxpr.invars, arguments, strict=True))
         for equation in jaxpr.eqns:
             inputs = [read(variable) for variable in equation.invars]
-            found = self._equation(equation, inputs)
+            try:
+                found = self._equation(equation, inputs)
+            except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+                # a primitive used in a way that nobody thought of is as unknown as another
+                raise NotTranslatable(equation.primitive.name) from error
             outputs = found if equation.primitive.multiple_results else [found]
             known.update(zip(equation.outvars, map(as_values, outputs), strict=True))
         return [read(variable) for variable in jaxpr.outvars]
