@@ -79,15 +79,15 @@ class AddedTerms:
             and e.term.closed_form is None
             and e.name not in self._varying
         ]
-        self._library = LibraryMatrix(plain, [slices[term.name].start for term in plain])
-        self._others = [e for e in effects if e.adds_term and e not in plain]
+        self.library = LibraryMatrix(plain, [slices[term.name].start for term in plain])
+        self.others = [e for e in effects if e.adds_term and e not in plain]
         self._slices = slices
 
     def in_use(self, theta: Float[np.ndarray, " p"]) -> InUse:
         """Return the branches that a parameter vector takes."""
-        tensors = self._library.tensors_in_use(theta)
-        others = [i for i, e in enumerate(self._others) if self._is_used(theta, e)]
-        several = len(self._others) + 1
+        tensors = self.library.tensors_in_use(theta)
+        others = [i for i, e in enumerate(self.others) if self._is_used(theta, e)]
+        several = len(self.others) + 1
         return InUse(
             np.int32(min(len(tensors), 2)),
             np.int32(tensors[0] if tensors else 0),
@@ -107,9 +107,9 @@ class AddedTerms:
     ) -> ModesRate:
         """Return the function that sums what is in use, dimensionless."""
         library = (
-            self._library_rate(theta, used, in_one_piece) if self._library.tensors else _nothing
+            self._library_rate(theta, used, in_one_piece) if self.library.tensors else _nothing
         )
-        others = self._others_rate(theta, used, amplitudes or {}) if self._others else _nothing
+        others = self._others_rate(theta, used, amplitudes or {}) if self.others else _nothing
 
         def total(state, gradient):
             stress = state[:4]
@@ -120,7 +120,7 @@ class AddedTerms:
         return total
 
     def _library_rate(self, theta, used: InUse, in_one_piece: bool) -> ModesRate:
-        library, matrix = self._library, self._library.matrix(theta)
+        library, matrix = self.library, self.library.matrix(theta)
         # with one tensor in use all other rows are zero
         row = matrix.sum(axis=0)
         tensors = [
@@ -158,7 +158,7 @@ class AddedTerms:
             values = [values_of(e) for e in effects]
             return lambda stress, gradient: every(values, stress, gradient)
 
-        branches = [_nothing, *(of([e]) for e in self._others), of(self._others)]
+        branches = [_nothing, *(of([e]) for e in self.others), of(self.others)]
         return lambda *flow: jax.lax.switch(used.others, branches, *flow)
 
 

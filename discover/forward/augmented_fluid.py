@@ -1,8 +1,11 @@
 """The fluid that a vector of parameters is: a declared law with effects, as integrators take it."""
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
 from discover.effects import (
     AbstractEffect,
@@ -20,6 +23,26 @@ from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.protocols.kinematics import Kinematics
 from tensor_library.kinematics import rate_of_deformation
+
+
+class OfModes(NamedTuple):
+    """What a vector of parameters says of each mode.
+
+    Attributes
+    ----------
+    law
+        With the values of its free parameters, and constants of its own for each mode where these
+        differ.
+    declared, extra
+        The declared modes, and those of effects.
+    amplitudes
+        Of effects whose amplitude differs from mode to mode, by name.
+    """
+
+    law: AbstractConstitutiveLaw
+    declared: Modes
+    extra: Modes | None
+    amplitudes: dict[str, Float[Array, " k"]]
 
 
 class AugmentedFluid:
@@ -50,19 +73,19 @@ class AugmentedFluid:
             position += len(effect.parameters)
         self.instants = slice(position, position + structure.step_instants)
         self.size = self.instants.stop
-        self._constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
+        self.constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
         # of the law's constants, and of effects' amplitudes
         slots = {name: slice(start, end) for name, start, end in structure.by_mode}
         free = structure.free_parameters
         self._varying_law = {name: at for name, at in slots.items() if name in free}
-        self._varying_effects = {
-            e: slots[e.name] for e in self._constitutive if e.name in slots and e.name not in free
+        self.varying_effects = {
+            e: slots[e.name] for e in self.constitutive if e.name in slots and e.name not in free
         }
-        of_effects = {e.name: at for e, at in self._varying_effects.items()}
-        self._added = AddedTerms(self._constitutive, self.slices, of_effects)
-        self._by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
+        of_effects = {e.name: at for e, at in self.varying_effects.items()}
+        self.added = AddedTerms(self.constitutive, self.slices, of_effects)
+        self.by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
-        self._states = [e for e in effects if isinstance(e, StateEffect)]
+        self.states = [e for e in effects if isinstance(e, StateEffect)]
         self.series = [e for e in effects if isinstance(e, SeriesElement)]
 
     def values(self, theta, effect: AbstractEffect):
@@ -71,15 +94,15 @@ class AugmentedFluid:
 
     def in_use(self, theta: np.ndarray) -> InUse:
         """Return the branches that a parameter vector takes."""
-        states = [i for i, e in enumerate(self._states) if theta[self.slices[e.name].start] != 0.0]
-        several = len(self._states) + 1
-        used = self._added.in_use(theta)._replace(
+        states = [i for i, e in enumerate(self.states) if theta[self.slices[e.name].start] != 0.0]
+        several = len(self.states) + 1
+        used = self.added.in_use(theta)._replace(
             states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
-            times=np.int32(any(self._states[i].changes_times for i in states)),
+            times=np.int32(any(self.states[i].changes_times for i in states)),
         )
-        if self._by_mode is None:
+        if self.by_mode is None:
             return used
-        differ = theta[self.slices[self._by_mode.name].start] != 0.0
+        differ = theta[self.slices[self.by_mode.name].start] != 0.0
         return used._replace(by_mode=np.int32(differ))
 
     def beside(self, numbers, theta, rate, flow: Kinematics | None):
@@ -90,7 +113,7 @@ class AugmentedFluid:
         """
         intensity, viscous = (1.0, 1.0) if flow is None else (flow.intensity, flow.viscous)
         total = numbers.solvent_viscosity * viscous * rate
-        for effect in self._constitutive:
+        for effect in self.constitutive:
             shear = effect.instantaneous_stress(self.values(theta, effect), intensity * rate)
             total = total + viscous / intensity * shear
         return total
@@ -125,9 +148,7 @@ class AugmentedFluid:
 
     def _terms_by_mode(self, law, added, theta, modes: Modes):
         """Return the function by how much h of each mode differs from that of equal constants."""
-        by_mode = self._by_mode
-        assert by_mode is not None
-        factors = by_mode.factors(self.values(theta, by_mode), *modes)
+        factors = self.by_mode_factors(theta, modes)
 
         def of_mode(law, stress, gradient):
             return law.extra_term(stress, rate_of_deformation(gradient))
@@ -142,24 +163,14 @@ class AugmentedFluid:
 
         return differing
 
-    def dynamics(
-        self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
-    ) -> Dynamics:
-        """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
-
-        Parameters
-        ----------
-        numbers, used, theta
-            What is data to the program, the branches that the vector takes, and the vector.
-        flow, in_one_piece
-            The flow, and whether steps are one piece of machine code.
-        """
+    def of_modes(self, numbers, theta) -> OfModes:
+        """Return what a vector of parameters says of each mode."""
         extra = None
         if self._modes:
             pairs = [effect.mode(self.values(theta, effect)) for effect in self._modes]
             extra = Modes(*(jnp.stack(column) for column in zip(*pairs, strict=True)))
         places = None
-        if self._varying_law or self._varying_effects:
+        if self._varying_law or self.varying_effects:
             places = decades(numbers.modulus, numbers.relaxation_time)
             if extra is not None:
                 own = self.structure.added_modes > 0
@@ -176,7 +187,6 @@ class AugmentedFluid:
             modulus = modulus * jnp.exp(theta[0])
         # that on the times is tried where it is not fitted too
         relaxation_time = relaxation_time * jnp.exp(theta[1])
-        of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
         amplitudes = {
             e.name: self._varied(
                 theta,
@@ -185,15 +195,36 @@ class AugmentedFluid:
                 at,
                 places,
             )
-            for e, at in self._varying_effects.items()
+            for e, at in self.varying_effects.items()
         }
-        added = self._added.rate(theta, used, amplitudes, in_one_piece)
+        return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
+
+    def by_mode_factors(self, theta, modes: Modes) -> Float[Array, " k"]:
+        """Return the factor on h of each declared mode."""
+        assert self.by_mode is not None
+        return self.by_mode.factors(self.values(theta, self.by_mode), *modes)
+
+    def dynamics(
+        self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
+    ) -> Dynamics:
+        """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
+
+        Parameters
+        ----------
+        numbers, used, theta
+            What is data to the program, the branches that the vector takes, and the vector.
+        flow, in_one_piece
+            The flow, and whether steps are one piece of machine code.
+        """
+        law, declared, extra, amplitudes = self.of_modes(numbers, theta)
+        of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
+        added = self.added.rate(theta, used, amplitudes, in_one_piece)
 
         def modes_rate(stress, gradient):
             same = of_law(stress, gradient) - added(stress, gradient)
-            if self._by_mode is None:
+            if self.by_mode is None:
                 return same
-            differing = self._terms_by_mode(law, added, theta, Modes(modulus, relaxation_time))
+            differing = self._terms_by_mode(law, added, theta, declared)
             return same - jax.lax.switch(
                 used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, gradient
             )
@@ -207,16 +238,18 @@ class AugmentedFluid:
         return Dynamics(
             modes_rate,
             law.linear_relaxation,
-            Modes(modulus, relaxation_time),
+            declared,
             extra,
-            {effect: self.values(theta, effect) for effect in self._states},
+            {effect: self.values(theta, effect) for effect in self.states},
             series,
             self.beside(numbers, theta, jnp.ones(1), flow)[0],
-            self._of_modes_at_rest("relaxations", law, modulus, extra) if law.retracts else None,
+            self._of_modes_at_rest("relaxations", law, declared.modulus, extra)
+            if law.retracts
+            else None,
             used.times,
             used.states,
             law.variables,
-            self._of_modes_at_rest("shares", law, modulus, extra) if law.tensors else None,
+            self._of_modes_at_rest("shares", law, declared.modulus, extra) if law.tensors else None,
             in_one_piece,
         )
 

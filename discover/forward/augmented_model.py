@@ -1,15 +1,15 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
 An effect at zero amplitude changes nothing, so a subset of effects is a vector of parameters with
-zeros, never another program. Runs are padded to one grid and mapped over. Trial vectors are not: in
-a call of its own, each leaves out the terms that it has at zero.
+zeros, never another program. Runs are padded to one grid. Transients at a given rate of all trial
+vectors go through one kernel, see `discover.forward.side_by_side`; of what else there is each
+vector is a call of its own, which leaves out the terms that it has at zero.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
-from itertools import repeat
 from typing import Any
 
 import jax
@@ -239,9 +239,9 @@ class AugmentedModel:
         """Return the records that a part of a batch holds, in the order of its rows."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
-            return _of_sweeps(self._of_piece(thetas, (part, None)), batch.moduli)
+            return _of_sweeps(self._of_piece(thetas, (part, None, 0)), batch.moduli)
         if not isinstance(part, TransientFlows):
-            return self._of_piece(thetas, (part, None))
+            return self._of_piece(thetas, (part, None, 0))
         pieces = self._pieces(part, batch, batch.rows[number])
         found = [self._of_piece(thetas, piece, limits) for piece in pieces]
         runs, samples = part.sample_index.shape
@@ -250,18 +250,32 @@ class AugmentedModel:
     def _of_piece(
         self, thetas, piece: "_Piece", limits: Iterable[float] | None = None
     ) -> Float[np.ndarray, "trials runs *columns"]:
-        program, (part, judging) = self._program, piece
+        program, (part, judging, asked) = self._program, piece
+        wanted = [np.inf] * len(thetas) if limits is None else limits
+        wanted = [
+            limit if program.is_judged_by_modes(theta) else np.inf
+            for theta, limit in zip(thetas, wanted, strict=True)
+        ]
+        if isinstance(part, TransientFlows):
+            assert judging is not None  # of transients alone
+            kernel = program.side_by_side(self._numbers, part)
+            if kernel is not None:
+                vectors = np.asarray(thetas, dtype=float)
+                return kernel.predict(
+                    self._numbers, vectors, part, judging, asked, np.array(wanted)
+                )
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial
             used = program.fluid.in_use(theta)
             weights = self._weights(theta, part)
-            limit = np.float64(limit if program.is_judged_by_modes(theta) else np.inf)
-            found = program.predict(self._numbers, used, theta, part, judging, weights, limit)
+            found = program.predict(
+                self._numbers, used, theta, part, judging, weights, np.float64(limit)
+            )
             return np.asarray(found)
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        trials = zip(thetas, repeat(np.inf, len(thetas)) if limits is None else limits, strict=True)
+        trials = zip(thetas, wanted, strict=True)
         found = in_threads(one, trials, is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
@@ -283,7 +297,8 @@ class AugmentedModel:
         judging, pieces = batch.records.of_runs(rows, part.room.samples), []
         for flows in inside:
             size = flows.room
-            pieces.append((flows, judging.padded(size.runs, size.samples)))
+            own = min(size.runs, len(judging))
+            pieces.append((flows, judging.padded(size.runs, size.samples), own))
             judging = judging.of_runs(range(size.runs, len(judging)))
         self._laid_out.append((part, batch.records, pieces))
         del self._laid_out[:-_KEPT]
@@ -332,8 +347,9 @@ class AugmentedModel:
         return out
 
 
-_Piece = tuple[Flows, Records | None]
-"""Flows that a program follows at once, and what judges them on the way."""
+_Piece = tuple[Flows, Records | None, int]
+"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
+no padding."""
 
 
 def _of_sweeps(

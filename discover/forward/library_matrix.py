@@ -24,28 +24,28 @@ class LibraryMatrix:
     """
 
     def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
-        self._positions = np.asarray(positions, dtype=int)
-        self._powers = tuple(dict.fromkeys(term.term.powers for term in terms))
-        self._rows = np.array([term.term.tensor for term in terms], dtype=int)
-        self._columns = np.array([self._powers.index(t.term.powers) for t in terms], dtype=int)
-        self.tensors = tuple(sorted(set(self._rows.tolist())))
+        self.positions = np.asarray(positions, dtype=int)
+        self.powers = tuple(dict.fromkeys(term.term.powers for term in terms))
+        self.rows = np.array([term.term.tensor for term in terms], dtype=int)
+        self.columns = np.array([self.powers.index(t.term.powers) for t in terms], dtype=int)
+        self.tensors = tuple(sorted(set(self.rows.tolist())))
         """Basis tensors that occur."""
 
     def tensors_in_use(self, theta: Float[np.ndarray, " p"]) -> list[int]:
         """Return which of `tensors` have a coefficient that is not zero, by position."""
-        used = set(self._rows[theta[self._positions] != 0.0].tolist())
+        used = set(self.rows[theta[self.positions] != 0.0].tolist())
         return [i for i, tensor in enumerate(self.tensors) if tensor in used]
 
     def matrix(self, theta: Float[Array, " p"]) -> Float[Array, "8 m"]:
         """Return the coefficients as a matrix."""
-        empty = jnp.zeros((8, len(self._powers)))
-        return empty.at[self._rows, self._columns].add(theta[self._positions])
+        empty = jnp.zeros((8, len(self.powers)))
+        return empty.at[self.rows, self.columns].add(theta[self.positions])
 
     def monomials(self, stress, rate) -> Float[Array, " m"]:
         """Return the monomials of the invariants, in the order of the columns."""
         invariants = scalar_invariants(stress, rate)
         values = []
-        for powers in self._powers:
+        for powers in self.powers:
             value = jnp.ones(())
             for i, power in enumerate(powers):
                 for _ in range(power):

@@ -1,7 +1,10 @@
 """What is compiled of a model: predictions for one structure of law and effects."""
 
+import logging
 from functools import lru_cache
+from typing import Any
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -23,6 +26,7 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
+from discover.forward.side_by_side import Kernel, SideBySide
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -30,7 +34,10 @@ from discover.forward.starts.steady_states import steady_states
 from discover.forward.structure import Numbers, Structure
 from discover.laws import LAWS
 from discover.programs import compiled
+from discover.programs.lanes import NotTranslatable
 from discover.protocols.kinematics import Kinematics
+
+_LOGGER = logging.getLogger(__name__)
 
 # Modes up to which the steps at a given rate are one piece of machine code; see `contracted`. With
 # eight runs and all candidates a prediction takes 2.0 ms so and 6.3 otherwise for 3 modes, 4.8 and
@@ -53,6 +60,8 @@ class Program:
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self.predict = compiled(self._predict_all, made_from=(structure, build))
+        self._made_from = (structure, build)
+        self._kernels: dict[Any, SideBySide | None] = {}
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
@@ -69,6 +78,31 @@ class Program:
         return declared_weights(
             runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
         )
+
+    def side_by_side(self, numbers: Numbers, part: TransientFlows) -> SideBySide | None:
+        """Return what predicts many vectors at once; None where that is left to `predict`.
+
+        To it are left chains that retract, runs that begin with a periodic state, and what laws or
+        effects of a user's own do that is not known in lanes.
+        """
+        law = numbers.law
+        if law.retracts or law.tensors or part.cycle_steps:
+            return None
+        flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
+        arrays, rest = eqx.partition(numbers.law, eqx.is_array)
+        shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
+        kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
+        if kind not in self._kernels:
+            try:
+                kernel = Kernel(self.fluid, numbers, flow)
+            except NotTranslatable as reason:
+                _LOGGER.debug("vectors are predicted one by one: %s", reason)
+                self._kernels[kind] = None
+            else:
+                self._kernels[kind] = SideBySide(
+                    self.fluid, kernel, self._rates, self._at_samples, self._made_from
+                )
+        return self._kernels[kind]
 
     def is_judged_by_modes(self, theta: np.ndarray) -> bool:
         """Return whether nothing alters the record after the modes, or gives way in series."""
@@ -110,6 +144,27 @@ class Program:
         weights,
         limit,
     ):
+        flow = run.kinematics
+        rate, tool_rate = self._rates(theta, run)
+        times = run.times[::2]
+        dynamics = self.fluid.dynamics(
+            numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
+        )
+        cycle = None
+        if run.cycle_steps:
+            cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
+        # as it is where `is_judged_by_modes`, which is where there is a limit
+        beside = self.fluid.beside(numbers, theta, rate[::2], flow)
+        nothing = jnp.zeros_like(times)
+        weight = nothing.at[run.sample_index].add(judging.weight)
+        recorded = nothing.at[run.sample_index].add(judging.recorded)
+        judged = Judged(weight, recorded, beside, limit)
+        stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
+        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
+        return self._at_samples(theta, run, stress, felt, tool_rate)
+
+    def _rates(self, theta, run: TransientFlows):
+        """Return the rate that the fluid feels, at half steps, and that of the tool at steps."""
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -126,24 +181,15 @@ class Program:
         for effect in self._downstream:
             changed = effect.felt_rate(self.fluid.values(theta, effect), instrument_times, rate)
             rate = where_in_shear(flow, changed, rate)
-        times = run.times[::2]
-        dynamics = self.fluid.dynamics(
-            numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
-        )
-        cycle = None
-        if run.cycle_steps:
-            cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        # as it is where `is_judged_by_modes`, which is where there is a limit
-        beside = self.fluid.beside(numbers, theta, rate[::2], flow)
-        nothing = jnp.zeros_like(times)
-        weight = nothing.at[run.sample_index].add(judging.weight)
-        recorded = nothing.at[run.sample_index].add(judging.recorded)
-        judged = Judged(weight, recorded, beside, limit)
-        stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
-        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
+        return rate, tool_rate
+
+    def _at_samples(self, theta, run: TransientFlows, stress, felt, tool_rate):
+        """Return the recorded stress at the samples, of that at all steps before the signal."""
         for effect in self._signal:
-            record = Record(times, felt, stress, run.clock_factor, run.strain_before, tool_rate)
-            stress = self._as_recorded(theta, effect, record, flow)
+            record = Record(
+                run.times[::2], felt, stress, run.clock_factor, run.strain_before, tool_rate
+            )
+            stress = self._as_recorded(theta, effect, record, run.kinematics)
         return stress[run.sample_index]
 
     def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):

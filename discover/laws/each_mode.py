@@ -124,7 +124,7 @@ def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callab
     axis
         Along which the modes lie, in the numbers and in what is returned.
     """
-    own, shared = _apart(tree)
+    own, shared = apart(tree)
 
     def of_mode(own, *numbers):
         return function(eqx.combine(own, shared), *numbers)
@@ -218,7 +218,7 @@ def _parts(tree: Any) -> list[Any]:
     return jax.tree.leaves(tree, is_leaf=_is_of_each)
 
 
-def _apart(tree: Tree) -> tuple[Tree, Tree]:
+def apart(tree: Tree) -> tuple[Tree, Tree]:
     """Return what differs from mode to mode, and all else, each with None for the other."""
     differs = jax.tree.map(
         lambda part: eqx.is_array if _is_of_each(part) else False, tree, is_leaf=_is_of_each

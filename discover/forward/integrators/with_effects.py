@@ -16,7 +16,7 @@ from discover.forward.starts.periodic_start import Cycle, periodic_start
 from discover.protocols.kinematics import Kinematics
 
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
-_JUMP = 1e-9
+JUMP = 1e-9
 
 RUNS = "runs"
 """Axis along which runs are followed side by side, all by the same number of steps."""
@@ -230,7 +230,7 @@ def _compliance_rate(
     taken = compliance * (predicted - (stiffness + viscous) * earlier)
     taken = taken + 0.5 * slip * h * before + missing
     now = -taken / (h + compliance * (stiffness + viscous))
-    now = jnp.where(h > _JUMP * end, now, earlier)
+    now = jnp.where(h > JUMP * end, now, earlier)
     change = (now - earlier) * own_time
     # the upper convected derivative is linear in the rate
     zero = jnp.zeros_like(stress[0])

@@ -1,0 +1,358 @@
+"""The loops over runs, steps and modes, in machine code for eight vectors of parameters at once.
+
+What is done in them is told by `step`; here stands where numbers lie. Arrays have the lanes last,
+each run is followed to its own end, and states of the fluid stay in a scratch array.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import llvmlite.ir as ir
+import numpy as np
+
+from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
+from discover.forward.structure import Numbers
+from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
+from discover.programs.lanes.arithmetic import INTEGER
+from discover.protocols.kinematics import Kinematics
+
+_COUNTS = ("runs", "steps", "modes", "tabled")
+# of all modes and lanes: rates, parameters, modes and the limit of each vector; and what is written
+_WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "scratch")
+_WHOLE = ("last", "flags", "goes_on")
+_SCALAR = ("width", "table", "flow", "jump", "weight", "recorded")
+_ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
+
+_EIGHT_BITS = ir.IntType(8)
+
+# Where in the scratch array what stands that is carried from step to step
+_MISSING, _EARLIER, _SHEARED, _MISSED, _TAKEN, _SUM, _OTHER_SUM, _LEVELS = range(8)
+
+
+class Kernel:
+    """Machine code for one structure of law and effects, with numbers and runs as data.
+
+    Attributes
+    ----------
+    flags
+        Which parts of it a vector needs.
+
+    Parameters
+    ----------
+    fluid
+        The fluid with its effects.
+    numbers
+        One of those that it is called with; their values are data.
+    flow
+        Kinematics of one run; None where all are simple shear.
+
+    Raises
+    ------
+    NotTranslatable
+        If a law or an effect does what is not known in lanes.
+    """
+
+    def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
+        self.flags = Flags(fluid)
+        self._times_at = self.flags.names.index("times")
+        theta = jax.ShapeDtypeStruct((fluid.size,), float)
+        found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
+        of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
+        self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
+        law = eqx.combine(found[0].law, found[1].law)
+        is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
+        self._variables = law.variables
+        self._step = Step(fluid, eqx.filter(law, is_array, inverse=True))
+        self._levels = [(e.levels, e.rest) for e in fluid.states]
+        self._series = bool(fluid.series)
+        self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
+        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
+        self._arithmetic = Arithmetic(self._w.builder)
+        self._write = Translation(self._arithmetic)
+        self._runs()
+        self._call = self._w.compiled()
+        # what was written is large, and the code is made
+        del self._w, self._arithmetic, self._write, self._parameters, self._on
+
+    def __call__(
+        self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Return stress and felt rate at step ends, and whether any vector was still of use.
+
+        Both have the shape (runs, ends, lanes); the stress is not a number where none was computed.
+
+        Parameters
+        ----------
+        runs
+            How many runs are followed.
+        tabled
+            Modes whose weights stand in the table.
+        used
+            Parts of the program that one of the vectors needs; see `Flags`.
+        given
+            The arrays beside these, by name.
+        """
+        steps, modes = given["width"].shape[1], len(given["mode"])
+        stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
+        felt, goes_on = np.zeros_like(stress), np.ones(1, np.int64)
+        flags = used.astype(np.int64)
+        flags[-1] = used[self._times_at]
+        scratch = np.empty((self._state_at + modes * (4 + self._variables), LANES))
+        arrays = given | {
+            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
+        }  # fmt: skip
+        # contiguous already; were one of them not, the code would read what is not its own
+        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
+        self._call(runs, steps, modes, tabled, *(array.ctypes.data for array in laid))
+        return stress, felt, bool(goes_on[0])
+
+    def packed(self, tree: Any, of_mode: bool) -> jax.Array:
+        """Return a part of `laid_out` as one array, of modes with these first."""
+        return (self._of_mode if of_mode else self._shared).packed(tree)
+
+    def flows(self, flow: Kinematics | None) -> np.ndarray:
+        """Return the kinematics of runs as one array, shape (runs, numbers)."""
+        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(flow)]
+        if not leaves:
+            return np.zeros((1, 1))
+        return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
+
+    def _runs(self) -> None:
+        w = self._w
+        first = [w.load("shared", i) for i in range(self._shared.size)]
+        self._parameters = self._shared.tree(first)
+        truths = [
+            w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))
+            for i in range(len(self.flags.names))
+        ]
+        self._on = dict(zip(self.flags.names, truths, strict=True))
+        self._keep(0.0, _MISSED)
+        w.store(INTEGER(1), "goes_on", 0)
+        with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
+            self._of_run(run)
+
+    def _goes_on(self):
+        return self._w.builder.icmp_signed("!=", self._w.load("goes_on", 0), INTEGER(0))
+
+    def _keep(self, value: Any, place: Any) -> None:
+        self._w.store(self._arithmetic.lanes(value), "scratch", place)
+
+    def _kept(self, place: Any) -> Any:
+        return self._w.load("scratch", place)
+
+    def _splat(self, name: str, place: Any) -> Any:
+        return self._arithmetic.splat(self._w.load(name, place))
+
+    def _of_run(self, run) -> None:
+        w, counts = self._w, self._w.counts
+        size = self._flow.size
+        kinematics = [self._splat("flow", w.at((run, size), (i, 1))) for i in range(size)]
+        flow = self._flow.tree(kinematics) if size else None
+        for place in (_MISSING, _EARLIER, _SHEARED, _TAKEN):
+            self._keep(0.0, place)
+        place = _LEVELS
+        for levels, rest in self._levels:
+            for _ in range(levels):
+                self._keep(rest, place)
+                place += 1
+        states = w.at((counts["modes"], 4 + self._variables))
+        with w.loop(states) as number:
+            self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
+        with w.loop(w.load("last", run), self._goes_on) as number, self._arithmetic.apart():
+            self._of_step(run, number, flow)
+        with w.builder.if_then(self._goes_on()), self._arithmetic.apart():
+            self._at_start(run, flow)
+            with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
+                self._beside(run, number, flow)
+
+    def _of_step(self, run, number, flow) -> None:
+        w, counts, write, step = self._w, self._w.counts, self._write, self._step
+        shared, on, add = self._parameters, self._on, self._arithmetic.add
+        steps = counts["steps"]
+        half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
+        rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
+        width = self._splat("width", w.at((run, steps), (number, 1)))
+        levels, earlier = self._states(), self._kept(_EARLIER)
+        before, scale_last, slow = write(
+            step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
+        )
+        if self._series:
+            with w.builder.if_then(on["series"]), self._arithmetic.apart():
+                self._foresee(run, number, flow, width, slow, rates, before, scale_last)
+        taken = self._kept(_TAKEN)
+        for place in (_SUM, _OTHER_SUM):
+            self._keep(0.0, place)
+        with w.loop(counts["modes"]) as mode_number, self._arithmetic.apart():
+            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow)
+            after = write(
+                step.of_mode,
+                shared, mode, on, flow, slow, stress, tuple(rates), taken, earlier, weights,
+            )  # fmt: skip
+            for i, value in enumerate(after):
+                self._keep(value, w.at((at, 1), (i, 1)))
+            sheared, recorded = write(step.felt, mode, flow, after)
+            self._keep(add(self._kept(_SUM), sheared[()]), _SUM)
+            if flow is not None:
+                self._keep(add(self._kept(_OTHER_SUM), recorded[()]), _OTHER_SUM)
+        sheared = self._kept(_SUM)
+        recorded = sheared if flow is None else self._kept(_OTHER_SUM)
+        self._keep(sheared, _SHEARED)
+        after, sheared, recorded = write(
+            step.after_modes,
+            shared, on, flow, levels, add(rates[1], taken), width, before, scale_last, sheared,
+            recorded,
+        )  # fmt: skip
+        flat = [value for level in after for value in level.flat]
+        for place, value in enumerate(flat, start=_LEVELS):
+            self._keep(value, place)
+        if self._series:
+            with w.builder.if_then(on["series"]), self._arithmetic.apart():
+                missing = write(
+                    step.missing,
+                    shared, on, flow, tuple(rates), width, before, sheared, self._kept(_MISSING),
+                    taken,
+                )  # fmt: skip
+                self._keep(missing[()], _MISSING)
+        self._keep(taken, _EARLIER)
+        self._record(run, number, flow, recorded[()], taken, rates[2])
+
+    def _foresee(self, run, number, flow, width, slow, rates, before, scale_last) -> None:
+        """Write what series elements take in a step."""
+        w, write, step, add = self._w, self._write, self._step, self._arithmetic.add
+        shared, on, earlier = self._parameters, self._on, self._kept(_EARLIER)
+        sums = (_SUM, _OTHER_SUM)
+        for place in sums:
+            self._keep(0.0, place)
+        with w.loop(w.counts["modes"]) as mode_number, self._arithmetic.apart():
+            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow)
+            rate = add(rates[0], earlier)
+            found = write(step.foreseen, shared, mode, on, flow, slow, stress, rate, weights)
+            for place, value in zip(sums, found, strict=True):
+                self._keep(add(self._kept(place), value[()]), place)
+        taken = write(
+            step.taken,
+            shared, on, flow, tuple(rates), width, self._splat("jump", run), before,
+            self._kept(_MISSING), earlier, scale_last, tuple(self._kept(place) for place in sums),
+        )  # fmt: skip
+        self._keep(taken[()], _TAKEN)
+
+    def _states(self) -> tuple:
+        """Return the states of the fluid, in the shapes of their effects."""
+        found, place = [], _LEVELS
+        for levels, _ in self._levels:
+            values = np.empty((levels,) if levels > 1 else (), object)
+            for at in np.ndindex(values.shape):
+                values[at] = self._kept(place)
+                place += 1
+            found.append(values)
+        return tuple(found)
+
+    def _mode(self, run, number, mode_number, width, slow):
+        """Return a mode, the weights of its step, its stress and where that is kept."""
+        w, builder, counts = self._w, self._w.builder, self._w.counts
+        size = self._of_mode.size
+        mode = self._of_mode.tree(
+            [w.load("mode", w.at((mode_number, size), (i, 1))) for i in range(size)]
+        )
+        untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
+        own = builder.or_(self._on["own weights"], untabled)
+        # past the table's end its first row is read, and not used
+        row = builder.select(untabled, INTEGER(0), mode_number)
+        tabled = w.at((run, counts["steps"]), (number, 1))
+        tabled = w.at((tabled, w.at((counts["tabled"], WEIGHTS))), (row, WEIGHTS))
+        table = [self._splat("table", w.at((tabled, 1), (i, 1))) for i in range(WEIGHTS)]
+        width = self._arithmetic.divide(width, slow[1])
+        on = {"own weights": own}
+        weights = self._write(self._step.weights, mode, on, width, _array(table))
+        at = w.at((mode_number, 4 + self._variables), (self._state_at, 1))
+        stress = [self._kept(w.at((at, 1), (i, 1))) for i in range(4 + self._variables)]
+        return mode, weights, _array(stress), at
+
+    def _record(self, run, number, flow, recorded, taken, rate) -> None:
+        """Write a stress down, and give up where no vector is of use any more."""
+        w, builder, a = self._w, self._w.builder, self._arithmetic
+        steps = w.counts["steps"]
+        at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
+        w.store(a.lanes(recorded), "stress", at)
+        w.store(a.lanes(taken), "felt", at)
+        weight = w.load("weight", at)
+        with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
+            beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
+            off = a.subtract(a.add(recorded, beside), self._splat("recorded", at))
+            off = a.multiply(a.splat(weight), off)
+            missed = a.add(self._kept(_MISSED), a.multiply(off, off))
+            self._keep(missed, _MISSED)
+            limit = w.load("limit", 0)
+            # what is no number is below no limit
+            endless = a.compare("==", limit, float("inf"))
+            of_use = builder.or_(endless, a.compare("<", missed, limit))
+            bits = builder.bitcast(of_use, _EIGHT_BITS)
+            some = builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
+            w.store(builder.zext(some, INTEGER), "goes_on", 0)
+
+    def _at_start(self, run, flow) -> None:
+        """Write what is felt and recorded at the start of a run, where the modes are at rest."""
+        w, a, steps = self._w, self._arithmetic, self._w.counts["steps"]
+        at = w.at((run, w.at((steps, 1), (1, 1))))
+        rate = w.load("rate", w.at((run, w.at((steps, 2), (1, 1)))))
+        felt = a.add(rate, w.load("felt", w.at((at, 1), (1, 1))))
+        beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
+        w.store(a.lanes(beside), "stress", at)
+        w.store(a.lanes(felt), "felt", at)
+
+    def _beside(self, run, number, flow) -> None:
+        """Write the felt rate at the end of a step, and the recorded stress with what is beside."""
+        w, builder, a = self._w, self._w.builder, self._arithmetic
+        steps = w.counts["steps"]
+        ends = w.at((steps, 1), (1, 1))
+        # at a step's end the mean of both sides; it is still the rate taken that `felt` holds
+        at = w.at((run, ends), (number, 1), (1, 1))
+        taken = w.load("felt", at)
+        is_last = builder.icmp_signed("==", w.at((number, 1), (1, 1)), steps)
+        following = w.load(
+            "felt", w.at((at, 1), (builder.select(is_last, INTEGER(0), INTEGER(1)), 1))
+        )
+        rate = w.load("rate", w.at((run, w.at((steps, 2), (1, 1))), (number, 2), (2, 1)))
+        mean = a.multiply(0.5, a.add(taken, following))
+        felt = a.add(rate, mean)
+        beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
+        w.store(a.lanes(a.add(w.load("stress", at), beside)), "stress", at)
+        w.store(a.lanes(felt), "felt", at)
+
+
+def _array(values: Sequence[Any]) -> np.ndarray:
+    found = np.empty(len(values), object)
+    found[:] = values
+    return found
+
+
+class _Layout:
+    """Trees of arrays as one axis of numbers, and back."""
+
+    def __init__(self, tree: Any, axes: int):
+        arrays = eqx.filter(
+            tree, lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct) or eqx.is_array(leaf)
+        )
+        leaves, self._structure = jax.tree.flatten(arrays)
+        self._axes = axes
+        self._shapes = [leaf.shape[axes:] for leaf in leaves]
+        self.size = sum(int(np.prod(shape, dtype=int)) for shape in self._shapes)
+
+    def packed(self, tree: Any) -> jax.Array:
+        leaves = jax.tree.leaves(eqx.filter(tree, eqx.is_array))
+        flat = [jnp.asarray(leaf, float).reshape(*leaf.shape[: self._axes], -1) for leaf in leaves]
+        return jnp.concatenate(flat, axis=-1)
+
+    def tree(self, values: Sequence[Any]) -> Any:
+        leaves, place = [], 0
+        for shape in self._shapes:
+            leaf = np.empty(shape, object)
+            for at in np.ndindex(shape):
+                leaf[at] = values[place]
+                place += 1
+            leaves.append(leaf)
+        return jax.tree.unflatten(self._structure, leaves)

@@ -1,0 +1,122 @@
+"""Machine code of a function written for LLVM, with the loops that hold it."""
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import llvmlite.binding as llvm
+import llvmlite.ir as ir
+
+from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
+
+Place = Any
+"""Where something lies: a whole number, known or of LLVM."""
+
+# arrays of NumPy begin at any double
+_ALIGNED = 8
+
+
+class Writing:
+    """A function of counts and of arrays while it is being written.
+
+    Parameters
+    ----------
+    counts, arrays
+        Names of its arguments: whole numbers first, then addresses. Those of `wide` hold eight
+        doubles at each place, those of `whole` whole numbers, the others a double.
+    """
+
+    def __init__(
+        self, counts: Sequence[str], arrays: Sequence[str], wide: Sequence[str],
+        whole: Sequence[str],
+    ):  # fmt: skip
+        self.module = ir.Module("lanes")
+        self.module.triple = llvm.get_process_triple()
+        held = {name: DOUBLES if name in wide else DOUBLE for name in arrays}
+        held |= dict.fromkeys(whole, INTEGER)
+        kinds = [*(INTEGER for _ in counts), *(held[name].as_pointer() for name in arrays)]
+        function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), "predict")
+        self.counts = dict(zip(counts, function.args, strict=False))
+        self.arrays = dict(zip(arrays, function.args[len(counts) :], strict=True))
+        for address in self.arrays.values():
+            address.add_attribute("noalias")
+        self.builder = ir.IRBuilder(function.append_basic_block("entry"))
+
+    def load(self, name: str, place: Place) -> Any:
+        """Return what an array holds at a place."""
+        found: Any = self.builder.load(self._address(name, place))
+        if found.type == DOUBLES:
+            found.align = _ALIGNED
+        return found
+
+    def store(self, value: Any, name: str, place: Place) -> None:
+        """Let an array hold a value at a place."""
+        stored: Any = self.builder.store(value, self._address(name, place))
+        if value.type == DOUBLES:
+            stored.align = _ALIGNED
+
+    def _address(self, name: str, place: Place) -> Any:
+        place = INTEGER(place) if isinstance(place, int) else place
+        return self.builder.gep(self.arrays[name], [place], inbounds=True)
+
+    def at(self, *places: tuple[Place, Place]) -> Any:
+        """Return the sum of indices times the strides of their axes."""
+        total: Any = INTEGER(0)
+        for index, stride in places:
+            index = INTEGER(index) if isinstance(index, int) else index
+            stride = INTEGER(stride) if isinstance(stride, int) else stride
+            total = self.builder.add(total, self.builder.mul(index, stride))
+        return total
+
+    @contextmanager
+    def loop(self, count: Place, goes_on: Callable[[], Any] | None = None) -> Iterator[Any]:
+        """Write what is done for each number below a count, as long as something holds."""
+        builder = self.builder
+        count = INTEGER(count) if isinstance(count, int) else count
+        head, body, after = (builder.append_basic_block(name) for name in ("head", "body", "after"))
+        before = builder.block
+        builder.branch(head)
+        builder.position_at_end(head)
+        number = builder.phi(INTEGER)
+        number.add_incoming(INTEGER(0), before)
+        inside = builder.icmp_signed("<", number, count)
+        if goes_on is not None:
+            inside = builder.and_(inside, goes_on())
+        builder.cbranch(inside, body, after)
+        builder.position_at_end(body)
+        yield number
+        number.add_incoming(builder.add(number, INTEGER(1)), builder.block)
+        builder.branch(head)
+        builder.position_at_end(after)
+
+    def compiled(self) -> Callable[..., None]:
+        """Return the function, which takes whole numbers and addresses."""
+        self.builder.ret_void()
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+        module = llvm.parse_assembly(str(self.module))
+        module.verify()
+        # registers as wide as there are: by default LLVM keeps to half of them
+        features = f"{llvm.get_host_cpu_features().flatten()},-prefer-256-bit"
+        machine = llvm.Target.from_default_triple().create_target_machine(
+            cpu=llvm.get_host_cpu_name(), features=features, opt=2
+        )
+        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        # all is in lanes already, and the loops are long
+        tuning.slp_vectorization = tuning.loop_vectorization = tuning.loop_unrolling = False
+        passes = llvm.create_pass_builder(machine, tuning)
+        passes.getModulePassManager().run(module, passes)
+        engine = llvm.create_mcjit_compiler(module, machine)
+        engine.finalize_object()
+        numbers = [ctypes.c_int64] * len(self.counts)
+        addresses = [ctypes.c_void_p] * len(self.arrays)
+        kind = ctypes.CFUNCTYPE(None, *numbers, *addresses)
+        function = kind(engine.get_function_address("predict"))
+
+        def call(*arguments: int) -> None:
+            # the engine owns the code, and lives as long as this does
+            assert engine is not None
+            function(*arguments)
+
+        return call

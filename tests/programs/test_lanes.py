@@ -1,0 +1,103 @@
+"""What is written for lanes against NumPy: every digit, infinities, and what is no number."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.programs.lanes import LANES, Arithmetic, NotTranslatable, Translation, Writing
+
+SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e-320, -1.0, 800.0])
+
+
+def in_lanes(function, *arguments):
+    """Return a function of numbers for eight sets of them, by machine code."""
+    w = Writing((), ("x", "y"), ("x", "y"), ())
+    given = [w.load("x", i) for i in range(len(arguments))]
+    found = Translation(Arithmetic(w.builder))(function, *given)
+    leaves = [value for leaf in jax.tree.leaves(found) for value in np.atleast_1d(leaf).flat]
+    for i, value in enumerate(leaves):
+        w.store(Arithmetic(w.builder).lanes(value), "y", i)
+    x, y = np.array(arguments, dtype=float), np.empty((len(leaves), LANES))
+    w.compiled()(x.ctypes.data, y.ctypes.data)
+    return y if len(leaves) > 1 else y[0]
+
+
+@pytest.mark.parametrize(
+    ("of_jax", "of_numpy", "low", "high"),
+    [
+        (jnp.exp, np.exp, -700.0, 700.0),
+        (jnp.expm1, np.expm1, -1.0, 1.0),
+        (jnp.expm1, np.expm1, -1e-9, 1e-9),
+        (jnp.log, np.log, 1e-300, 1e3),
+        (jnp.log, np.log, 0.5, 2.0),
+        (jnp.log1p, np.log1p, -1e-9, 1e-9),
+        (jnp.tanh, np.tanh, -1e-3, 30.0),
+        (jnp.sqrt, np.sqrt, 0.0, 1e10),
+        (lambda x: x**1.7, lambda x: x**1.7, 1e-6, 1e6),
+        (lambda x: x**-3, lambda x: x**-3.0, -2.0, -0.1),
+    ],
+)
+def test_functions_have_the_digits_of_numpy(of_jax, of_numpy, low, high):
+    x = np.linspace(low, high, LANES)
+    # a few roundings; a power loses those of its exponent, here up to 30
+    np.testing.assert_allclose(in_lanes(of_jax, x), of_numpy(x), rtol=2e-14)
+
+
+@pytest.mark.parametrize(
+    ("of_jax", "of_numpy"),
+    [
+        (jnp.exp, np.exp),
+        (jnp.expm1, np.expm1),
+        (jnp.tanh, np.tanh),
+        (jnp.sqrt, np.sqrt),
+        (lambda x: jnp.minimum(x, 60.0), lambda x: np.minimum(x, 60.0)),
+        (lambda x: jnp.clip(x, -1.0, 1.0), lambda x: np.clip(x, -1.0, 1.0)),
+        (lambda x: jnp.where(x > 0.0, x, 2.0), lambda x: np.where(x > 0.0, x, 2.0)),
+    ],
+)
+def test_what_is_infinite_or_no_number_stays_so(of_jax, of_numpy):
+    with np.errstate(all="ignore"):
+        wanted = of_numpy(SPECIAL)
+    np.testing.assert_allclose(in_lanes(of_jax, SPECIAL), wanted, rtol=1e-14, atol=1e-300)
+
+
+def test_a_logarithm_of_what_has_none_is_no_number():
+    found = in_lanes(jnp.log, np.array([0.0, -1.0, np.nan, np.inf, -np.inf, 1.0, np.e, 2.0]))
+    np.testing.assert_allclose(
+        found, [-np.inf, np.nan, np.nan, np.inf, np.nan, 0.0, 1.0, np.log(2.0)], atol=1e-15
+    )
+
+
+def test_the_larger_of_two_is_no_number_where_one_is_none():
+    other = SPECIAL[::-1].copy()
+    np.testing.assert_array_equal(in_lanes(jnp.maximum, SPECIAL, other), np.maximum(SPECIAL, other))
+
+
+def test_branches_by_numbers_are_taken_lane_by_lane():
+    def function(x):
+        return jax.lax.cond(x > 0.0, lambda v: jnp.sqrt(v), lambda v: 1.0 - v, x)
+
+    x = np.linspace(-2.0, 2.0, LANES)
+    wanted = np.where(x > 0.0, np.sqrt(np.abs(x)), 1.0 - x)
+    np.testing.assert_allclose(in_lanes(function, x), wanted, rtol=1e-15)
+
+
+def test_arrays_are_moved_summed_and_multiplied():
+    matrix = np.arange(9.0).reshape(3, 3)
+
+    def function(x, y):
+        tensor = jnp.zeros((3, 3)).at[0, 1].set(x).at[2].add(y)
+        tensor = tensor + jnp.asarray(matrix)
+        return jnp.concatenate([(tensor @ tensor.T).ravel()[1:5], jnp.max(tensor, axis=0)[::-1]])
+
+    x, y = np.linspace(1.0, 2.0, LANES), np.linspace(-3.0, 3.0, LANES)
+    wanted = [np.asarray(function(*pair)) for pair in zip(x, y, strict=True)]
+    np.testing.assert_allclose(in_lanes(function, x, y), np.transpose(wanted), rtol=1e-14)
+
+
+def test_what_is_not_known_in_lanes_is_refused():
+    with pytest.raises(NotTranslatable, match="while"):
+        in_lanes(
+            lambda x: jax.lax.while_loop(lambda v: v < 1.0, lambda v: 2.0 * v, x), np.ones(LANES)
+        )
