@@ -86,7 +86,7 @@ def up_to_the_first_computation() -> Iterator[None]:
         ("discover.closed_loop.searching.make_batch", _reach),
         ("discover.comparison.instrument.known.comparison_flows", _reach),
         ("discover.learners.distillation.simulate", _reach),
-        ("discover.batch.cluster._local_client", _reach),
+        ("discover.batch.run.run_in_workers", _reach),
         ("distributed.Client", lambda address, timeout: client(address, timeout="1s")),
     ]
     with ExitStack() as stack:

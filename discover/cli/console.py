@@ -4,7 +4,7 @@ import io
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from typing import Any
 
 import typer
 
@@ -32,7 +32,7 @@ class _HeardOrNot(io.FileIO):
             return len(data)
 
 
-def heard_or_not(stream: TextIO) -> TextIO:
+def heard_or_not(stream: Any) -> Any:
     """Return a standard stream that takes any character, and lets its reader leave early.
 
     What ``| head`` does not want to see is no reason to leave files unwritten, or for another exit

@@ -82,5 +82,5 @@ def read_json(path: Path) -> Any:
         raise
     except ValueError as error:
         raise InputError(
-            f"{path.name} is no JSON of a result ({error}). Run again with --overwrite."
+            f"{path.name} is not valid JSON of a result ({error}). Run again with --overwrite."
         ) from None

@@ -20,7 +20,7 @@ from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from discover.new_names import require_new_name
-from discover.plain_numbers import as_number
+from discover.plain_numbers import as_number, short
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.registry import Registry
 
@@ -243,11 +243,14 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
             raise InputError(
                 f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to {high:g}."
             )
-        value = as_number(f"The parameter {key!r} of the law {name!r}", parameters[key])
+        try:
+            value = as_number(key, parameters[key])
+        except InputError:
+            value = math.nan
         if not low <= value <= high:
             raise InputError(
                 f"The parameter {key!r} of the law {name!r} must be a number from {low:g} to "
-                f"{high:g}; got {value:g}."
+                f"{high:g}; got {short(parameters[key])}."
             )
         values.append(value)
     return entry.build(*values)

@@ -168,7 +168,7 @@ def _sweep_up(folder: Path) -> None:
 
 def _read_json(path: Path) -> dict[str, Any] | None:
     try:
-        content = parse_json(read_bytes(path, path.name))
+        content = parse_json(read_bytes(path, path.name, is_input=False))
     except ValueError:
         return None  # absent or damaged: computed again
     return content if isinstance(content, dict) else None

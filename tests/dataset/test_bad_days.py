@@ -260,12 +260,14 @@ def test_folders_pipes_and_forbidden_files_are_refused_without_waiting(tmp_path,
     assert "pipe or device" in str(use(tmp_path))
     (tmp_path / "a.csv").unlink()
     write(tmp_path)
-    from pathlib import Path
+    opened = os.open
 
-    def forbidden(self):
-        raise PermissionError(13, "Permission denied", str(self))
+    def forbidden(path, *more, **how):
+        if str(path).startswith(str(tmp_path)):
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *more, **how)
 
-    monkeypatch.setattr(Path, "read_bytes", forbidden)  # the tests may run as root
+    monkeypatch.setattr(os, "open", forbidden)  # the tests may run as root
     message = str(use(tmp_path))
     assert "Permission denied" in message
     assert "study.toml" in message

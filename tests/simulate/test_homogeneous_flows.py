@@ -157,7 +157,7 @@ def test_what_cannot_have_come_before_is_refused():
     for nonsense, word in (
         (lambda: after_steady_flow(start_up(1.0), 0.0, 5.0), "must not be 0"),
         (lambda: after_steady_flow(start_up(1.0), 2.0, 0.0), "end must be a positive time"),
-        (lambda: after_step_strain(start_up(0.0), np.nan, 0.1), "needs a strain"),
+        (lambda: after_step_strain(start_up(0.0), np.nan, 0.1), "strain must be finite"),
         (lambda: after_step_strain(start_up(0.0), 1.0, -0.1), "first must be"),
         (lambda: after_alternation(start_up(1.0), 0.0, TIMES), "period must be"),
         (lambda: after_steady_flow(oscillatory_shear(1.0, 1.0), 2.0, 5.0), "has no beginning"),

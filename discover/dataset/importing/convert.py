@@ -270,7 +270,9 @@ def _read(path: Path, state: _Import) -> None:
 
 _CALIBRATION = re.compile(
     r"calibra|kalibri|étalon|taratura|verification|(reference|standard|référence) (oil|fluid)"
-    r"|viscosity standard|prüföl|referenzöl|air check|self-?test|校正|校准|標準液|較正|보정|교정",
+    r"|viscosity standard"
+    r"|\bblank (run|test|measurement)\b|empty (tool|geometry|cup)|leermessung|prüföl|referenzöl"
+    r"|air check|self-?test|校正|校准|標準液|較正|보정|교정",
     re.IGNORECASE,
 )
 _A_CALIBRATION = (

@@ -16,6 +16,9 @@ _DEGREES = re.compile(
     r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
     r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])",
 )
+_KELVIN_FROM = 200.0
+"""Below which a melt or a solution is frozen, in K."""
+
 _TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 
 
@@ -69,6 +72,11 @@ def _constant(name: str, number: str, unit: str | None) -> Constant:
     return Constant(name, number.replace(",", "."), unit)
 
 
+_AS_SYMBOL = re.compile(
+    r"(?<![^\W_])T(?:emp(?:erature)?)?\s*[=_]\s*(-?[0-9]+(?:[.,][0-9]+)?)(?![\w.,%°])"
+)
+
+
 def temperature_in(text: str) -> Constant | None:
     """Return the temperature that a title or a file's name says; None if it says none, or several.
 
@@ -81,9 +89,13 @@ def temperature_in(text: str) -> Constant | None:
         unit = match[2][0].upper()
         if _TO.search(text[: match.start()]):
             return None  # a ramp
-        if unit == "C" or 200.0 <= float(value) <= 700.0:
+        if unit == "C" or _KELVIN_FROM <= float(value) <= 700.0:
             sign = "-" if match[0].startswith("-") else ""
             found[sign + value, unit] = Constant(
                 "temperature", sign + value, "°C" if unit == "C" else "K"
             )
+    if not found and (match := _AS_SYMBOL.search(text)):
+        value = match[1].replace(",", ".")
+        if abs(float(value)) < _KELVIN_FROM:  # from there on it may be in kelvin
+            return Constant("temperature", value, "°C")
     return next(iter(found.values())) if len(found) == 1 else None

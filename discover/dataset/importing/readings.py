@@ -149,6 +149,7 @@ class Readings:
             (self._find_constant("temperature"), "the header"),
             (temperature_in(self.block.name), "the title"),
             (temperature_in(PurePath(self.name).stem), "the file's name"),
+            (temperature_in("; ".join(map(" ".join, self.block.above))), "the lines above"),
         ):
             if found is None:
                 continue

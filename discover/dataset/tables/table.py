@@ -9,6 +9,7 @@ import stat
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from jaxtyping import Float
@@ -19,6 +20,9 @@ from discover.inputs_kept import note_input
 
 LARGEST_FILE = 300_000_000
 """Bytes; some five million samples. More cannot be looked at, let alone fitted."""
+
+_PIECE = 2**20
+"""Bytes that are read at once."""
 
 LARGEST_VALUE = 1e15
 """No rheometer quantity in SI units is larger; squares of such numbers still compute."""
@@ -170,7 +174,7 @@ def read_bytes(
                     f"{name} is a pipe or device, not a file. Save the data in a file."
                 )
             # a file that grows, or says 0 bytes and never ends, is no larger than the limit either
-            content = file.read(largest + 1) if status.st_size <= largest else b""
+            content = _read(file, status.st_size, largest) if status.st_size <= largest else b""
         size = max(status.st_size, len(content))
         if size > largest:
             raise InputError(
@@ -195,6 +199,17 @@ def read_bytes(
         ) from None
     except ValueError:
         raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+
+
+def _read(file: BinaryIO, size: int, largest: int) -> bytes:
+    """Return what a file of a size holds; of one that holds more one byte more than the largest."""
+    content = file.read(size + 1)
+    if len(content) <= size:
+        return content
+    grown = bytearray(content)  # it grows, or does not say its size
+    while len(grown) <= largest and (piece := file.read(_PIECE)):
+        grown += piece
+    return bytes(grown)
 
 
 def _at_once(path: str, flags: int) -> int:
