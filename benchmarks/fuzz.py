@@ -90,7 +90,7 @@ def harmed(r: random.Random, tree: object, text: Callable = json.dumps) -> bytes
             for key in way:
                 at = at[key]
             at[last] = r.choice([*ODD, at[last]])
-            if isinstance(at, list):
+            if isinstance(at, list) and len(at) < 10 and len(json.dumps(tree)) < 10**5:
                 at *= r.choice([1, 1, 2, 2000])
             elif r.random() < 0.3:
                 del at[last]
@@ -369,6 +369,8 @@ def frame(r: random.Random) -> Input:
     options = {}
     for _ in range(r.choice([1, 1, 2])):
         table, value = samples if runs is None or r.random() < 0.6 else runs, r.choice(odd)
+        if not table.size:
+            break
         column, row = r.randrange(table.shape[1]), r.randrange(len(table))
         match r.choice(["cell", "cell", "heading", "run", "twice", "levels", "rows", "option"]):
             case "cell":

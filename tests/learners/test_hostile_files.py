@@ -63,6 +63,15 @@ def objects(path):
     write(path, {"estimator.json": json.dumps(HEADER), "a.npy": stream.getvalue()})
 
 
+def no_head(path):
+    raw = b"\x93NUMPY\1\0" + (9001).to_bytes(2, "little") + b"(" * 9000 + b"\n"
+    write(path, {"estimator.json": json.dumps(HEADER), "a.npy": raw})
+
+
+def otherwise_packed(path):
+    write(path, {"estimator.json": json.dumps(HEADER)}, zipfile.ZIP_LZMA)
+
+
 def encrypted(path):
     write(path, {"estimator.json": json.dumps(HEADER)}, zipfile.ZIP_STORED)
     raw = bytearray(path.read_bytes())
@@ -73,7 +82,17 @@ def encrypted(path):
 
 @pytest.mark.parametrize(
     "make",
-    [swelling, many, deep, large_shape, overflowing_shape, objects, encrypted],
+    [
+        swelling,
+        many,
+        deep,
+        large_shape,
+        overflowing_shape,
+        objects,
+        no_head,
+        otherwise_packed,
+        encrypted,
+    ],
     ids=lambda make: make.__name__,
 )
 def test_a_file_that_would_fill_the_memory_or_run_something_is_refused(make, tmp_path):

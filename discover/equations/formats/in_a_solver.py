@@ -98,6 +98,8 @@ def in_a_solver(equation: Equation) -> InASolver | str | None:
         flows = [(0.0, 10.0 * max(1.0, mean / time))]
         for deborah in dict.fromkeys(box.deborah):
             frequency = deborah / mean * time
+            if frequency <= 0.0:  # start-up alone
+                continue
             flows.append((frequency, _PERIODS * 2.0 * np.pi / frequency))
         try:
             found = [_extremes(law, time * amplitude, *flow, budget) for flow in flows]

@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ _LARGEST = 2**28
 """Bytes that all parts of a file unpack to, at most: an estimator of megabytes is a large one."""
 
 _MOST_MEMBERS = 10_000
+
+_HEAD = 512
+"""Bytes of an array's head, which NumPy reads as a Python literal; of plain numbers it has 118."""
 
 
 def write_estimator(
@@ -142,6 +146,7 @@ class EstimatorFile:
 _UNREADABLE = (
     ValueError, EOFError, OSError, zlib.error, RecursionError, NotImplementedError,
     RuntimeError,  # of a member that is encrypted
+    SyntaxError, TokenError,  # of an array whose head is none
 )  # fmt: skip
 
 
@@ -156,6 +161,9 @@ def _require_small(file: zipfile.ZipFile) -> None:
         raise ValueError(
             f"{len(members)} parts of {size / 1e6:.0f} MB in all, more than an estimator has"
         )
+    packed = {info.compress_type for info in members}
+    if not packed <= {zipfile.ZIP_DEFLATED, zipfile.ZIP_STORED}:
+        raise ValueError("parts are packed as no estimator's are")
 
 
 def _read(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> bytes:
@@ -170,9 +178,9 @@ def _read_array(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
     version = np.lib.format.read_magic(content)
     if version != (1, 0):
         raise ValueError(f"{info.filename} is in a form of NumPy that no estimator has")
-    shape, _, dtype = np.lib.format.read_array_header_1_0(content)
+    shape, _, dtype = np.lib.format.read_array_header_1_0(content, max_header_size=_HEAD)
     # memory is asked for by the shape, so it has to be that of the content
     if math.prod(shape) * dtype.itemsize != len(content.getvalue()) - content.tell():
         raise ValueError(f"{info.filename} has another size than its shape {shape}")
     content.seek(0)
-    return np.lib.format.read_array(content, allow_pickle=False)
+    return np.lib.format.read_array(content, allow_pickle=False, max_header_size=_HEAD)
