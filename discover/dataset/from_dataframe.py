@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from inspect import signature
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -75,6 +76,9 @@ def from_dataframe(
                 f"The columns of {label} must have text for names, on one level; got "
                 f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
             )
+    no_option = [one for one in options if one not in signature(load_dataset).parameters]
+    if no_option:
+        raise InputError(f"from_dataframe has no option {short(no_option[0])}; see load_dataset.")
     unknown = [kind for kind in tables or {} if kind not in _KINDS]
     if unknown:
         raise InputError(f"There is no table {unknown[0]!r}; it may be {', '.join(_KINDS)}.")
