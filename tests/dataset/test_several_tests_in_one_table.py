@@ -18,6 +18,7 @@ from made_exports import (
 )
 
 from discover.dataset import load_dataset
+from discover.dataset.importing.header_constants import temperature_in
 
 
 def start_up(rate):
@@ -178,7 +179,7 @@ def test_a_table_of_a_calibration_is_no_test_of_the_sample(tmp_path):
         "Time,Shear rate,Shear stress,Signal", "(s),(1/s),(Pa),(V)",
         *lines(TIMES, np.full(30, 0.5), start_up(0.5), TIMES, mark=","),
     ]  # fmt: skip
-    for title in ("Calibration Data", "Reference oil", "Kalibrierung"):
+    for title in ("Calibration Data", "Reference oil", "Kalibrierung", "Blank run (air)"):
         made = [row.format(title) for row in rows]
         out, result = imported(tmp_path, "a.csv", made, "--overwrite")
         assert_start_ups(out, ("a-2.csv",), (0.5,))
@@ -186,7 +187,7 @@ def test_a_table_of_a_calibration_is_no_test_of_the_sample(tmp_path):
         assert f"block 1 {title}: left out" in result.stdout
         assert "--test a.csv:1=flow_curve" in result.stdout
         assert "columns not read: Signal." in result.stdout
-    plain = [row.format("Flow curve") for row in rows]
+    plain = [row.format("Blank ink, flow curve") for row in rows]
     out, _ = imported(tmp_path, "a.csv", plain, "--overwrite")
     np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 0.2 * RATES, rtol=EXACT)
 
@@ -249,3 +250,30 @@ def test_creep_and_recovery_in_one_table_stay_one_run(tmp_path):
     assert test.protocol.control == "stress"
     assert test.strain is not None
     np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("T=40", ("40", "°C")),
+        ("melt_T=40", ("40", "°C")),
+        ("Sample: melt, 40 °C", ("40", "°C")),
+        ("melt 313.15 K", ("313.15", "K")),
+        ("T=313", None),  # kelvin, or a number of the sample
+        ("T40", None),
+        ("from 20 °C to 40 °C", None),
+    ],
+)
+def test_words_say_a_temperature_only_where_it_is_certain(text, said):
+    found = temperature_in(text)
+    assert (found and (found.value, found.unit)) == said
+
+
+def test_a_line_above_the_numbers_says_their_temperature(tmp_path):
+    names = "ω [rad/s],G' [Pa],G'' [Pa]"
+    for celsius in (20, 60):
+        rows = [f"Sample: melt, {celsius} °C", names, *lines(*sweep(), mark=",")]
+        (tmp_path / f"{celsius}.csv").write_text("\n".join(rows), encoding="utf-8")
+    out, _ = run(tmp_path, tmp_path / "20.csv", tmp_path / "60.csv")
+    assert_sweep(out / "lve_20C.csv")
+    assert (out / "lve_60C.csv").exists()

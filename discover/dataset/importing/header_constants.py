@@ -73,7 +73,7 @@ def _constant(name: str, number: str, unit: str | None) -> Constant:
 
 
 _AS_SYMBOL = re.compile(
-    r"(?<![^\W_])T(?:emp(?:erature)?)?\s*[=_]\s*(-?[0-9]+(?:[.,][0-9]+)?)(?![\w.,%°])"
+    r"(?<![^\W_])T(?:emp(?:erature)?)?\s*=\s*(-?[0-9]+(?:[.,][0-9]+)?)(?![\w.,%°])"
 )
 
 
