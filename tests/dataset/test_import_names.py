@@ -209,3 +209,10 @@ def test_a_mapping_file_with_names_of_an_unknown_quantity_is_refused():
 def test_names_are_read_only_where_something_is_imported():
     code = "import sys, discover.cli; sys.exit('discover.dataset.importing.names' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_a_number_of_the_interval_is_no_time_though_german_calls_that_intervallzeit():
+    for name in ("Interval", "Segment", "Step"):
+        assert "step_time" not in name_table().find(name)
+    for name in ("Intervallzeit", "Interval time", "Segment time"):
+        assert "step_time" in name_table().find(name)
