@@ -9,6 +9,7 @@ import typer
 from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import JsonOption, OverwriteOption, QuietOption
+from discover.errors import InputError
 
 
 @guarded
@@ -88,8 +89,6 @@ def _write(found, out: Path, overwrite: bool) -> None:
 
 
 def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
-    from discover.errors import InputError
-
     for text in given or []:
         if "=" not in text:
             raise InputError(f"--{option} takes NAME=VALUE; got {text!r}.")
@@ -97,8 +96,6 @@ def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
 
 
 def _number(option: str, name: str, text: str) -> float:
-    from discover.errors import InputError
-
     try:
         return float(text)
     except ValueError:
@@ -106,8 +103,6 @@ def _number(option: str, name: str, text: str) -> float:
 
 
 def _range(name: str, text: str) -> tuple[float, float]:
-    from discover.errors import InputError
-
     low, colon, high = text.partition(":")
     if not colon:
         raise InputError(f"--bounds {name} must be two numbers, low:high; got {text!r}.")

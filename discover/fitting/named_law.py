@@ -14,9 +14,9 @@ from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import covariance_and_noise
+from discover.inference.fit_uncertainty import covariance_and_noise, with_moduli
 from discover.inference.least_squares import Fit
-from discover.inference.modulus_errors import modulus_shifts, response
+from discover.inference.modulus_errors import modulus_shifts
 from discover.inference.problem import FitProblem
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
@@ -306,10 +306,7 @@ def _uncertainty(problem: FitProblem, fit: Fit) -> tuple[Float[np.ndarray, "p p"
         return np.zeros((0, 0)), 1.0
     covariance, noise = covariance_and_noise(problem.batch, fit.residual, fit.jacobian)
     shifts = modulus_shifts(problem.model, fit.theta, problem.batch)
-    if len(shifts):
-        off = response(fit.jacobian, shifts)
-        covariance = covariance + off @ off.T
-    return covariance, max(noise.effective_samples - len(fit.free), 1.0)
+    return with_moduli(covariance, fit, shifts), max(noise.effective_samples - len(fit.free), 1.0)
 
 
 def _constants(

@@ -32,9 +32,7 @@ def intervals(
     if not fit.free:
         return {}
     covariance, quantile = uncertainty(batch, fit.residual, fit.jacobian)
-    if shifts is not None and len(shifts):
-        off = response(fit.jacobian, shifts)
-        covariance = covariance + off @ off.T
+    covariance = with_moduli(covariance, fit, shifts)
     half = quantile * np.sqrt(np.clip(np.diag(covariance), 0.0, None))
     bounds = {}
     for position, h in zip(fit.free, half, strict=True):
@@ -46,6 +44,18 @@ def intervals(
             float(min(value + h, high)),
         )
     return bounds
+
+
+def with_moduli(
+    covariance: Float[np.ndarray, "free free"],
+    fit: Fit,
+    shifts: Float[np.ndarray, "k runs n"] | None,
+) -> Float[np.ndarray, "free free"]:
+    """Return the covariance of fitted parameters with that of the moduli in it; see `intervals`."""
+    if shifts is None or not len(shifts):
+        return covariance
+    off = response(fit.jacobian, shifts)
+    return covariance + off @ off.T
 
 
 def uncertainty(
