@@ -194,10 +194,6 @@ class Step:
 
         return _if(on["own weights"], own, table)
 
-    def first_slope(self, shared, mode, on, flow, slow, stress, rate, now):
-        """Return the remainder at the start of a step."""
-        return self._remainder(shared, mode, on, flow, slow[1], stress, rate, now)
-
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.
 
