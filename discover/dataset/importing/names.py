@@ -131,9 +131,10 @@ class NameTable:
                 return both
         cut: dict[str, str] = {}
         alike = self._words.get((len(words), words[0][0]), ()) if words else ()
-        for section, whole in alike:
-            # a word alone is no shorter form of a compound: Interval is not Intervallzeit
-            if (len(words) > 1 or words[0].endswith(".")) and all(map(_stands_for, words, whole)):
+        # a word alone is no shorter form of a compound: Interval is not Intervallzeit
+        alone = len(words) == 1 and not words[0].endswith(".")
+        for section, whole in () if alone else alike:
+            if all(map(_stands_for, words, whole)):
                 cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
         least = min(map(len, cut.values()), default=0)
         best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
