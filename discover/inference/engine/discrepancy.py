@@ -133,92 +133,70 @@ class Discrepancy:
         return np.concatenate([power * np.exp(growth * g) for g in self.growth])
 
     def _weighed(self) -> tuple[list[Member], float]:
-        fitter, fit, rows = self.fitter, self.fit, self.fitter.rows
-        alike = Noise(_relative_sizes(fitter, fit), 1.0, 0.0, fit.noise.share)
-        n, c, u = len(rows), self._constants, len(self.names)
-        found, without = [], []
+        fitter, fit = self.fitter, self.fit
+        sizes, share = _relative_sizes(fitter, fit), fit.noise.share
+        n, c, u = len(fitter.noise.kept), self._constants, len(self.names)
+        curves = list(product(CURVES, STIFFNESS, GROWTHS))
+        scales = np.array([size * self._spectrum(k, g) for size, k, g in curves])
+        own = np.log(self._prior_of_curves(curves))
+        found, grams = [], {}
         for correlation in sorted({0.0, 0.45, 0.75, fit.noise.correlation}):
-            noise = Noise(alike.sizes, 1.0, correlation, alike.share)
-            white = fitter.noise.whitened(
-                np.column_stack([self._left, self._columns]), self.record, noise
-            )
-            gram = white.T @ white
+            noise = Noise(sizes, 1.0, correlation, share)
+            columns = np.column_stack([self._left, self._columns])
+            white = fitter.noise.whitened(columns, self.record, noise)
+            gram = grams[correlation] = white.T @ white
             base = fitter.noise.log_determinant(self.record, noise)
             base += np.log(0.5) if correlation == 0.0 else np.log(0.5 / 3.0)
-            for curve, stiffness, growth, terms in self._grid():
-                used = np.arange(gram.shape[0] - 1)
-                scale = np.concatenate([
-                    np.full(c, 1.0 / fit.noise.common),
-                    np.full(u, terms / fit.noise.common),
-                    curve * self._spectrum(stiffness, growth) if curve else np.zeros(len(used) - c - u),
-                ])  # fmt: skip
-                used = used[scale > 0]
-                own = scale[used]
-                inner = np.eye(len(used)) + own[:, None] * gram[1 + used][:, 1 + used] * own
-                factor = np.linalg.cholesky(inner)
-                along = solve_triangular(factor, own * gram[1 + used, 0], lower=True)
-                square = max(gram[0, 0] - along @ along, 1e-300)
-                value = base - np.sum(np.log(np.diag(factor))) - 0.5 * n * np.log(square / n)
-                value += -0.5 * n * (1.0 + LOG_2PI)
-                if not curve and not terms:
-                    without.append(value)
-                    continue
-                found.append(
-                    (
-                        value,
-                        curve,
-                        stiffness,
-                        growth,
-                        terms,
-                        np.sqrt(square / n),
-                        used,
-                        own,
-                        factor,
-                        along,
-                        len(scale),
-                    )
+            for terms in TERMS:
+                scale = np.full(c + u, 1.0 / fit.noise.common)
+                scale[c:] *= terms
+                prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
+                # constants and terms first, then the curves beside them
+                first = c + (u if terms else 0)
+                inner = scale[:first, None] * gram[1 : first + 1, 1 : first + 1] * scale[:first]
+                factor = np.linalg.cholesky(np.eye(first) + inner)
+                rest = np.r_[0, 1 + c + u : len(gram)]
+                along = solve_triangular(
+                    factor, scale[:first, None] * gram[1 : first + 1][:, rest], lower=True
                 )
-        none = logsumexp(without)
-        values = np.array([one[0] for one in found])
-        weights = values + self._log_prior([one[1] for one in found], [one[4] for one in found])
+                left = gram[np.ix_(rest, rest)] - along.T @ along
+                determinant = np.sum(np.log(np.diag(factor)))
+                squares = [left[0, 0]]
+                determinants = [determinant]
+                many = scales[:, :, None] * left[1:, 1:] * scales[:, None, :]
+                chol = np.linalg.cholesky(np.eye(many.shape[1]) + many)
+                ahead = np.linalg.solve(chol, (scales * left[1:, 0])[..., None])[..., 0]
+                squares = np.append(left[0, 0], left[0, 0] - np.sum(ahead**2, axis=1))
+                logs = np.log(np.diagonal(chol, axis1=1, axis2=2)).sum(axis=1)
+                determinants = np.append(determinant, determinant + logs)
+                squares = np.maximum(squares, 1e-300)
+                values = base - determinants - 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
+                priors = np.append(np.log(0.1), own) + prior
+                for i, (value, square) in enumerate(zip(values, squares, strict=True)):
+                    which = None if not i else i - 1
+                    found.append((value, value + priors[i], correlation, terms, which, square))
+        plain = [one[0] for one in found if one[4] is None and not one[3]]
+        some = [one for one in found if one[4] is not None or one[3]]
+        none, weights = logsumexp(plain), np.array([one[1] for one in some])
         total = logsumexp(weights)
         members = []
-        for log_weight, one in sorted(
-            zip(weights - total, found, strict=True), key=lambda p: -p[0]
-        ):
-            if log_weight < -7.0 or len(members) == 12:
+        for at in np.argsort(-weights)[:12]:
+            if weights[at] - total < -7.0:
                 break
-            _, curve, stiffness, growth, terms, noise, used, own, factor, along, size = one
-            inverse = solve_triangular(factor, np.eye(len(used)), lower=True).T
-            mean, root, scale = np.zeros(size), np.zeros((size, len(used))), np.zeros(size)
-            mean[used], root[used], scale[used] = (
-                own * (inverse @ along),
-                own[:, None] * inverse,
-                own,
-            )
+            _, weight, correlation, terms, which, square = some[at]
+            scale = np.full(c + u, 1.0 / fit.noise.common)
+            scale[c:] *= terms
+            width = np.zeros(scales.shape[1]) if which is None else scales[which]
+            scale = np.concatenate([scale, width])
+            curve, stiffness, growth = (0.0, 1.0, 0.0) if which is None else curves[which]
             members.append(
                 Member(
-                    float(log_weight),
-                    curve,
-                    stiffness,
-                    growth,
-                    terms,
-                    float(noise),
-                    mean,
-                    root,
-                    scale,
+                    float(weight - total), curve, stiffness, growth, terms,
+                    float(np.sqrt(square / n)), *_posterior(grams[correlation], scale), scale,
                 )
-            )
+            )  # fmt: skip
         hidden = self._hidden()
-        factor = logsumexp([total, none + np.log(max(hidden, 1e-300))]) - none
-        return members, float(factor)
-
-    def _grid(self):
-        yield 0.0, 1.0, 0.0, 0.0
-        for terms in TERMS[1:]:
-            yield 0.0, 1.0, 0.0, terms
-        for curve, stiffness, growth, terms in product(CURVES, STIFFNESS, GROWTHS, TERMS):
-            yield curve, stiffness, growth, terms
+        return members, float(logsumexp([total, none + np.log(max(hidden, 1e-300))]) - none)
 
     def _hidden(self) -> float:
         """Return the prior probability of a discrepancy too small to be seen."""
@@ -226,25 +204,33 @@ class Discrepancy:
             min(1.0, _SHARES[0] / max(self.smallest, 1e-9)) if np.isfinite(self.smallest) else 0.0
         )
 
-    def _log_prior(self, curves: Sequence[float], terms: Sequence[float]) -> np.ndarray:
-        """Return the log prior of members of the grid, beside what is too small to be seen."""
-        ends = np.array(_SHARES)
-        if np.isfinite(self.smallest):
-            share = np.diff(np.minimum(ends, max(self.smallest, ends[0]))) / max(
-                self.smallest, 1e-9
-            )
-        else:
-            share = np.full(len(CURVES), 1.0 / len(CURVES))
-        # sizes are uniform up to the smallest effect; a fifth of the prior asks nothing of them
-        flat = 0.2 / len(CURVES) if np.isfinite(self.smallest) else 0.0
-        own = (0.8 if np.isfinite(self.smallest) else 1.0) * share + flat
+    def _prior_of_curves(self, curves: Sequence[tuple[float, float, float]]) -> np.ndarray:
+        """Return the prior of each curve, beside what is too small to be seen.
+
+        Sizes are uniform up to what the smallest effect takes away; a fifth asks nothing of them.
+        """
+        ends, limit = np.array(_SHARES), self.smallest
+        share = np.full(len(CURVES), 1.0 / len(CURVES))
+        if np.isfinite(limit):
+            inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
+            share = 0.8 * inside + 0.2 * share
         per = len(STIFFNESS) * len(GROWTHS)
-        found = []
-        for curve, term in zip(curves, terms, strict=True):
-            of_curve = own[CURVES.index(curve)] / per if curve else 0.1
-            of_term = 0.5 if not term else 0.5 / (len(TERMS) - 1)
-            found.append(np.log(max(of_curve * of_term, 1e-300)))
-        return np.array(found)
+        return np.array([max(share[CURVES.index(size)], 1e-300) / per for size, _, _ in curves])
+
+
+def _posterior(
+    gram: Float[np.ndarray, "n+1 n+1"], scale: Float[np.ndarray, " n"]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
+    """Return mean and root of the covariance of coefficients, for noise of size one."""
+    used = np.flatnonzero(scale > 0)
+    own = scale[used]
+    inner = own[:, None] * gram[1:, 1:][np.ix_(used, used)] * own
+    factor = np.linalg.cholesky(np.eye(len(used)) + inner)
+    inverse = solve_triangular(factor, np.eye(len(used)), lower=True).T
+    mean, root = np.zeros(len(scale)), np.zeros((len(scale), len(used)))
+    mean[used] = own * (inverse @ (inverse.T @ (own * gram[1:, 0][used])))
+    root[used] = own[:, None] * inverse
+    return mean, root
 
 
 def _relative_sizes(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:

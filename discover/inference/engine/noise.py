@@ -26,6 +26,8 @@ _ALIKE = 4.0
 LEAST = 1e-4
 """Relative size below which no noise is taken to be: what a model of a fluid is not told to."""
 
+_SHARES = np.array(SHARES)
+
 _GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
 
 
@@ -64,6 +66,8 @@ class NoiseModel:
         self._decays, self._left = decay, np.sqrt(1.0 - decay**2)
         self._determinants = -np.sum(np.log(self._left), axis=1)
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
+        self._there = np.flatnonzero(self._count)
+        self._starts = np.searchsorted(self._run, self._there)
 
     def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
         return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
@@ -85,18 +89,17 @@ class NoiseModel:
         """Return the log likelihood over all noises, and the likeliest noise."""
         if not (np.all(np.isfinite(residual)) and np.max(np.abs(residual / self.rows.size)) < 1e6):
             return -np.inf, Noise(np.ones(len(self._count)), 1.0, 0.0, 0.0)
-        squares, logs = [], []
-        for share in SHARES:
-            deviation = self.deviation(predicted, share)[self.kept]
-            scaled = residual[self.kept] / deviation
-            left = (scaled - self._decays * scaled[self._before]) / self._left
-            squares.append(
-                np.stack([np.bincount(self._run, row**2, len(self._count)) for row in left])
-            )
-            logs.append(self._determinants - np.sum(np.log(deviation)))
-        square = np.concatenate(squares) + LEAST**2 * self._count
+        size = self.rows.size[self.kept]
+        relative = (predicted[self.kept] / size) ** 2
+        spread = size * np.sqrt(1.0 + _SHARES[:, None] * (relative - 1.0))
+        scaled = residual[self.kept] / spread
+        left = (scaled[:, None] - self._decays * scaled[:, None, self._before]) / self._left
+        square = np.full((len(SHARES), len(CORRELATIONS), len(self._count)), 0.0)
+        square[..., self._there] = np.add.reduceat(left**2, self._starts, axis=-1)
+        square = square.reshape(len(_GRID), -1) + LEAST**2 * self._count
+        logs = (self._determinants - np.sum(np.log(spread), axis=1)[:, None]).ravel()
         values, common = self._marginal(square)
-        values = values + np.concatenate(logs)
+        values = values + logs
         values = values + (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
         best = int(np.argmax(values))
         share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
@@ -109,7 +112,7 @@ class NoiseModel:
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""
         n, total = self._count, np.sum(self._count)
         common = np.sum(square, axis=1) / total
-        for _ in range(12):
+        for _ in range(6):
             weight = np.sum((_ALIKE + n) / (_ALIKE * common[:, None] + square), axis=1)
             common = len(n) / weight
         runs = (

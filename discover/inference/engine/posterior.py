@@ -13,6 +13,7 @@ from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
+from discover.linear_algebra_threads import in_one_thread
 
 NONE = 0.5
 """Prior probability that something has no name; set on development seeds of judged worlds."""
@@ -36,6 +37,9 @@ _RUNS_AWAY = 10.0
 """Times the size of the largest record, which no sound prediction of another run exceeds."""
 
 _LEFT_OUT_ROUNDS = 4
+
+_FAR = 0.5
+"""Of the size of a run: what a discrepancy changes it by at most, in the mean and as a deviation."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,7 @@ class Posterior:
         low, high = (prior.to_value(np.clip(e[0], *prior.ends)) for e in ends)
         return low, high
 
+    @in_one_thread
     def bands(self) -> list[Band]:
         """Return the bands of the predicted runs, by the fitted runs alone."""
         rows = self.problem.predicted
@@ -133,6 +138,7 @@ class Posterior:
         ]
 
 
+@in_one_thread
 def explain(problem: Problem, most: int = 3) -> Posterior:
     """Return the posterior of a problem, hypotheses being sets of up to so many effects."""
     search = Search(Fitter(problem, problem.fitted), most).run()
@@ -142,13 +148,14 @@ def explain(problem: Problem, most: int = 3) -> Posterior:
     whole, judged = search, near
     if problem.predicted is not None:
         every = Rows.of([*problem.fitted.runs, *problem.predicted.runs])
-        whole = refitted([*near, search.found[frozenset()]], Fitter(problem, every)).backwards()
+        whole = refitted([*near, search.found[frozenset()]], Fitter(problem, every))
+        whole.backwards().exchange()
         judged = whole.alive()
     logs = np.array([whole.rank(fit) for fit in judged])
-    nothing = [
-        whole.rank(fit) + _log_factor(whole, fit) + np.log(NONE / (1.0 - NONE))
-        for fit in judged[:_WITH_DISCREPANCY]
+    beside = [
+        Discrepancy(whole.fitter, fit, smallest(whole, fit)) for fit in judged[:_WITH_DISCREPANCY]
     ]
+    nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
     total = logsumexp([*logs, *nothing])
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
     unexplained = float(np.exp(logsumexp(nothing) - total)) + lost if nothing else 1.0
@@ -160,11 +167,9 @@ def explain(problem: Problem, most: int = 3) -> Posterior:
         for i, fit in enumerate(near[:_WITH_DISCREPANCY])
     )
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
-    return Posterior(problem, search, explanations, unexplained, fits, discrepancies)
-
-
-def _log_factor(search: Search, fit: Fit) -> float:
-    return Discrepancy(search.fitter, fit, smallest(search, fit)).log_factor
+    found = Posterior(problem, search, explanations, unexplained, fits, discrepancies)
+    found.memory["whole"] = whole, judged, beside
+    return found
 
 
 def smallest(search: Search, fit: Fit) -> float:
@@ -273,27 +278,38 @@ class _Predictions:
         predicted = self.fitter.predict([fit.theta])[0]
         jacobian, apart = self._jacobian(fit, predicted)
         unused = discrepancy._signatures(self.fitter, predicted) * discrepancy.shares
-        size = np.sqrt(np.mean((unused / self.rows.size[:, None]) ** 2, axis=0))
-        unused = unused * np.minimum(1.0, 1.0 / np.maximum(size, 1e-300))
         pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
         widths = np.concatenate([1.0 / np.sqrt(pulls), self.problem_widths])
-        columns = np.column_stack([jacobian * widths, unused])
+        columns = np.column_stack([jacobian * widths, self._bounded(unused, 1.0)])
         centres = np.array([p.centre for p in fit.priors.values()])
-        base = predicted - jacobian[:, : len(centres)] @ (fit.coordinates - centres)
+        own = jacobian[:, : len(centres)]
         fastest = np.max(self.problem.fitted.fastest)
         growth = np.log(self.rows.fastest / fastest)[self.rows.run]
         missed = (self.missed(fit) * self.rows.size) ** 2
         found = []
         for member in discrepancy.members:
             c = columns.shape[1]
-            middle = base + columns @ member.mean[:c]
+            change = columns @ member.mean[:c] - own @ (fit.coordinates - centres)
+            middle = predicted + self._bounded(change[:, None], _FAR)[:, 0]
             spread = np.sum((columns @ member.root[:c]) ** 2, axis=1) * member.noise**2
             curve = member.noise * member.curve * self.rows.size * np.exp(member.growth * growth)
             variance = np.maximum(spread + apart + curve**2, missed)
-            share = fit.noise.share
-            noise = member.noise * self.fitter.noise.deviation(middle, share)
+            variance = self._bounded(np.sqrt(variance)[:, None], _FAR)[:, 0] ** 2
+            noise = member.noise * self.fitter.noise.deviation(middle, fit.noise.share)
             found.append((member.log_weight, middle, variance + noise**2))
         return found
+
+    def _bounded(self, columns: Float[np.ndarray, "rows k"], most: float) -> np.ndarray:
+        """Return columns that change no run by more than so much of its size.
+
+        To first order alone what is far from the fitted runs would grow without bound.
+        """
+        out = columns.copy()
+        for i in range(len(self.rows.runs)):
+            at = self.rows.run == i
+            size = np.sqrt(np.mean((columns[at] / self.rows.size[at, None]) ** 2, axis=0))
+            out[at] *= most / np.maximum(size, most)
+        return out
 
     @property
     def problem_widths(self) -> np.ndarray:

@@ -215,8 +215,6 @@ class Problem:
 
 def _is_of_unknown_order(parameter: EffectParameter) -> bool:
     """Return whether only the order of an inner constant is known."""
-    return (
-        (parameter.low <= 0.0
-        and parameter.scale != "one")
-        or (parameter.low > 0.0 and parameter.high > _FEW * parameter.low)
+    return (parameter.low <= 0.0 and parameter.scale != "one") or (
+        parameter.low > 0.0 and parameter.high > _FEW * parameter.low
     )

@@ -10,7 +10,7 @@ _BEAM = 3
 _REFITTED = 8
 """Candidates of each set in the beam that are refitted, of all that are scored."""
 
-_EXCHANGED = 4
+_EXCHANGED = 6
 _BEST = 4
 _FALLEN = 15.0
 """Log likelihood within which a set with an effect at zero shows that another set is as likely."""
@@ -19,8 +19,9 @@ _ROUNDS = 3
 _HEADROOM = 1.0
 """Log evidence by which a larger set may fall behind for the search to go on."""
 
-_PROBE = 1e-3
-"""Of its prior width: amplitude at which the signature of an effect is taken."""
+_PROBES = (1e-3, 1.0)
+"""Of its prior width: amplitudes at which the signature of an effect is taken. What a filter or a
+structure does is not in proportion to its amplitude."""
 
 Key = frozenset[str]
 
@@ -86,21 +87,23 @@ class Search:
         if fit.covariance is None or fit.jacobian is None:
             return []
         asked = [
-            (effect.name, inner)
+            (effect.name, inner, probe)
             for effect in problem.candidates
             if effect.name not in fit.names
             for inner in problem.starts(effect.name)
+            for probe in _PROBES
         ]
         if not asked:
             return []
         thetas, steps, priors = [], [], []
-        for name, inner in asked:
+        for name, inner, probe in asked:
             theta, at = fit.theta.copy(), problem.model.positions(name)[0]
             for position, value in inner.items():
                 theta[position] = value
             prior = problem.priors((name,))[at]
             centre = theta[at] if at in fit.priors else 0.0  # a nuisance that may be at fault
-            step = _PROBE * prior.width
+            step = probe * prior.width
+            step = -step if centre + step > prior.high else step
             theta[at] = centre + step
             thetas.append(theta)
             steps.append(step)
@@ -118,7 +121,7 @@ class Search:
         curvature = np.sum(new**2, axis=0) - np.sum(shared**2, axis=0)
         total, count = float(left @ left), len(left)
         best: dict[str, tuple[float, Fit]] = {}
-        for i, ((name, inner), prior) in enumerate(zip(asked, priors, strict=True)):
+        for i, ((name, inner, _), prior) in enumerate(zip(asked, priors, strict=True)):
             at = problem.model.positions(name)[0]
             stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
             size = float(np.clip(slope[i] / stiff, prior.low, prior.high))
