@@ -4,11 +4,11 @@ To first order about a fit the records are
 
     y = m + J dθ + Σ_i c_i u_i + d_r + ε,    c_i ~ N(0, (τ w_i)²),    d_r = Σ_k b_rk cos(π k x),
 
-with u_i the signatures of all effects and terms that are not in the hypothesis, each no larger than
-a third of the record at τ = 1 (so this is the dense library, and says something of any flow), and
-d_r a smooth curve along the samples of each run, b_rk ~ N(0, ρ² S_k), whose size may grow with the
-shear rate   [Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415
-for τ by evidence]. ρ, τ, the stiffness of S and the growth are summed over a grid.
+with u_i the signatures of all effects and terms that are not in the hypothesis, each a third of the
+record at τ = 1 (this is the dense library, and says something of any flow), and d_r a smooth curve
+along the samples of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the shear rate   [Kennedy
+& O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415, for τ by evidence].
+ρ, τ, the stiffness of S and the growth are summed over a grid.
 """
 
 from collections.abc import Sequence
@@ -38,38 +38,39 @@ TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
 _MODES = 20
 _THIRD = 1.0 / 3.0
 
-_SHARES = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
+_CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
 """Ends of the cells of ρ of which `CURVES` are the middles."""
+
+_LIKELY = 7.0
+_MOST = 12
+_JUDGED = 24
+"""Samples of a run left out by which members are judged."""
 
 
 @dataclass(frozen=True)
 class Member:
-    """One discrepancy of the grid: its weight, and what the records say of it.
+    """One discrepancy of the grid.
 
     Attributes
     ----------
-    log_weight
-        Log of its posterior probability among all of the hypothesis.
     curve, stiffness, growth, terms
         ρ over the noise, half swings, power of the rate, τ.
+    log_weight
+        Log of its probability among all of the hypothesis.
     noise
         Size of the noise over the records.
     mean, root
-        Posterior of all coefficients in units of their priors, shape (n,) and (n, n): covariance
-        is noise² root rootᵀ.
-    scale
-        Prior deviations over the noise, shape (n,).
+        Of the constants and terms, in units of their priors: the covariance is noise² root rootᵀ.
     """
 
-    log_weight: float
     curve: float
     stiffness: float
     growth: float
     terms: float
+    log_weight: float
     noise: float
-    mean: Float[np.ndarray, " n"]
-    root: Float[np.ndarray, "n n"]
-    scale: Float[np.ndarray, " n"]
+    mean: Float[np.ndarray, " m"]
+    root: Float[np.ndarray, "m m"]
 
 
 class Discrepancy:
@@ -81,7 +82,17 @@ class Discrepancy:
         A hypothesis with derivatives, and what fitted it.
     smallest
         What the least effect of the hypothesis takes away over the noise: a discrepancy is as
-        likely of any size up to that, and as no larger one.
+        likely of any size up to that.
+
+    Attributes
+    ----------
+    names, shares
+        Effects and terms that are not in the hypothesis, and the amplitude of each that changes
+        the records by a third.
+    log_factor
+        Log of how many times likelier the records are with a discrepancy than without.
+    members
+        The likeliest of the grid.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit, smallest: float = np.inf):
@@ -90,20 +101,19 @@ class Discrepancy:
         rows = fitter.rows
         self.record = fitter.record(fit)
         pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths])
-        centres = [p.centre for p in fit.priors.values()]
-        off = np.concatenate([fit.coordinates - centres, fit.linear])
-        self._constants = len(widths)
-        self.names, self.steps = self._others()
-        unused = self._signatures(fitter, fit.predicted)
-        with np.errstate(divide="ignore"):
-            size = np.sqrt(np.mean((unused / rows.size[:, None]) ** 2, axis=0))
-            self.shares = np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
-        self.unused = unused * self.shares
-        self.curves = _cosines(rows.run, len(rows.runs)) * rows.size[:, None]
-        self._columns = np.column_stack([fit.jacobian * widths, self.unused, self.curves])
-        self._left = rows.recorded - self.record + fit.jacobian @ off
+        self.widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths])
+        centres = np.array([p.centre for p in fit.priors.values()])
+        self.offset = np.concatenate([fit.coordinates - centres, fit.linear])
+        self.names, self._steps = self._others()
+        unused = self.signatures(fitter, fit.predicted)
+        size = np.sqrt(np.mean((unused / rows.size[:, None]) ** 2, axis=0))
+        self.shares = np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
+        self.columns = np.column_stack([fit.jacobian * self.widths, unused * self.shares])
+        self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
+        self._curves = _cosines(rows.run, len(rows.runs)) * rows.size[:, None]
+        self._grid = list(product(CURVES, STIFFNESS, GROWTHS))
+        self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
         self.members, self.log_factor = self._weighed()
 
     def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
@@ -114,113 +124,198 @@ class Discrepancy:
     def _at(self, name: str) -> int:
         return self.fitter.problem.model.positions(name)[0]
 
-    def _signatures(self, fitter: Fitter, predicted) -> Float[np.ndarray, "rows k"]:
-        """Return what one of each effect that is not there does to the records, in Pa."""
+    def signatures(
+        self, fitter: Fitter, predicted: Float[np.ndarray, " rows"]
+    ) -> Float[np.ndarray, "rows k"]:
+        """Return what one of each effect that is not there does to records, in Pa."""
         thetas = []
-        for name, step in zip(self.names, self.steps, strict=True):
+        for name, step in zip(self.names, self._steps, strict=True):
             theta = self.fit.theta.copy()
             theta[self._at(name)] += step
             thetas.append(theta)
-        found = (fitter.predict(thetas) - predicted).T / self.steps
+        found = (fitter.predict(thetas) - predicted).T / self._steps
         return np.where(np.all(np.isfinite(found), axis=0), found, 0.0)
 
-    def _spectrum(self, stiffness: float, growth: float) -> Float[np.ndarray, " curves"]:
-        """Return the deviations of the curves' coefficients, for a size of one."""
+    # the grid ---------------------------------------------------------------------------------
+
+    def _scale(self, terms: float) -> Float[np.ndarray, " m"]:
+        """Return the prior deviations of constants and terms, over the noise."""
+        scale = np.full(self.columns.shape[1], 1.0 / self.fit.noise.common)
+        scale[len(self.widths) :] *= terms
+        return scale
+
+    def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
+        """Return the deviations of the curves of each run, for each curve of the grid."""
         k = np.arange(_MODES)
-        power = 1.0 / (1.0 + (k / stiffness) ** 4)
-        power = np.sqrt(power / np.sum(power) * np.where(k == 0, 1.0, 2.0) / 1.0)
-        power /= np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
-        return np.concatenate([power * np.exp(growth * g) for g in self.growth])
+        found = []
+        for size, stiffness, growth in self._grid:
+            power = 1.0 / (1.0 + (k / stiffness) ** 4)
+            # a cosine has half of the square of its size, a constant all of it
+            power /= np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
+            found.append(size * power * np.exp(growth * self.growth)[:, None])
+        return np.array(found)
+
+    def _grams(self, correlation: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return products of [left, columns] of each run, its curve being integrated out.
+
+        Returns
+        -------
+        Shape (1 + grid, runs, 1 + m, 1 + m), without a curve first, and log determinants of shape
+        (1 + grid,).
+        """
+        if correlation in self._kept:
+            return self._kept[correlation]
+        noise = Noise(self._sizes(), 1.0, correlation, self.fit.noise.share)
+        both = np.column_stack([self.left, self.columns, self._curves])
+        white = self.fitter.noise.whitened(both, self.record, noise)
+        run, runs = self.fitter.rows.run[self.fitter.noise.kept], len(self.growth)
+        m = 1 + self.columns.shape[1]
+        inner, cross, plain = [], [], []
+        for i in range(runs):
+            own = white[run == i, :m]
+            curve = white[run == i, m + i * _MODES : m + (i + 1) * _MODES]
+            plain.append(own.T @ own)
+            cross.append(curve.T @ own)
+            inner.append(curve.T @ curve)
+        d = self._deviations()
+        chol = np.linalg.cholesky(
+            np.eye(_MODES) + d[..., :, None] * np.array(inner) * d[..., None, :]
+        )
+        along = np.linalg.solve(chol, d[..., None] * np.array(cross))
+        grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
+        logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
+        base = self.fitter.noise.log_determinant(self.record, noise)
+        found = np.concatenate([np.array(plain)[None], grams]), base - np.append(0.0, logs)
+        self._kept[correlation] = found
+        return found
+
+    def _sizes(self) -> Float[np.ndarray, " runs"]:
+        """Return the noise of each run over that of all, as samples scatter about a smooth curve."""
+        rows = self.fitter.rows
+        left = (rows.recorded - self.record) / rows.size
+        own = [left[rows.run == i] for i in range(len(rows.runs))]
+        found = np.array([np.mean(np.diff(x, 2) ** 2) / 6.0 if len(x) > 4 else np.nan for x in own])
+        usual = np.nanmedian(found) if np.any(np.isfinite(found)) else 1.0
+        usual = max(float(usual), 1e-300)
+        count = np.array([len(x) for x in own], float)
+        shared = (4.0 * usual + count * np.where(np.isfinite(found), found, usual)) / (4.0 + count)
+        return np.sqrt(shared / np.mean(shared))
 
     def _weighed(self) -> tuple[list[Member], float]:
-        fitter, fit = self.fitter, self.fit
-        sizes, share = _relative_sizes(fitter, fit), fit.noise.share
-        n, c, u = len(fitter.noise.kept), self._constants, len(self.names)
-        curves = list(product(CURVES, STIFFNESS, GROWTHS))
-        scales = np.array([size * self._spectrum(k, g) for size, k, g in curves])
-        own = np.log(self._prior_of_curves(curves))
-        found, grams = [], {}
-        for correlation in sorted({0.0, 0.45, 0.75, fit.noise.correlation}):
-            noise = Noise(sizes, 1.0, correlation, share)
-            columns = np.column_stack([self._left, self._columns])
-            white = fitter.noise.whitened(columns, self.record, noise)
-            gram = grams[correlation] = white.T @ white
-            base = fitter.noise.log_determinant(self.record, noise)
-            base += np.log(0.5) if correlation == 0.0 else np.log(0.5 / 3.0)
+        n, own = len(self.fitter.noise.kept), self._priors()
+        some, plain = [], []
+        for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
+            grams, logs = self._grams(correlation)
+            total, known = np.sum(grams, axis=1), np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
             for terms in TERMS:
-                scale = np.full(c + u, 1.0 / fit.noise.common)
-                scale[c:] *= terms
+                scale = self._scale(terms)
+                used = scale > 0
+                matrix = scale[used, None] * total[:, 1:, 1:][:, used][:, :, used] * scale[used]
+                chol = np.linalg.cholesky(np.eye(matrix.shape[1]) + matrix)
+                ahead = np.linalg.solve(chol, (scale * total[:, 0, 1:])[:, used, None])[..., 0]
+                squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 1e-300)
+                values = logs + known - np.sum(np.log(np.diagonal(chol, axis1=1, axis2=2)), axis=1)
+                values -= 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
                 prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
-                # constants and terms first, then the curves beside them
-                first = c + (u if terms else 0)
-                inner = scale[:first, None] * gram[1 : first + 1, 1 : first + 1] * scale[:first]
-                factor = np.linalg.cholesky(np.eye(first) + inner)
-                rest = np.r_[0, 1 + c + u : len(gram)]
-                along = solve_triangular(
-                    factor, scale[:first, None] * gram[1 : first + 1][:, rest], lower=True
-                )
-                left = gram[np.ix_(rest, rest)] - along.T @ along
-                determinant = np.sum(np.log(np.diag(factor)))
-                squares = [left[0, 0]]
-                determinants = [determinant]
-                many = scales[:, :, None] * left[1:, 1:] * scales[:, None, :]
-                chol = np.linalg.cholesky(np.eye(many.shape[1]) + many)
-                ahead = np.linalg.solve(chol, (scales * left[1:, 0])[..., None])[..., 0]
-                squares = np.append(left[0, 0], left[0, 0] - np.sum(ahead**2, axis=1))
-                logs = np.log(np.diagonal(chol, axis1=1, axis2=2)).sum(axis=1)
-                determinants = np.append(determinant, determinant + logs)
-                squares = np.maximum(squares, 1e-300)
-                values = base - determinants - 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
-                priors = np.append(np.log(0.1), own) + prior
-                for i, (value, square) in enumerate(zip(values, squares, strict=True)):
-                    which = None if not i else i - 1
-                    found.append((value, value + priors[i], correlation, terms, which, square))
-        plain = [one[0] for one in found if one[4] is None and not one[3]]
-        some = [one for one in found if one[4] is not None or one[3]]
-        none, weights = logsumexp(plain), np.array([one[1] for one in some])
+                for which, (value, square) in enumerate(zip(values, squares, strict=True)):
+                    if which or terms:
+                        log = value + prior + (own[which - 1] if which else np.log(0.1))
+                        some.append((log, correlation, terms, which, np.sqrt(square / n)))
+                    else:
+                        plain.append(value)
+        none, weights = logsumexp(plain), np.array([one[0] for one in some])
         total = logsumexp(weights)
         members = []
-        for at in np.argsort(-weights)[:12]:
-            if weights[at] - total < -7.0:
+        for at in np.argsort(-weights)[:_MOST]:
+            weight, correlation, terms, which, noise = some[at]
+            if weight - total < -_LIKELY:
                 break
-            _, weight, correlation, terms, which, square = some[at]
-            scale = np.full(c + u, 1.0 / fit.noise.common)
-            scale[c:] *= terms
-            width = np.zeros(scales.shape[1]) if which is None else scales[which]
-            scale = np.concatenate([scale, width])
-            curve, stiffness, growth = (0.0, 1.0, 0.0) if which is None else curves[which]
-            members.append(
-                Member(
-                    float(weight - total), curve, stiffness, growth, terms,
-                    float(np.sqrt(square / n)), *_posterior(grams[correlation], scale), scale,
-                )
-            )  # fmt: skip
-        hidden = self._hidden()
-        return members, float(logsumexp([total, none + np.log(max(hidden, 1e-300))]) - none)
+            gram = np.sum(self._grams(correlation)[0][which], axis=0)
+            members.append(self._member(gram, which, terms, float(weight - total), float(noise)))
+        return members, float(np.logaddexp(total, none + np.log(self._hidden())) - none)
+
+    def _member(self, gram, which: int, terms: float, log_weight: float, noise: float) -> Member:
+        mean, root = _posterior(gram, self._scale(terms))
+        kind = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+        return Member(*kind, terms, log_weight, noise, mean, root)
 
     def _hidden(self) -> float:
         """Return the prior probability of a discrepancy too small to be seen."""
-        return (
-            min(1.0, _SHARES[0] / max(self.smallest, 1e-9)) if np.isfinite(self.smallest) else 0.0
-        )
+        if not np.isfinite(self.smallest):
+            return 1e-300
+        return 0.8 * min(1.0, _CELLS[0] / max(self.smallest, 1e-9))
 
-    def _prior_of_curves(self, curves: Sequence[tuple[float, float, float]]) -> np.ndarray:
-        """Return the prior of each curve, beside what is too small to be seen.
+    def _priors(self) -> Float[np.ndarray, " grid"]:
+        """Return the log prior of each curve, beside what is too small to be seen.
 
         Sizes are uniform up to what the smallest effect takes away; a fifth asks nothing of them.
         """
-        ends, limit = np.array(_SHARES), self.smallest
+        ends, limit = np.array(_CELLS), self.smallest
         share = np.full(len(CURVES), 1.0 / len(CURVES))
         if np.isfinite(limit):
             inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
             share = 0.8 * inside + 0.2 * share
         per = len(STIFFNESS) * len(GROWTHS)
-        return np.array([max(share[CURVES.index(size)], 1e-300) / per for size, _, _ in curves])
+        return np.log([share[CURVES.index(size)] / per for size, _, _ in self._grid])
+
+    # what it is worth ---------------------------------------------------------------------------
+
+    def candidates(self) -> list[tuple[int, float]]:
+        """Return curves and terms of the grid that a prediction may rest on."""
+        stiff = self.members[0].stiffness if self.members else STIFFNESS[0]
+        curves = [0, *(i + 1 for i, one in enumerate(self._grid) if one[1] == stiff)]
+        return [(which, terms) for which in curves for terms in TERMS]
+
+    def left_out(
+        self, which: int, terms: float
+    ) -> tuple[Float[np.ndarray, " judged"], Float[np.ndarray, " judged"]]:
+        """Return errors and deviations of each run as the others predict it, over its size.
+
+        To first order about the fit to all runs; of each run some samples.
+        """
+        rows = self.fitter.rows
+        grams, _ = self._grams(self.fit.noise.correlation)
+        total, scale = np.sum(grams[which], axis=0), self._scale(terms)
+        size, _, growth = self._grid[which - 1] if which else (0.0, 0.0, 0.0)
+        errors, deviations = [], []
+        for i, at in enumerate(self.judged):
+            if not len(at):
+                continue
+            gram = total - grams[which][i]
+            n = len(rows) - np.count_nonzero(rows.run == i)
+            mean, root = _posterior(gram, scale)
+            square = gram[0, 0] - gram[0, 1:] @ mean
+            noise = np.sqrt(max(float(square), 1e-300) / max(n, 1))
+            columns = self.columns[at]
+            spread = np.sum((columns @ root) ** 2, axis=1) / rows.size[at] ** 2
+            level = self.fitter.noise.deviation(self.record, self.fit.noise.share)[at]
+            own = (size * np.exp(growth * self.growth[i])) ** 2 + (level / rows.size[at]) ** 2
+            errors.append((self.left[at] - columns @ mean) / rows.size[at])
+            deviations.append(noise * np.sqrt(spread + own))
+        return np.concatenate(errors), np.concatenate(deviations)
+
+    @property
+    def judged(self) -> list[np.ndarray]:
+        """Rows of each run by which predictions of runs left out are judged."""
+        run = self.fitter.rows.run
+        return [
+            np.unique(np.linspace(at[0], at[-1], _JUDGED).astype(int))
+            for at in (np.flatnonzero(run == i) for i in range(len(self.growth)))
+        ]
+
+    def member(self, which: int, terms: float) -> Member:
+        """Return a member of the grid, by all fitted runs."""
+        grams, _ = self._grams(self.fit.noise.correlation)
+        gram = np.sum(grams[which], axis=0)
+        mean, _ = _posterior(gram, self._scale(terms))
+        square = max(float(gram[0, 0] - gram[0, 1:] @ mean), 1e-300)
+        noise = np.sqrt(square / len(self.fitter.noise.kept))
+        return self._member(gram, which, terms, 0.0, float(noise))
 
 
 def _posterior(
-    gram: Float[np.ndarray, "n+1 n+1"], scale: Float[np.ndarray, " n"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n n"]]:
+    gram: Float[np.ndarray, "m+1 m+1"], scale: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m used"]]:
     """Return mean and root of the covariance of coefficients, for noise of size one."""
     used = np.flatnonzero(scale > 0)
     own = scale[used]
@@ -233,20 +328,30 @@ def _posterior(
     return mean, root
 
 
-def _relative_sizes(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
-    """Return the noise of each run over that of all, as its samples scatter about a smooth curve."""
-    rows = fitter.rows
-    left = (rows.recorded - fitter.record(fit)) / rows.size
-    found, count = [], []
-    for i in range(len(rows.runs)):
-        own = left[rows.run == i]
-        found.append(np.mean(np.diff(own, 2) ** 2) / 6.0 if len(own) > 4 else np.nan)
-        count.append(len(own))
-    scatter, counts = np.array(found), np.array(count, float)
-    usual = np.nanmedian(scatter) if np.any(np.isfinite(scatter)) else 1.0
-    scatter = np.where(np.isfinite(scatter), scatter, usual)
-    shared = (4.0 * usual + counts * scatter) / (4.0 + counts)
-    return np.sqrt(shared / max(float(np.mean(shared)), 1e-300))
+def stacked(
+    errors: Float[np.ndarray, "members samples"], deviations: Float[np.ndarray, "members samples"]
+) -> tuple[Float[np.ndarray, " members"], float]:
+    """Return weights of predictions by what runs left out say, and the factor on their deviations.
+
+    The weights maximise the log density of samples that were left out under the mixture: what is
+    right where no hypothesis is   [Yao, Vehtari, Simpson & Gelman 2018, Bayesian Anal. 13, 917].
+    The factor is that at which 95 % of them lie within two deviations.
+
+    Parameters
+    ----------
+    errors, deviations
+        Of samples of runs left out, by each prediction.
+    """
+    logs = -0.5 * (errors / deviations) ** 2 - np.log(deviations)
+    densities = np.exp(logs - np.max(logs, axis=0))
+    weights = np.full(len(errors), 1.0 / len(errors))
+    for _ in range(300):
+        share = weights[:, None] * densities
+        weights = np.mean(share / np.sum(share, axis=0), axis=1)
+    middle = weights @ errors
+    spread = np.sqrt(weights @ ((errors - middle) ** 2 + deviations**2))
+    reach = float(np.quantile(np.abs(middle) / spread, 0.95)) / 1.96
+    return weights, reach
 
 
 def _cosines(run: np.ndarray, runs: int) -> Float[np.ndarray, "rows curves"]:

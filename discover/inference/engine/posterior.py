@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.special import logsumexp, ndtr
 
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.discrepancy import Discrepancy, stacked
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
@@ -36,10 +36,10 @@ _NAMELESS = 0.5
 _RUNS_AWAY = 10.0
 """Times the size of the largest record, which no sound prediction of another run exceeds."""
 
-_LEFT_OUT_ROUNDS = 4
+_DRAWS = 12
+"""Pairs of draws of each discrepancy."""
 
-_FAR = 0.5
-"""Of the size of a run: what a discrepancy changes it by at most, in the mean and as a deviation."""
+_SEED = 20261128
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,15 @@ class Posterior:
 
     @in_one_thread
     def bands(self) -> list[Band]:
-        """Return the bands of the predicted runs, by the fitted runs alone."""
+        """Return the bands of the predicted runs, by the fitted runs alone.
+
+        Where a hypothesis is all there is, its evidence weighs its prediction. Where none is, runs
+        that are left out in turn weigh predictions, with discrepancies of all sizes beside them.
+        """
         rows = self.problem.predicted
         if rows is None:
             return []
-        parts = _Predictions(self, rows).parts()
+        parts = Predictions(self, rows).parts()
         if not parts:
             return []
         weights = np.array([p[0] for p in parts])
@@ -163,12 +167,26 @@ def explain(problem: Problem, most: int = 3) -> Posterior:
     own = np.array([search.rank(fit) for fit in near])
     share = np.exp(own - logsumexp(own)) if len(own) else own
     discrepancies = tuple(
-        (float(own[i]), Discrepancy(search.fitter, fit, smallest(search, fit)))
-        for i, fit in enumerate(near[:_WITH_DISCREPANCY])
+        (search.rank(fit), Discrepancy(search.fitter, fit, smallest(search, fit)))
+        for fit in _of_each_size(alive)
     )
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
     found = Posterior(problem, search, explanations, unexplained, fits, discrepancies)
     found.memory["whole"] = whole, judged, beside
+    return found
+
+
+def _of_each_size(alive: Sequence[Fit]) -> list[Fit]:
+    """Return the likeliest hypotheses of each size, two of the likeliest size.
+
+    Where none is right, a smaller one may predict better what is far off.
+    """
+    found = list(alive[:_WITH_DISCREPANCY])
+    sizes = {len(fit.names) for fit in found}
+    for fit in alive:
+        if len(fit.names) not in sizes:
+            sizes.add(len(fit.names))
+            found.append(fit)
     return found
 
 
@@ -216,135 +234,122 @@ def _has_term(problem: Problem, names: Sequence[str]) -> bool:
     return any(isinstance(problem.effects[name], LibraryTerm) for name in names)
 
 
-class _Predictions:
+class Predictions:
     """Normal predictions of rows that were not fitted, one for each hypothesis."""
 
     def __init__(self, posterior: Posterior, rows: Rows):
         self.posterior, self.rows = posterior, rows
         self.problem = posterior.problem
         self.fitter = Fitter(self.problem, rows)
+        self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
 
     def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
         """Return weight, mean and variance of the rows, of each hypothesis and discrepancy."""
-        largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
-        found, search = [], self.posterior.search
-        usable = []
-        for fit, _ in self.posterior.fits:
+        found: list[tuple[float, np.ndarray, np.ndarray]] = []
+        explained = 1.0 - self.posterior.unexplained
+        sound = [(f, p) for f, p in self.posterior.fits if self._ahead(f) is not None]
+        total = sum(p for _, p in sound)
+        for fit, probability in sound:
+            if (weight := explained * probability / total) > 1e-4:
+                found.append((weight, *self._of_fit(fit)))
+        return found + self._of_none(1.0 - explained if sound else 1.0)
+
+    def _ahead(self, fit: Fit) -> Float[np.ndarray, " rows"] | None:
+        """Return what the model of a fit predicts; None where it runs away."""
+        if "ahead" not in fit.memory:
             predicted = self.fitter.predict([fit.theta])[0]
-            if np.all(np.isfinite(predicted)) and np.max(np.abs(predicted)) < largest:
-                usable.append(fit)
-                found.append((search.rank(fit), *self._of_fit(fit, predicted)))
-        for rank, discrepancy in self.posterior.discrepancies:
-            if discrepancy.fit in usable:
-                log = rank + discrepancy.log_factor + np.log(NONE / (1.0 - NONE))
-                found += [(log + w, *rest) for w, *rest in self._beside(discrepancy)]
-        top = max((one[0] for one in found), default=0.0)
-        return [(float(np.exp(w - top)), m, v) for w, m, v in found if w > top - 9.0]
+            with np.errstate(invalid="ignore"):
+                sound = bool(np.all(np.abs(predicted) < self._largest))
+            fit.memory["ahead"] = predicted if sound else None
+        return fit.memory["ahead"]
 
     def _jacobian(self, fit: Fit, predicted: np.ndarray):
-        """Return derivatives of the rows, and the fit's own coefficients of what is linear."""
+        """Return derivatives of the rows, and the variance of what each run has of its own."""
+        if "jacobian" in fit.memory:
+            return fit.memory["jacobian"]
         ahead = self.fitter.start(fit.names, fit.theta)
         ahead.predicted = predicted
         moved = self.fitter.predict(self.fitter._moved(ahead))
         own = self.fitter._columns(ahead, moved)[:, : len(fit.priors)]
         # of what is linear, only the gain and the moduli are those of the fitted runs
         runs, q = len(self.problem.fitted.runs), len(fit.linear)
-        linear = self.fitter.linear_columns(predicted)
-        per_run = (2 + bool(self.problem.loading)) * len(self.rows.runs)
+        linear, each = self.fitter.linear_columns(predicted), 2 + bool(self.problem.loading)
         shared = np.zeros((len(self.rows), q))
         shared[:, 0] = linear[:, 0]
-        tail = (2 + bool(self.problem.loading)) * runs + 1
-        shared[:, tail:] = linear[:, 1 + per_run :]
-        apart = linear[:, 1 : 1 + per_run] * self.fitter.widths[1 : 1 + per_run]
-        return np.column_stack([own * (1.0 + fit.linear[0]), shared]), np.sum(apart**2, axis=1)
-
-    def _instants(self, fit: Fit, predicted: np.ndarray) -> np.ndarray:
-        """Return the variance by steps whose instants no fitted run tells."""
-        return np.zeros_like(predicted)
-
-    def _of_fit(self, fit: Fit, predicted: np.ndarray):
-        jacobian, apart = self._jacobian(fit, predicted)
-        n = len(fit.priors)
-        middle = predicted + jacobian[:, n:] @ fit.linear
-        variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
-        return middle, variance + self._noise(fit, middle) ** 2
-
-    def _noise(self, fit: Fit, middle: np.ndarray) -> np.ndarray:
-        return fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
-
-    def _beside(self, discrepancy: Discrepancy):
-        """Return what each discrepancy of a hypothesis says of the rows."""
-        fit = discrepancy.fit
-        predicted = self.fitter.predict([fit.theta])[0]
-        jacobian, apart = self._jacobian(fit, predicted)
-        unused = discrepancy._signatures(self.fitter, predicted) * discrepancy.shares
-        pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        widths = np.concatenate([1.0 / np.sqrt(pulls), self.problem_widths])
-        columns = np.column_stack([jacobian * widths, self._bounded(unused, 1.0)])
-        centres = np.array([p.centre for p in fit.priors.values()])
-        own = jacobian[:, : len(centres)]
-        fastest = np.max(self.problem.fitted.fastest)
-        growth = np.log(self.rows.fastest / fastest)[self.rows.run]
-        missed = (self.missed(fit) * self.rows.size) ** 2
-        found = []
-        for member in discrepancy.members:
-            c = columns.shape[1]
-            change = columns @ member.mean[:c] - own @ (fit.coordinates - centres)
-            middle = predicted + self._bounded(change[:, None], _FAR)[:, 0]
-            spread = np.sum((columns @ member.root[:c]) ** 2, axis=1) * member.noise**2
-            curve = member.noise * member.curve * self.rows.size * np.exp(member.growth * growth)
-            variance = np.maximum(spread + apart + curve**2, missed)
-            variance = self._bounded(np.sqrt(variance)[:, None], _FAR)[:, 0] ** 2
-            noise = member.noise * self.fitter.noise.deviation(middle, fit.noise.share)
-            found.append((member.log_weight, middle, variance + noise**2))
+        shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]
+        alone = slice(1, 1 + each * len(self.rows.runs))
+        apart = np.sum((linear[:, alone] * self.fitter.widths[alone]) ** 2, axis=1)
+        found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
+        fit.memory["jacobian"] = found
         return found
 
-    def _bounded(self, columns: Float[np.ndarray, "rows k"], most: float) -> np.ndarray:
-        """Return columns that change no run by more than so much of its size.
+    def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        predicted = self._ahead(fit)
+        assert predicted is not None
+        jacobian, apart = self._jacobian(fit, predicted)
+        middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
+        variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
+        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
+        return middle, variance + noise**2
 
-        To first order alone what is far from the fitted runs would grow without bound.
+    def _of_none(self, weight: float) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Return predictions beside discrepancies, weighed by runs left out in turn."""
+        usable = [d for _, d in self.posterior.discrepancies if self._ahead(d.fit) is not None]
+        kinds = [(d, which, terms) for d in usable for which, terms in d.candidates()]
+        if not kinds or weight < 1e-4:
+            return []
+        left = [d.left_out(which, terms) for d, which, terms in kinds]
+        errors, deviations = (np.array([one[i] for one in left]) for i in (0, 1))
+        weights, reach = stacked(errors, deviations)
+        # as few runs as there are tell the factor badly   [Barber et al. 2021, Ann. Stat. 49, 486]
+        runs = len(self.problem.fitted.runs)
+        reach *= (runs + 1.0) / max(runs - 1.0, 1.0)
+        found = []
+        for share, (discrepancy, which, terms) in zip(weights, kinds, strict=True):
+            if share > 1e-3:
+                middle, variance, noise = self._beside(discrepancy, which, terms)
+                spread = variance * max(reach, 1.0) ** 2 + noise
+                found.append((weight * share, middle, spread))
+        return found
+
+    def _beside(self, discrepancy: Discrepancy, which: int, terms: float):
+        """Return what a discrepancy of a hypothesis says of the rows.
+
+        Constants and terms are drawn, for to first order what is far would grow without bound; what
+        runs away is no fluid.
         """
-        out = columns.copy()
-        for i in range(len(self.rows.runs)):
-            at = self.rows.run == i
-            size = np.sqrt(np.mean((columns[at] / self.rows.size[at, None]) ** 2, axis=0))
-            out[at] *= most / np.maximum(size, most)
-        return out
+        fit, member = discrepancy.fit, discrepancy.member(which, terms)
+        predicted = self._ahead(fit)
+        assert predicted is not None
+        linear, n = len(fit.linear), len(fit.priors)
+        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, member.root.shape[1]))
+        drawn = member.mean + member.noise * np.concatenate([lot, -lot]) @ member.root.T
+        widths = np.concatenate([discrepancy.widths, np.zeros(len(discrepancy.names))])
+        widths[n + linear :] = discrepancy.shares
+        drawn = drawn * widths
+        drawn[:, :n] += fit.coordinates - discrepancy.offset[:n]
+        found = self.fitter.predict([self._theta(discrepancy, one) for one in drawn])
+        sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
+        found = found[sound] if np.any(sound) else predicted[None]
+        _, apart = self._jacobian(fit, predicted)
+        middle = np.mean(found, axis=0) * (1.0 + member.mean[n] * discrepancy.widths[n])
+        fastest = np.max(self.problem.fitted.fastest)
+        growth = np.log(self.rows.fastest / fastest)[self.rows.run]
+        curve = member.noise * member.curve * self.rows.size * np.exp(member.growth * growth)
+        noise = member.noise * self.fitter.noise.deviation(middle, fit.noise.share)
+        return middle, np.var(found, axis=0) + apart + curve**2, noise**2
 
-    @property
-    def problem_widths(self) -> np.ndarray:
-        """Prior deviations of what is linear in the fitted runs."""
-        return self.posterior.search.fitter.widths
-
-    def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
-        """Return by how much, relative, each run may be missed as runs left out in turn are."""
-        if "missed" not in fit.memory:
-            fit.memory["missed"] = left_out(self.problem, fit)
-        missed, fastest = fit.memory["missed"], self.problem.fitted.fastest
-        size = [
-            np.sqrt(np.mean((missed * np.maximum(fast / fastest, 1.0)) ** 2))
-            for fast in self.rows.fastest
-        ]
-        return np.array(size)[self.rows.run]
-
-
-def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
-    """Return by how much of its size each fitted run is missed when it is left out."""
-    rows, found = problem.fitted, []
-    for i in range(len(rows.runs)):
-        fitter = Fitter(problem, rows, without=i)
-        start = fitter.start(fit.names, fit.theta, fit.linear)
-        # when a rate steps is read off its own record, and is no prediction
-        own = [step.place for step in rows.runs[i].rate_steps if step.place is not None]
-        held = {problem.model.instants.start + place for place in own}
-        start.priors = {at: prior for at, prior in start.priors.items() if at not in held}
-        part = fitter.fit([start], _LEFT_OUT_ROUNDS, derivatives=False)[0]
-        at = rows.run == i
-        off = (rows.recorded - part.predicted)[at] / rows.size[at]
-        noise = fit.noise.sizes[i] ** 2
-        size = float(np.sqrt(max(float(np.mean(off**2)) - noise, 0.0)))
-        found.append(min(size, 3.0) if np.isfinite(size) else 3.0)
-    return np.array(found)
+    def _theta(self, discrepancy: Discrepancy, drawn: np.ndarray) -> Float[np.ndarray, " p"]:
+        """Return the vector of drawn coordinates, with what was drawn of the terms beside them."""
+        fit, theta = discrepancy.fit, discrepancy.fit.theta.copy()
+        for (at, prior), value in zip(fit.priors.items(), drawn, strict=False):
+            theta[at] = prior.to_value(np.clip(value, *prior.ends))
+        model = self.problem.model
+        first = len(fit.priors) + len(fit.linear)
+        for name, value in zip(discrepancy.names, drawn[first:], strict=True):
+            at = model.positions(name)[0]
+            theta[at] = np.clip(theta[at] + value, model.low[at], model.high[at])
+        return theta
 
 
 def quantiles(
