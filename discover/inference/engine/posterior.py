@@ -271,8 +271,18 @@ def _classes(
         if all(_has_term(problem, names) for names in one["members"]):
             lost += (1.0 - _NAMELESS) * share
             share *= _NAMELESS
-        found.append(Explanation(tuple(one["members"]), share))
+        found.append(Explanation(_smallest_sets(one["members"]), share))
     return tuple(sorted(found, key=lambda one: -one.probability)), lost
+
+
+def _smallest_sets(members: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+    """Return sets of which no part predicts the same: what is added to these changes nothing."""
+    sets = [set(names) for names in members]
+    return tuple(
+        names
+        for names, own in zip(members, sets, strict=True)
+        if not any(other < own for other in sets)
+    )
 
 
 def _has_term(problem: Problem, names: Sequence[str]) -> bool:
@@ -351,7 +361,7 @@ class Predictions:
         root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
         lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
         drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
-        found = self.fitter.predict([_at(fit, one) for one in drawn])
+        found = self.fitter.predict([fit.at(one) for one in drawn])
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
         spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)
@@ -371,14 +381,6 @@ class Predictions:
             for fast in self.rows.fastest
         ]
         return np.minimum(wider * np.array(size), _MOST_MISSED)[self.rows.run]
-
-
-def _at(fit: Fit, coordinates: np.ndarray) -> Float[np.ndarray, " p"]:
-    """Return the vector of a fit at other coordinates of what is free."""
-    theta = fit.theta.copy()
-    for (at, prior), value in zip(fit.priors.items(), coordinates, strict=True):
-        theta[at] = prior.to_value(np.clip(value, *prior.ends))
-    return theta
 
 
 def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
