@@ -93,7 +93,8 @@ class Fitter:
     """
 
     def __init__(self, problem: Problem, rows: Rows, without: int | None = None):
-        self.problem, self.rows, self.noise = problem, rows, NoiseModel(rows, without)
+        self.problem, self.rows = problem, rows
+        self.noise = NoiseModel(rows, without, problem.noise)
         self._shifts = self._modulus_shifts()
         self.widths = self._widths()
 

@@ -23,6 +23,9 @@ SHARES = (0.0, 0.6, 0.9, 0.985)
 _ALIKE = 4.0
 """Degrees of freedom by which sizes of runs are alike: two of three within a factor of 1.5."""
 
+_KNOWN = 100.0
+"""The same where the noise is known: within a tenth."""
+
 LEAST = 1e-4
 """Relative size below which no noise is taken to be: what a model of a fluid is not told to."""
 
@@ -55,10 +58,13 @@ class NoiseModel:
         The records.
     without
         A run that is left out; None for none.
+    known
+        Size over the records, where it is known.
     """
 
-    def __init__(self, rows: Rows, without: int | None = None):
-        self.rows = rows
+    def __init__(self, rows: Rows, without: int | None = None, known: float | None = None):
+        self.rows, self.known = rows, known
+        self._alike = _ALIKE if known is None else _KNOWN
         self.kept = np.flatnonzero(rows.run != without)
         self._run, self._gap = rows.run[self.kept], rows.gap[self.kept]
         self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
@@ -103,7 +109,7 @@ class NoiseModel:
         values = values + (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
         best = int(np.argmax(values))
         share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
-        sizes = np.sqrt((_ALIKE * common[best] + square[best]) / (_ALIKE + self._count))
+        sizes = np.sqrt((self._alike * common[best] + square[best]) / (self._alike + self._count))
         return float(logsumexp(values)), Noise(
             sizes, float(np.sqrt(common[best])), correlation, share
         )
@@ -112,14 +118,16 @@ class NoiseModel:
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""
         n, total = self._count, np.sum(self._count)
         common = np.sum(square, axis=1) / total
-        for _ in range(6):
-            weight = np.sum((_ALIKE + n) / (_ALIKE * common[:, None] + square), axis=1)
+        if self.known is not None:
+            common = np.full_like(common, max(self.known, LEAST) ** 2)
+        for _ in range(6 if self.known is None else 0):
+            weight = np.sum((self._alike + n) / (self._alike * common[:, None] + square), axis=1)
             common = len(n) / weight
         runs = (
-            gammaln(0.5 * (_ALIKE + n))
-            - gammaln(0.5 * _ALIKE)
-            + 0.5 * _ALIKE * np.log(_ALIKE * common[:, None])
-            - 0.5 * (_ALIKE + n) * np.log(_ALIKE * common[:, None] + square)
+            gammaln(0.5 * (self._alike + n))
+            - gammaln(0.5 * self._alike)
+            + 0.5 * self._alike * np.log(self._alike * common[:, None])
+            - 0.5 * (self._alike + n) * np.log(self._alike * common[:, None] + square)
         )
         return np.sum(runs, axis=1) - 0.5 * total * np.log(np.pi), common
 

@@ -11,6 +11,7 @@ from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.forward.batches import data_scales
+from discover.forward.by_mode import LARGEST
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
 from discover.statistics import root_of
@@ -64,6 +65,13 @@ SOUND_CLOCK = 0.01
 """Relative deviation of relaxation times: temperature is held to 0.1 to 0.2 K, and a melt's times
 change by 5 % in 1 K (Ferry 1980, ch. 11)."""
 
+BY_MODE = (1.0, 0.5)
+"""Standard deviations of slope and curvature over a decade of relaxation time, by which a constant
+differs from mode to mode; in e-foldings."""
+
+OWN_OF_A_MODE = 0.3
+"""Standard deviation by which the constant of one mode deviates from that."""
+
 SOUND_ZERO = 0.001
 """Zero and drift of a record, over its root mean square."""
 
@@ -81,6 +89,8 @@ class Problem:
         All runs that are fitted, and those that are predicted.
     loading
         Relative deviation by which loadings of the sample differ, if each run is its own.
+    noise
+        Of the records, relative to their size, where it is known.
     """
 
     def __init__(
@@ -90,10 +100,12 @@ class Problem:
         fitted: Sequence[Run],
         predicted: Sequence[Run] = (),
         loading: float = 0.0,
+        noise: float | None = None,
     ):
         names = {e.name for e in candidates} | {e.name for e in declared.effects}
         beside = [make_effect(n.effect) for n in NUISANCES if n.effect not in names]
-        self.declared, self.candidates, self.loading = declared, tuple(candidates), loading
+        self.declared, self.candidates = declared, tuple(candidates)
+        self.loading, self.noise = loading, noise
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
         effects = [*candidates, *beside]
@@ -124,13 +136,16 @@ class Problem:
                 width = min(high - low, 10.0)
                 middle = float(self.zero[position])
                 found[position] = Prior("normal", middle, width, low, high)
+        declared = {known.name for known in model.declared.effects}
+        for name in (*declared, *(p.name for p in model.declared.free_parameters)):
+            found |= self._by_mode(name)
         found.setdefault(1, Prior("normal", 0.0, SOUND_CLOCK))
         for nuisance in NUISANCES:
             effect = self.effects[nuisance.effect]
             first = effect.parameters[0]
             unit = ({"one": 1.0} | self.scales)[first.scale]
             position = model.positions(effect.name)[0]
-            if position in found:
+            if position in found or effect.name in declared:
                 continue
             found[position] = Prior(
                 "normal", 0.0, nuisance.sound * first.first_trial * unit,
@@ -139,6 +154,13 @@ class Problem:
         for position in range(model.instants.start, model.instants.stop):
             found[position] = Prior("normal", 0.5, 0.29, 0.0, 1.0)
         return found
+
+    def _by_mode(self, name: str) -> dict[int, Prior]:
+        """Return the priors of what varies a constant from mode to mode, on its link's scale."""
+        varying = self.model.varying(name)
+        widths = [*BY_MODE, *[OWN_OF_A_MODE] * (len(varying) - len(BY_MODE))]
+        ends = -LARGEST, LARGEST
+        return {at: Prior("normal", 0.0, w, *ends) for at, w in zip(varying, widths, strict=False)}
 
     def _signatures(self) -> dict[str, float]:
         """Return the amplitude of each effect that changes the records as much as is typical."""
@@ -168,6 +190,7 @@ class Problem:
             )  # fmt: skip
             for position, parameter in zip(positions[1:], effect.parameters[1:], strict=True):
                 found[position] = self._inner(position, parameter)
+            found |= self._by_mode(name)
         return found
 
     def _inner(self, position: int, parameter: EffectParameter) -> Prior:
@@ -208,7 +231,7 @@ class Problem:
         """Return a vector without some effects."""
         out = theta.copy()
         for name in names:
-            positions = self.model.positions(name)
+            positions = [*self.model.positions(name), *self.model.varying(name)]
             out[positions] = self.zero[positions]
         return out
 

@@ -81,7 +81,8 @@ class Search:
         """Return hypotheses with one effect more, ready to be fitted, the likeliest first.
 
         Each is scored from one linearisation at amplitude zero, inner constants at several starts:
-        the gain of log likelihood with noise sizes free, less the Laplace price of its prior.
+        the gain of log likelihood with noise sizes free, less the Laplace price of its prior. Both
+        the share of the squared residual that this is and the score stand in `memory["scored"]`.
         """
         problem, fitter = self.problem, self.fitter
         if fit.covariance is None or fit.jacobian is None:
@@ -140,6 +141,8 @@ class Search:
                 theta[at] + size if at in fit.priors else size, prior.low, prior.high
             )
             best[name] = score, fitter.start((*fit.names, name), theta, fit.linear)
+            share = -np.expm1(-2.0 * gain / count)
+            best[name][1].memory["scored"] = float(share), float(score)
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
     def exchange(self) -> None:
