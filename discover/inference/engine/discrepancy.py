@@ -11,9 +11,9 @@ along the samples of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the 
 ρ, τ, the stiffness of S and the growth are summed over a grid.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -43,8 +43,6 @@ _CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
 
 _LIKELY = 7.0
 _MOST = 12
-_JUDGED = 24
-"""Samples of a run left out by which members are judged."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +53,8 @@ class Member:
     ----------
     curve, stiffness, growth, terms
         ρ over the noise, half swings, power of the rate, τ.
+    which, correlation
+        Its curve in the grid, zero for none, and the correlation of the noise beside it.
     log_weight
         Log of its probability among all of the hypothesis.
     noise
@@ -67,10 +67,31 @@ class Member:
     stiffness: float
     growth: float
     terms: float
+    which: int
+    correlation: float
     log_weight: float
     noise: float
     mean: Float[np.ndarray, " m"]
     root: Float[np.ndarray, "m m"]
+
+
+class _Products(NamedTuple):
+    """Products of what was left and columns, curves being integrated out; and those with curves.
+
+    Attributes
+    ----------
+    gram
+        Shape (1 + grid, 1 + m, 1 + m), without a curve first.
+    log_determinant
+        Shape (1 + grid,).
+    cross, inner
+        Of curves with the others and with themselves, of each run.
+    """
+
+    gram: Float[np.ndarray, "grid m+1 m+1"]
+    log_determinant: Float[np.ndarray, " grid"]
+    cross: Float[np.ndarray, "runs k m+1"]
+    inner: Float[np.ndarray, "runs k k"]
 
 
 class Discrepancy:
@@ -113,7 +134,7 @@ class Discrepancy:
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
         self._curves = _cosines(rows.run, len(rows.runs)) * rows.size[:, None]
         self._grid = list(product(CURVES, STIFFNESS, GROWTHS))
-        self._kept: dict[float, tuple[np.ndarray, np.ndarray]] = {}
+        self._kept: dict[float, _Products] = {}
         self.members, self.log_factor = self._weighed()
 
     def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
@@ -155,39 +176,32 @@ class Discrepancy:
             found.append(size * power * np.exp(growth * self.growth)[:, None])
         return np.array(found)
 
-    def _grams(self, correlation: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return products of [left, columns] of each run, its curve being integrated out.
-
-        Returns
-        -------
-        Shape (1 + grid, runs, 1 + m, 1 + m), without a curve first, and log determinants of shape
-        (1 + grid,).
-        """
-        if correlation in self._kept:
-            return self._kept[correlation]
-        noise = Noise(self._sizes(), 1.0, correlation, self.fit.noise.share)
-        both = np.column_stack([self.left, self.columns, self._curves])
-        white = self.fitter.noise.whitened(both, self.record, noise)
-        run, runs = self.fitter.rows.run[self.fitter.noise.kept], len(self.growth)
-        m = 1 + self.columns.shape[1]
-        inner, cross, plain = [], [], []
-        for i in range(runs):
-            own = white[run == i, :m]
-            curve = white[run == i, m + i * _MODES : m + (i + 1) * _MODES]
-            plain.append(own.T @ own)
-            cross.append(curve.T @ own)
-            inner.append(curve.T @ curve)
-        d = self._deviations()
-        chol = np.linalg.cholesky(
-            np.eye(_MODES) + d[..., :, None] * np.array(inner) * d[..., None, :]
-        )
-        along = np.linalg.solve(chol, d[..., None] * np.array(cross))
-        grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
-        logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
-        base = self.fitter.noise.log_determinant(self.record, noise)
-        found = np.concatenate([np.array(plain)[None], grams]), base - np.append(0.0, logs)
-        self._kept[correlation] = found
-        return found
+    def _products(self, correlation: float) -> "_Products":
+        """Return products of what was left, columns and curves of each run, whitened."""
+        if correlation not in self._kept:
+            noise = Noise(self._sizes(), 1.0, correlation, self.fit.noise.share)
+            both = np.column_stack([self.left, self.columns, self._curves])
+            white = self.fitter.noise.whitened(both, self.record, noise)
+            run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
+            plain, cross, inner = [], [], []
+            for i in range(len(self.growth)):
+                own = white[run == i, :m]
+                curve = white[run == i, m + i * _MODES : m + (i + 1) * _MODES]
+                plain.append(own.T @ own)
+                cross.append(curve.T @ own)
+                inner.append(curve.T @ curve)
+            d = self._deviations()
+            scaled = d[..., :, None] * np.array(inner) * d[..., None, :]
+            chol = np.linalg.cholesky(np.eye(_MODES) + scaled)
+            along = np.linalg.solve(chol, d[..., None] * np.array(cross))
+            grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
+            logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
+            total = np.sum(np.concatenate([np.array(plain)[None], grams]), axis=1)
+            base = self.fitter.noise.log_determinant(self.record, noise)
+            self._kept[correlation] = _Products(
+                total, base - np.append(0.0, logs), np.array(cross), np.array(inner)
+            )
+        return self._kept[correlation]
 
     def _sizes(self) -> Float[np.ndarray, " runs"]:
         """Return the noise of each run over that of all, as samples scatter about a smooth curve."""
@@ -205,8 +219,8 @@ class Discrepancy:
         n, own = len(self.fitter.noise.kept), self._priors()
         some, plain = [], []
         for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
-            grams, logs = self._grams(correlation)
-            total, known = np.sum(grams, axis=1), np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
+            total, logs, *_ = self._products(correlation)
+            known = np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
             for terms in TERMS:
                 scale = self._scale(terms)
                 used = scale > 0
@@ -230,25 +244,18 @@ class Discrepancy:
             weight, correlation, terms, which, noise = some[at]
             if weight - total < -_LIKELY:
                 break
-            gram = np.sum(self._grams(correlation)[0][which], axis=0)
-            members.append(self._member(gram, which, terms, float(weight - total), float(noise)))
-        return members, float(np.logaddexp(total, none + np.log(self._hidden())) - none)
-
-    def _member(self, gram, which: int, terms: float, log_weight: float, noise: float) -> Member:
-        mean, root = _posterior(gram, self._scale(terms))
-        kind = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
-        return Member(*kind, terms, log_weight, noise, mean, root)
-
-    def _hidden(self) -> float:
-        """Return the prior probability of a discrepancy too small to be seen."""
-        if not np.isfinite(self.smallest):
-            return 1e-300
-        return 0.8 * min(1.0, _CELLS[0] / max(self.smallest, 1e-9))
+            mean, root = _posterior(self._products(correlation).gram[which], self._scale(terms))
+            kind = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+            members.append(
+                Member(*kind, terms, which, correlation, weight - total, noise, mean, root)
+            )
+        return members, float(total - none)
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
-        """Return the log prior of each curve, beside what is too small to be seen.
+        """Return the log prior of each curve.
 
-        Sizes are uniform up to what the smallest effect takes away; a fifth asks nothing of them.
+        Sizes are uniform up to what the smallest effect takes away, and a fifth asks nothing of
+        them. What is too small to be seen is no discrepancy.
         """
         ends, limit = np.array(_CELLS), self.smallest
         share = np.full(len(CURVES), 1.0 / len(CURVES))
@@ -258,59 +265,39 @@ class Discrepancy:
         per = len(STIFFNESS) * len(GROWTHS)
         return np.log([share[CURVES.index(size)] / per for size, _, _ in self._grid])
 
-    # what it is worth ---------------------------------------------------------------------------
-
-    def candidates(self) -> list[tuple[int, float]]:
-        """Return curves and terms of the grid that a prediction may rest on."""
-        stiff = self.members[0].stiffness if self.members else STIFFNESS[0]
-        curves = [0, *(i + 1 for i, one in enumerate(self._grid) if one[1] == stiff)]
-        return [(which, terms) for which in curves for terms in TERMS]
-
-    def left_out(
-        self, which: int, terms: float
-    ) -> tuple[Float[np.ndarray, " judged"], Float[np.ndarray, " judged"]]:
-        """Return errors and deviations of each run as the others predict it, over its size.
-
-        To first order about the fit to all runs; of each run some samples.
-        """
-        rows = self.fitter.rows
-        grams, _ = self._grams(self.fit.noise.correlation)
-        total, scale = np.sum(grams[which], axis=0), self._scale(terms)
-        size, _, growth = self._grid[which - 1] if which else (0.0, 0.0, 0.0)
-        errors, deviations = [], []
-        for i, at in enumerate(self.judged):
+    def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:
+        """Return draws of the root mean square of the discrepancy of each run, over its size."""
+        rows, c = self.fitter.rows, len(self.widths)
+        weights = np.exp([member.log_weight for member in self.members])
+        chosen = lot.choice(len(weights), draws, p=weights / np.sum(weights))
+        found = np.zeros((draws, len(self.growth)))
+        for number, member in enumerate(self.members):
+            at = np.flatnonzero(chosen == number)
             if not len(at):
                 continue
-            gram = total - grams[which][i]
-            n = len(rows) - np.count_nonzero(rows.run == i)
-            mean, root = _posterior(gram, scale)
-            square = gram[0, 0] - gram[0, 1:] @ mean
-            noise = np.sqrt(max(float(square), 1e-300) / max(n, 1))
-            columns = self.columns[at]
-            spread = np.sum((columns @ root) ** 2, axis=1) / rows.size[at] ** 2
-            level = self.fitter.noise.deviation(self.record, self.fit.noise.share)[at]
-            own = (size * np.exp(growth * self.growth[i])) ** 2 + (level / rows.size[at]) ** 2
-            errors.append((self.left[at] - columns @ mean) / rows.size[at])
-            deviations.append(noise * np.sqrt(spread + own))
-        return np.concatenate(errors), np.concatenate(deviations)
+            normal = lot.standard_normal((len(at), member.root.shape[1]))
+            own = member.mean + member.noise * normal @ member.root.T
+            off = own[:, c:] @ self.columns[:, c:].T
+            if member.which:
+                off = off + self._drawn_curves(member, own, lot)
+            for i in range(len(self.growth)):
+                part = off[:, rows.run == i] / rows.size[rows.run == i]
+                found[at, i] = np.sqrt(np.mean(part**2, axis=1))
+        return found
 
-    @property
-    def judged(self) -> list[np.ndarray]:
-        """Rows of each run by which predictions of runs left out are judged."""
-        run = self.fitter.rows.run
-        return [
-            np.unique(np.linspace(at[0], at[-1], _JUDGED).astype(int))
-            for at in (np.flatnonzero(run == i) for i in range(len(self.growth)))
-        ]
-
-    def member(self, which: int, terms: float) -> Member:
-        """Return a member of the grid, by all fitted runs."""
-        grams, _ = self._grams(self.fit.noise.correlation)
-        gram = np.sum(grams[which], axis=0)
-        mean, _ = _posterior(gram, self._scale(terms))
-        square = max(float(gram[0, 0] - gram[0, 1:] @ mean), 1e-300)
-        noise = np.sqrt(square / len(self.fitter.noise.kept))
-        return self._member(gram, which, terms, 0.0, float(noise))
+    def _drawn_curves(self, member: Member, own: np.ndarray, lot: np.random.Generator):
+        """Return draws of the curves of all runs, given constants and terms, in Pa."""
+        products, out = self._products(member.correlation), np.zeros((len(own), len(self.left)))
+        deviations = self._deviations()[member.which - 1]
+        for i, d in enumerate(deviations):
+            inner = np.eye(_MODES) + d[:, None] * products.inner[i] * d
+            right = d[:, None] * (products.cross[i][:, :1] - products.cross[i][:, 1:] @ own.T)
+            middle = np.linalg.solve(inner, right).T
+            normal = lot.standard_normal(middle.shape)
+            spread = member.noise * np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
+            curves = self._curves[:, i * _MODES : (i + 1) * _MODES]
+            out += ((middle + spread) * d) @ curves.T
+        return out
 
 
 def _posterior(
@@ -326,32 +313,6 @@ def _posterior(
     mean[used] = own * (inverse @ (inverse.T @ (own * gram[1:, 0][used])))
     root[used] = own[:, None] * inverse
     return mean, root
-
-
-def stacked(
-    errors: Float[np.ndarray, "members samples"], deviations: Float[np.ndarray, "members samples"]
-) -> tuple[Float[np.ndarray, " members"], float]:
-    """Return weights of predictions by what runs left out say, and the factor on their deviations.
-
-    The weights maximise the log density of samples that were left out under the mixture: what is
-    right where no hypothesis is   [Yao, Vehtari, Simpson & Gelman 2018, Bayesian Anal. 13, 917].
-    The factor is that at which 95 % of them lie within two deviations.
-
-    Parameters
-    ----------
-    errors, deviations
-        Of samples of runs left out, by each prediction.
-    """
-    logs = -0.5 * (errors / deviations) ** 2 - np.log(deviations)
-    densities = np.exp(logs - np.max(logs, axis=0))
-    weights = np.full(len(errors), 1.0 / len(errors))
-    for _ in range(300):
-        share = weights[:, None] * densities
-        weights = np.mean(share / np.sum(share, axis=0), axis=1)
-    middle = weights @ errors
-    spread = np.sqrt(weights @ ((errors - middle) ** 2 + deviations**2))
-    reach = float(np.quantile(np.abs(middle) / spread, 0.95)) / 1.96
-    return weights, reach
 
 
 def _cosines(run: np.ndarray, runs: int) -> Float[np.ndarray, "rows curves"]:

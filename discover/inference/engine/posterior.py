@@ -6,9 +6,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp, ndtr
+from scipy.stats import t as student
 
 from discover.effects.library_term import LibraryTerm
-from discover.inference.engine.discrepancy import Discrepancy, stacked
+from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
@@ -36,8 +37,16 @@ _NAMELESS = 0.5
 _RUNS_AWAY = 10.0
 """Times the size of the largest record, which no sound prediction of another run exceeds."""
 
+_LEFT_OUT_ROUNDS = 5
+
+_MOST_MISSED = 1.0
+"""Over the size of a run: by more nothing is missed that is called a prediction."""
+
 _DRAWS = 12
-"""Pairs of draws of each discrepancy."""
+"""Pairs of draws of the constants of a hypothesis."""
+
+_SIZES = 400
+"""Draws of the size of a discrepancy."""
 
 _SEED = 20261128
 
@@ -59,6 +68,26 @@ class Band:
     high: Float[np.ndarray, " n"]
 
 
+@dataclass(frozen=True)
+class Size:
+    """How large a discrepancy is, over the root mean square of the records.
+
+    Attributes
+    ----------
+    size, ci95
+        Of all fitted runs.
+    by_run
+        By name of the run.
+    grows_with_rate
+        Power of the shear rate with which it grows, if the records tell.
+    """
+
+    size: float
+    ci95: tuple[float, float]
+    by_run: dict[str, float]
+    grows_with_rate: float | None
+
+
 @dataclass
 class Posterior:
     """What records say of a problem.
@@ -75,8 +104,8 @@ class Posterior:
         Probability that none of them is all that is there.
     fits
         Hypotheses that are possible, fitted to the fitted runs, with their probabilities.
-    discrepancies
-        Of the likeliest hypotheses.
+    left
+        What the likeliest hypothesis leaves of the fitted runs; None where none can be followed.
     """
 
     problem: Problem
@@ -84,7 +113,7 @@ class Posterior:
     explanations: tuple[Explanation, ...]
     unexplained: float
     fits: tuple[tuple[Fit, float], ...]
-    discrepancies: tuple[tuple[float, Discrepancy], ...]
+    left: Discrepancy | None
     memory: dict = field(default_factory=dict)
 
     @property
@@ -121,11 +150,44 @@ class Posterior:
         return low, high
 
     @in_one_thread
+    def discrepancy(self) -> "Size | None":
+        """Return how large what no hypothesis holds is; None where none can be followed.
+
+        It is no smaller than what fitted runs are missed by that are left out in turn, and it is
+        zero where a hypothesis is all there is.
+        """
+        if self.left is None:
+            return None
+        lot, fit = np.random.default_rng(_SEED), self.left.fit
+        drawn = self.left.sizes(_SIZES, lot)
+        missed, runs = self.missed(fit), drawn.shape[1]
+        usual = np.sqrt(np.mean(missed**2) * runs / lot.chisquare(runs, _SIZES))
+        of_all = np.maximum(np.sqrt(np.mean(drawn**2, axis=1)), usual)
+        there = lot.random(_SIZES) < self.unexplained
+        size, low, high = np.quantile(np.where(there, of_all, 0.0), (0.5, 0.025, 0.975))
+        growth = [(m.growth, np.exp(m.log_weight)) for m in self.left.members if m.curve]
+        weight = sum(w for _, w in growth)
+        by_run = np.maximum(np.median(drawn, axis=0), missed) if self.unexplained > 0.5 else 0.0
+        names = [run.name for run in self.problem.fitted.runs]
+        return Size(
+            float(size),
+            (float(low), float(high)),
+            dict(zip(names, np.broadcast_to(by_run, runs).tolist(), strict=True)),
+            sum(g * w for g, w in growth) / weight if weight > 0.5 else None,
+        )
+
+    def missed(self, fit: Fit) -> Float[np.ndarray, " runs"]:
+        """Return by how much of its size each fitted run is missed that is left out of a fit."""
+        if "missed" not in fit.memory:
+            fit.memory["missed"] = left_out(self.problem, fit)
+        return fit.memory["missed"]
+
+    @in_one_thread
     def bands(self) -> list[Band]:
         """Return the bands of the predicted runs, by the fitted runs alone.
 
-        Where a hypothesis is all there is, its evidence weighs its prediction. Where none is, runs
-        that are left out in turn weigh predictions, with discrepancies of all sizes beside them.
+        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as it
+        misses fitted ones that are left out in turn.
         """
         rows = self.problem.predicted
         if rows is None:
@@ -166,27 +228,10 @@ def explain(problem: Problem, most: int = 3) -> Posterior:
     # constants and bands are those of the fitted runs
     own = np.array([search.rank(fit) for fit in near])
     share = np.exp(own - logsumexp(own)) if len(own) else own
-    discrepancies = tuple(
-        (search.rank(fit), Discrepancy(search.fitter, fit, smallest(search, fit)))
-        for fit in _of_each_size(alive)
-    )
+    left = Discrepancy(search.fitter, near[0], smallest(search, near[0])) if near else None
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
-    found = Posterior(problem, search, explanations, unexplained, fits, discrepancies)
+    found = Posterior(problem, search, explanations, unexplained, fits, left)
     found.memory["whole"] = whole, judged, beside
-    return found
-
-
-def _of_each_size(alive: Sequence[Fit]) -> list[Fit]:
-    """Return the likeliest hypotheses of each size, two of the likeliest size.
-
-    Where none is right, a smaller one may predict better what is far off.
-    """
-    found = list(alive[:_WITH_DISCREPANCY])
-    sizes = {len(fit.names) for fit in found}
-    for fit in alive:
-        if len(fit.names) not in sizes:
-            sizes.add(len(fit.names))
-            found.append(fit)
     return found
 
 
@@ -244,15 +289,18 @@ class Predictions:
         self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
 
     def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return weight, mean and variance of the rows, of each hypothesis and discrepancy."""
+        """Return weight, mean and variance of the rows, of each hypothesis alone and beside more."""
         found: list[tuple[float, np.ndarray, np.ndarray]] = []
         explained = 1.0 - self.posterior.unexplained
         sound = [(f, p) for f, p in self.posterior.fits if self._ahead(f) is not None]
         total = sum(p for _, p in sound)
         for fit, probability in sound:
-            if (weight := explained * probability / total) > 1e-4:
-                found.append((weight, *self._of_fit(fit)))
-        return found + self._of_none(1.0 - explained if sound else 1.0)
+            share = probability / total
+            if explained * share > 1e-4:
+                found.append((explained * share, *self._of_fit(fit)))
+            if (1.0 - explained) * share > 1e-3:
+                found.append(((1.0 - explained) * share, *self._of_none(fit)))
+        return found
 
     def _ahead(self, fit: Fit) -> Float[np.ndarray, " rows"] | None:
         """Return what the model of a fit predicts; None where it runs away."""
@@ -292,64 +340,63 @@ class Predictions:
         noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
         return middle, variance + noise**2
 
-    def _of_none(self, weight: float) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return predictions beside discrepancies, weighed by runs left out in turn."""
-        usable = [d for _, d in self.posterior.discrepancies if self._ahead(d.fit) is not None]
-        kinds = [(d, which, terms) for d in usable for which, terms in d.candidates()]
-        if not kinds or weight < 1e-4:
-            return []
-        left = [d.left_out(which, terms) for d, which, terms in kinds]
-        errors, deviations = (np.array([one[i] for one in left]) for i in (0, 1))
-        weights, reach = stacked(errors, deviations)
-        # as few runs as there are tell the factor badly   [Barber et al. 2021, Ann. Stat. 49, 486]
-        runs = len(self.problem.fitted.runs)
-        reach *= (runs + 1.0) / max(runs - 1.0, 1.0)
-        found = []
-        for share, (discrepancy, which, terms) in zip(weights, kinds, strict=True):
-            if share > 1e-3:
-                middle, variance, noise = self._beside(discrepancy, which, terms)
-                spread = variance * max(reach, 1.0) ** 2 + noise
-                found.append((weight * share, middle, spread))
-        return found
+    def _of_none(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a hypothesis says of the rows where it is not all there is.
 
-    def _beside(self, discrepancy: Discrepancy, which: int, terms: float):
-        """Return what a discrepancy of a hypothesis says of the rows.
-
-        Constants and terms are drawn, for to first order what is far would grow without bound; what
-        runs away is no fluid.
+        It misses them as it misses fitted runs that are left out in turn, by more where a run is
+        faster. Constants are drawn, for to first order what is far would grow without bound.
         """
-        fit, member = discrepancy.fit, discrepancy.member(which, terms)
         predicted = self._ahead(fit)
-        assert predicted is not None
-        linear, n = len(fit.linear), len(fit.priors)
-        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, member.root.shape[1]))
-        drawn = member.mean + member.noise * np.concatenate([lot, -lot]) @ member.root.T
-        widths = np.concatenate([discrepancy.widths, np.zeros(len(discrepancy.names))])
-        widths[n + linear :] = discrepancy.shares
-        drawn = drawn * widths
-        drawn[:, :n] += fit.coordinates - discrepancy.offset[:n]
-        found = self.fitter.predict([self._theta(discrepancy, one) for one in drawn])
+        assert predicted is not None and fit.covariance is not None
+        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
+        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
+        drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
+        found = self.fitter.predict([_at(fit, one) for one in drawn])
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
-        found = found[sound] if np.any(sound) else predicted[None]
+        spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)
-        middle = np.mean(found, axis=0) * (1.0 + member.mean[n] * discrepancy.widths[n])
-        fastest = np.max(self.problem.fitted.fastest)
-        growth = np.log(self.rows.fastest / fastest)[self.rows.run]
-        curve = member.noise * member.curve * self.rows.size * np.exp(member.growth * growth)
-        noise = member.noise * self.fitter.noise.deviation(middle, fit.noise.share)
-        return middle, np.var(found, axis=0) + apart + curve**2, noise**2
+        middle = predicted * (1.0 + fit.linear[0])
+        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
+        missed = self.missed(fit) * self.rows.size
+        return middle, spread + apart + missed**2 + noise**2
 
-    def _theta(self, discrepancy: Discrepancy, drawn: np.ndarray) -> Float[np.ndarray, " p"]:
-        """Return the vector of drawn coordinates, with what was drawn of the terms beside them."""
-        fit, theta = discrepancy.fit, discrepancy.fit.theta.copy()
-        for (at, prior), value in zip(fit.priors.items(), drawn, strict=False):
-            theta[at] = prior.to_value(np.clip(value, *prior.ends))
-        model = self.problem.model
-        first = len(fit.priors) + len(fit.linear)
-        for name, value in zip(discrepancy.names, drawn[first:], strict=True):
-            at = model.positions(name)[0]
-            theta[at] = np.clip(theta[at] + value, model.low[at], model.high[at])
-        return theta
+    def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
+        """Return the deviation, over its size, by which each run may be missed."""
+        missed, fastest = self.posterior.missed(fit), self.problem.fitted.fastest
+        runs = len(missed)
+        # as few runs tell a deviation badly: of the next one Student's quantile is the wider
+        wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
+        size = [
+            np.sqrt(np.mean((missed * np.maximum(fast / fastest, 1.0)) ** 2))
+            for fast in self.rows.fastest
+        ]
+        return np.minimum(wider * np.array(size), _MOST_MISSED)[self.rows.run]
+
+
+def _at(fit: Fit, coordinates: np.ndarray) -> Float[np.ndarray, " p"]:
+    """Return the vector of a fit at other coordinates of what is free."""
+    theta = fit.theta.copy()
+    for (at, prior), value in zip(fit.priors.items(), coordinates, strict=True):
+        theta[at] = prior.to_value(np.clip(value, *prior.ends))
+    return theta
+
+
+def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
+    """Return by how much of its size each fitted run is missed when it is left out of the fit."""
+    rows, found = problem.fitted, []
+    for i in range(len(rows.runs)):
+        fitter = Fitter(problem, rows, without=i)
+        start = fitter.start(fit.names, fit.theta, fit.linear)
+        # when a rate steps is read off its own record, and is no prediction
+        own = [step.place for step in rows.runs[i].rate_steps if step.place is not None]
+        held = {problem.model.instants.start + place for place in own}
+        start.priors = {at: prior for at, prior in start.priors.items() if at not in held}
+        part = fitter.fit([start], _LEFT_OUT_ROUNDS, derivatives=False)[0]
+        at = rows.run == i
+        off = (rows.recorded - part.predicted)[at] / rows.size[at]
+        size = float(np.sqrt(max(float(np.mean(off**2)) - fit.noise.common**2, 0.0)))
+        found.append(min(size, _MOST_MISSED) if np.isfinite(size) else _MOST_MISSED)
+    return np.array(found)
 
 
 def quantiles(
