@@ -72,7 +72,7 @@ class Member:
     log_weight: float
     noise: float
     mean: Float[np.ndarray, " m"]
-    root: Float[np.ndarray, "m m"]
+    root: Float[np.ndarray, "m used"]
 
 
 class _Products(NamedTuple):
