@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from discover._version import __version__ as __version__
 
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
-    from discover.closed_loop.in_memory import close_loop as close_loop
+    from discover.loop.in_memory import close_loop as close_loop
     from discover.comparison.in_memory import compare as compare
     from discover.dataset import Dataset as Dataset
     from discover.dataset import LinearSweep as LinearSweep
@@ -91,7 +91,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "discover.closed_loop.in_memory": ("close_loop",),
+    "discover.loop.in_memory": ("close_loop",),
     "discover.comparison.in_memory": ("compare",),
     "discover.dataset": (
         "LinearSweep",
@@ -129,7 +129,7 @@ _PLACES = {
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 
 _PACKAGES = (
-    "closed_loop",
+    "loop",
     "comparison",
     "dataset",
     "effects",

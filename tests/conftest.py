@@ -210,16 +210,6 @@ def left_to_the_page():
     return _leave_out_other_readings
 
 
-@pytest.fixture(scope="module")
-def effects_alone() -> Iterator[None]:
-    """Leave out free functions and next tests of loops, which have files of tests of their own."""
-    beyond = importlib.import_module("discover.closed_loop.beyond.beyond_the_search")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(beyond, "_free_functions", lambda *_: ())
-        patch.setattr(beyond, "next_tests", lambda *_: beyond.NextTests())
-        yield
-
-
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Return the folder of measured data sets, or skip and say why."""

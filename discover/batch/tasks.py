@@ -140,8 +140,8 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
     if there is not None:
         return there
-    from discover.closed_loop.each_run import run_loop_on
     from discover.dataset.conditions import material_and_temperature
+    from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
     from discover.report.loop.verdict import loop_verdict
     from discover.report.overlay import loop_overlays, read_overlays
@@ -154,9 +154,7 @@ def run_close_loop(
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
     asked = dict(study.loop)
-    result = run_loop_on(
-        data_of_study, declared, progress, laws=model.choice, store=folder, **asked
-    )
+    result = run_loop_on(data_of_study, declared, progress, laws=model.choice, **asked)
     each = data_of_study.each
     progress("drawing", 0.97)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
@@ -204,8 +202,9 @@ def fit_declared(model, dataset):
     """
     if not model.free:
         return model
-    from discover.closed_loop import run_loop
     from discover.laws import make_law
+    from discover.laws import make_law
+    from discover.loop import run_loop
     from discover.study.declared_model import forward_model
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name

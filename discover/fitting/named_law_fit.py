@@ -10,7 +10,6 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
 from discover.equations.equation import mean_relaxation_time
@@ -18,6 +17,7 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
+from discover.loop.run_record import RunRecord
 from discover.notebook_view import NotebookView
 from discover.page_view import PageView
 from discover.statistics import LackOfFit

@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
+from discover.loop.loop_result import LoopResult
 from discover.report.comparison.report import write_comparison
 from discover.report.loop.report import write_loop
 from discover.report.page import made_by

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.closed_loop import RunRecord
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
 from discover.dataset.tables.table import read_table, shown
@@ -16,6 +15,7 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws import LAWS, Fluid, make_law
+from discover.loop import RunRecord
 from discover.study.schema import OverlayAsked, Study
 
 COLUMNS = ("run", "time_s", "quantity", "value")

@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
-from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
-from discover.closed_loop.results.stages import DeclaredEffect
+from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.loop.parts import DeclaredEffect
 from discover.effects import make_effect
 from discover.equations import (
     AugmentedLaw,

@@ -8,7 +8,7 @@ import pytest
 from independent_folder import MOBILITY, write_folder
 
 import discover as dc
-from discover.closed_loop import in_memory
+from discover.loop import in_memory
 from discover.learners.tbnn_ude import DefaultRecipe
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tensor_sindy.estimator import TensorSINDy

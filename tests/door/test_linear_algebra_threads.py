@@ -7,7 +7,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import discover as dc
 from discover import linear_algebra_threads
-from discover.closed_loop import loop
+from discover.loop import loop
 from discover.comparison import run_comparison
 from discover.learners import distillation
 from discover.learners.run_prediction import RunPrediction

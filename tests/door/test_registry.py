@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import discover as dc
-from discover.closed_loop.candidates import candidates_of
+from discover.loop.candidates import candidates_of
 from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
 from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.laws.base import as_parameter

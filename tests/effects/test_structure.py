@@ -7,7 +7,7 @@ import pytest
 from independent import Structured, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
-from discover.closed_loop.candidates import candidates_of
+from discover.loop.candidates import candidates_of
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from independent import Giesekus, Structured, Thixotropic, UpperConvectedMaxwell, steps
 
-from discover.closed_loop import DeclaredModel, run_loop
+from discover.loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run
 from discover.protocols import shear_rates, step_rates
 

@@ -5,7 +5,7 @@ import pytest
 from independent import authors
 from independent.homogeneous import UNIT
 
-from discover.closed_loop import ErrorPair, LoopResult, RunRecord
+from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Dataset, Run
 from discover.errors import InputError

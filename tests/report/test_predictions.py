@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from discover.closed_loop import ErrorPair, LoopResult, RunRecord
+from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.flows import Flow

@@ -5,9 +5,6 @@ import pytest
 from independent import Giesekus, WhiteMetzner, oscillation, start_up
 from scipy.signal import lfilter
 
-from discover.closed_loop.judging.fitted_runs import FittedRuns
-from discover.closed_loop.judging.reasons import Grounds, reasons
-from discover.closed_loop.judging.unseen_runs import UnseenRuns
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.likeness import likeness
 from discover.statistics.noise.running_mean import averaged_over

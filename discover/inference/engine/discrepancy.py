@@ -72,7 +72,7 @@ class Member:
     log_weight: float
     noise: float
     mean: Float[np.ndarray, " m"]
-    root: Float[np.ndarray, "m m"]
+    root: Float[np.ndarray, "m used"]
 
 
 class _Products(NamedTuple):
@@ -88,9 +88,9 @@ class _Products(NamedTuple):
         Of curves with the others and with themselves, of each run.
     """
 
-    gram: Float[np.ndarray, "grid m+1 m+1"]
+    gram: Float[np.ndarray, "grid n n"]
     log_determinant: Float[np.ndarray, " grid"]
-    cross: Float[np.ndarray, "runs k m+1"]
+    cross: Float[np.ndarray, "runs k n"]
     inner: Float[np.ndarray, "runs k k"]
 
 
@@ -301,7 +301,7 @@ class Discrepancy:
 
 
 def _posterior(
-    gram: Float[np.ndarray, "m+1 m+1"], scale: Float[np.ndarray, " m"]
+    gram: Float[np.ndarray, "one_more one_more"], scale: Float[np.ndarray, " m"]
 ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m used"]]:
     """Return mean and root of the covariance of coefficients, for noise of size one."""
     used = np.flatnonzero(scale > 0)
