@@ -205,7 +205,7 @@ class Discrepancy:
 
     @property
     def sizes_of_noise(self) -> Float[np.ndarray, " runs"]:
-        """Return the noise of each run over that of all, as samples scatter about a smooth curve."""
+        """Noise of each run over that of all, as samples scatter about a smooth curve."""
         rows = self.fitter.rows
         left = (rows.recorded - self.record) / rows.size
         own = [left[rows.run == i] for i in range(len(rows.runs))]

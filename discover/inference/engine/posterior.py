@@ -186,8 +186,8 @@ class Posterior:
     def bands(self) -> list[Band]:
         """Return the bands of the predicted runs, by the fitted runs alone.
 
-        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as it
-        misses fitted ones that are left out in turn.
+        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as
+        it misses fitted ones that are left out in turn.
         """
         rows = self.problem.predicted
         if rows is None:
@@ -299,10 +299,13 @@ class Predictions:
         self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
 
     def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return weight, mean and variance of the rows, of each hypothesis alone and beside more."""
+        """Return weight, mean and variance of the rows, of each hypothesis."""
         found: list[tuple[float, np.ndarray, np.ndarray]] = []
         explained = 1.0 - self.posterior.unexplained
         sound = [(f, p) for f, p in self.posterior.fits if self._ahead(f) is not None]
+        if not sound:  # where all that are likely run away, the likeliest that does not
+            others = self.posterior.search.alive()
+            sound = [(f, 1.0) for f in others if self._ahead(f) is not None][:1]
         total = sum(p for _, p in sound)
         for fit, probability in sound:
             share = probability / total
@@ -357,7 +360,8 @@ class Predictions:
         faster. Constants are drawn, for to first order what is far would grow without bound.
         """
         predicted = self._ahead(fit)
-        assert predicted is not None and fit.covariance is not None
+        assert predicted is not None
+        assert fit.covariance is not None
         root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
         lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
         drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
