@@ -28,6 +28,7 @@ from discover.inference.step_instants import with_own_instants
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.statistics.residual import judged_cost, summarise
+from discover.words import unknown_name
 
 _AT_END = 1e-3
 """Share of its range within which a constant stands at an end."""
@@ -66,7 +67,7 @@ def choose_law(
     unknown = [name for name in names if name not in LAWS]
     if unknown or not names:
         raise InputError(
-            f"Unknown law {unknown[0]!r}; write some of {', '.join(LAWS)}."
+            unknown_name("law", unknown[0], LAWS)
             if unknown
             else f"No law is named to choose from; write some of {', '.join(LAWS)}."
         )

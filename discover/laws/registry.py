@@ -15,12 +15,13 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from discover.errors import InputError
+from discover.errors import InputError, Problems
 from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
 from discover.new_names import require_new_name
 from discover.plain_numbers import as_number, short
+from discover.words import nearest, unknown_name
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.registry import Registry
 
@@ -228,29 +229,30 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
         )
     parameters = dict(parameters or {})
     if not isinstance(name, str) or name not in LAWS:
-        raise InputError(f"Unknown law {name!r}; write one of {', '.join(LAWS)}.")
-    entry = LAWS[name]
-    unknown = [key for key in parameters if key not in entry.parameters]
-    if unknown:
-        wanted = ", ".join(entry.parameters) or "none"
-        raise InputError(
-            f"The law {name!r} has no parameter {unknown[0]!r}. Write one of its parameters: "
-            f"{wanted}."
-        )
-    values = []
+        raise InputError(unknown_name("law", name, LAWS))
+    entry, problems, values = LAWS[name], Problems(), []
+    for key in parameters:
+        if key not in entry.parameters:
+            said = unknown_name("parameter", key, entry.parameters)
+            problems.add(f"The law {name!r}: {said}")
+    meant = {nearest(key, entry.parameters) for key in parameters if key not in entry.parameters}
     for key, (low, high) in entry.parameters.items():
         if key not in parameters:
-            raise InputError(
-                f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to {high:g}."
-            )
+            if key not in meant:
+                problems.add(
+                    f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to "
+                    f"{high:g}."
+                )
+            continue
         try:
             value = as_number(key, parameters[key])
         except InputError:
             value = math.nan
         if not low <= value <= high:
-            raise InputError(
+            problems.add(
                 f"The parameter {key!r} of the law {name!r} must be a number from {low:g} to "
                 f"{high:g}; got {short(parameters[key])}."
             )
         values.append(value)
+    problems.require_none()
     return entry.build(*values)

@@ -1,5 +1,6 @@
 """The study file: what may be written in it, and nothing else."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -7,16 +8,19 @@ from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_
 
 from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.loading import LARGEST
-from discover.laws.registry import ANY, LAWS
+from discover.effects.known import known_effects
+from discover.errors import Problems
+from discover.laws.registry import ANY, LAWS, make_law, starting_value
 from discover.learners.registry import learner_names
 from discover.protocols.classes import FLOW_CLASSES, FlowClass
 from discover.validation import Section
+from discover.words import unknown_name
 from tensor_library.closed_forms import CLOSED_FORMS
 
 
 def _known_law(name: str) -> str:
     if name not in LAWS:
-        raise ValueError(f"unknown law {name[:60]!r}; write one of {', '.join(LAWS)}")
+        raise ValueError(unknown_name("law", name, LAWS))
     return name
 
 
@@ -34,17 +38,13 @@ def _known_law_or_several(given: Any) -> Any:
 
 def _known_learner(name: str) -> str:
     if name not in learner_names():
-        raise ValueError(
-            f"unknown learner {name[:60]!r}; write one of {', '.join(learner_names())}"
-        )
+        raise ValueError(unknown_name("learner", name, learner_names()))
     return name
 
 
 def _known_form(name: str) -> str:
     if name not in CLOSED_FORMS:
-        raise ValueError(
-            f"unknown closed form {name[:60]!r}; write some of {', '.join(CLOSED_FORMS)}"
-        )
+        raise ValueError(unknown_name("closed form", name, CLOSED_FORMS))
     return name
 
 
@@ -74,6 +74,11 @@ Role = Literal["fit", "judge"] | None
 """What a table beside the runs is for; by default it judges, unless there is no run to fit."""
 
 
+def _require_parameters(law: str, parameters: Mapping[str, float | str]) -> None:
+    """Refuse parameters that a law has not, or that lie outside their ranges."""
+    make_law(law, {k: starting_value(law, k) if v == "fit" else v for k, v in parameters.items()})
+
+
 class Synthetic(Section):
     """Data computed from a known law instead of measured."""
 
@@ -83,6 +88,11 @@ class Synthetic(Section):
     noise: Annotated[float, Field(ge=0, le=10)] = 0.0
     seed: Seed = 0
     samples: Annotated[int, Field(ge=10, le=100_000)] = 201
+
+    @model_validator(mode="after")
+    def _names(self):
+        _require_parameters(self.law, self.parameters)
+        return self
 
 
 class Data(Section):
@@ -162,6 +172,17 @@ class Model(Section):
     from_: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
         default=None, alias="from"
     )
+
+    @model_validator(mode="after")
+    def _names(self):
+        problems = Problems()
+        if isinstance(self.law, str) and self.law in LAWS and self.from_ is None:
+            with problems.collected():
+                _require_parameters(self.law, self.parameters)
+        with problems.collected():
+            known_effects(self.effects, "effects")
+        problems.require_none()
+        return self
 
     @model_validator(mode="after")
     def _window(self):
