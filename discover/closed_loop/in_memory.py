@@ -92,7 +92,7 @@ def close_loop(
         f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
         f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
     ).strip()
-    return replace(result, title=data.name, summary=summary)
+    return replace(result, title=data.name, described=summary)
 
 
 def _checked(options: Mapping[str, Any]) -> Loop:

@@ -12,6 +12,7 @@ from discover.effects.known import known_effects
 from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS, make_law, starting_value
 from discover.learners.registry import learner_names
+from discover.learners.settings import DEFAULT_DEGREE
 from discover.protocols.classes import FLOW_CLASSES, FlowClass
 from discover.validation import Section
 from discover.words import unknown_name
@@ -74,9 +75,10 @@ Role = Literal["fit", "judge"] | None
 """What a table beside the runs is for; by default it judges, unless there is no run to fit."""
 
 
-def _require_parameters(law: str, parameters: Mapping[str, float | str]) -> None:
+def _require_parameters(law: str, parameters: Mapping[str, Any]) -> None:
     """Refuse parameters that a law has not, or that lie outside their ranges."""
-    make_law(law, {k: starting_value(law, k) if v == "fit" else v for k, v in parameters.items()})
+    values = {k: starting_value(law, k) if v == "fit" else v for k, v in parameters.items()}
+    make_law(law, values)
 
 
 class Synthetic(Section):
@@ -254,7 +256,7 @@ class Loop(Section):
 class Library(Section):
     """Candidate terms: tensors × invariants up to a degree, plus closed forms."""
 
-    degree: Annotated[int, Field(ge=0, le=2)] = 1
+    degree: Annotated[int, Field(ge=0, le=2)] = DEFAULT_DEGREE
     closed_forms: tuple[ClosedFormName, ...] = ()
 
 
