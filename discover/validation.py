@@ -42,7 +42,10 @@ class Section(BaseModel):
     is no 1, and "3" in quotes no 3.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True,
+        use_attribute_docstrings=True,  # what a key means, as the page of all keys says
+    )  # fmt: skip
 
     @model_validator(mode="before")
     @classmethod

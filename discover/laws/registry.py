@@ -18,8 +18,8 @@ import jax.numpy as jnp
 from discover.errors import InputError, Problems
 from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.of_function import law_of_function
 from discover.laws.named import NamedLaw
+from discover.laws.of_function import law_of_function
 from discover.new_names import require_new_name
 from discover.plain_numbers import as_number, short
 from discover.words import nearest, unknown_name
