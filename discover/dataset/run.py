@@ -198,7 +198,7 @@ class Run(NotebookView):
         from discover.dataset.run_table import run_line
 
         yield repr(self).strip("<>")
-        line = {key: value for key, value in run_line(self).items() if value is not None}
+        line = {key: value for key, value in run_line(self).items() if value not in (None, False)}
         yield pd.DataFrame([{**line, **self.metadata}])
         yield self.to_dataframe().describe().loc[["min", "mean", "max"]].rename_axis("column")
 

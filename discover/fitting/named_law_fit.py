@@ -118,7 +118,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
     misfit: LackOfFit
     records: tuple[RunRecord, ...]
     model: AugmentedModel
-    theta: Float[np.ndarray, " p"]
+    theta: Float[np.ndarray, " all"]
     written: Equation | None = None
     title: str = ""
 

@@ -2,8 +2,10 @@
 
 import inspect
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
+from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from discover.errors import InputError
@@ -29,7 +31,7 @@ class LawOfFunction(AbstractConstitutiveLaw):
     names: tuple[str, ...] = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    def extra_term(self, stress: State, rate: Symmetric) -> State:
+    def extra_term(self, stress: State, rate: Symmetric) -> Any:  # a user's, checked by its shape
         """Return h of the function."""
         return self.function(stress, rate, **dict(zip(self.names, self.values, strict=True)))
 
@@ -55,7 +57,7 @@ def law_of_function(
             "of each of its parameters in parameters."
         ) from None
 
-    def build(*values: float) -> LawOfFunction:
+    def build(*values: ArrayLike) -> LawOfFunction:
         return LawOfFunction(tuple(map(as_parameter, values)), function, names)
 
     return build

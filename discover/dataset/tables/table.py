@@ -5,13 +5,13 @@ import io
 import os
 import re
 import stat
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.dataset.tables.units import Quantity, find_column
 from discover.errors import InputError, Problems
@@ -98,7 +98,7 @@ class Table:
             )
         return np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values)
 
-    def like_it(self, rows: Iterable[int]) -> str:
+    def like_it(self, rows: Int[np.ndarray, " faulty"]) -> str:
         """Return which lines of the file have the fault of the first of some rows too."""
         return _like_it([self.lines[row] for row in rows])
 
