@@ -1,6 +1,5 @@
 """Keep compiled programs between runs of the software."""
 
-import logging
 import os
 import re
 import stat
@@ -23,13 +22,6 @@ os.environ.setdefault("EQX_ON_ERROR", "nan")
 _WHOLE_LOOPS = "--xla_backend_extra_options=xla_cpu_small_while_loop_byte_threshold=100000000"
 if "xla_backend_extra_options" not in (_flags := os.environ.get("XLA_FLAGS", "")):
     os.environ["XLA_FLAGS"] = f"{_flags} {_WHOLE_LOOPS}".strip()
-
-# XLA and JAX write to standard error what is for those who build them: alarms of slow compilation,
-# a program that another processor's cache holds, an accelerator that nobody asked for. XLA reads
-# its level when it is loaded; whoever set one gets what they asked for
-os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
-if (_log := logging.getLogger("jax")).level == logging.NOTSET:
-    _log.setLevel(logging.ERROR)
 
 _ENTRY = re.compile(r".*-[0-9a-f]{64}-cache")
 """Names that JAX gives: that of the function, and a digest."""

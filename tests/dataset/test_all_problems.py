@@ -51,10 +51,10 @@ def test_a_good_folder_is_read_as_before(tmp_path):
 
 def test_a_folder_a_file_and_a_run_that_are_misspelled_get_a_guess(tmp_path):
     root = folder_of(tmp_path, runs="file\nfast.csv\nslwo.csv\n", fast=GOOD, slow=GOOD)
-    with pytest.raises(dc.InputError, match="Did you mean 'slow.csv'"):
+    with pytest.raises(dc.InputError, match=r"Did you mean 'slow\.csv'"):
         dc.load_dataset(root)
     with pytest.raises(dc.InputError, match="Did you mean 'melt'"):
         dc.load_dataset(tmp_path / "mlet")
     (root / "runs.csv").write_text("file\nfast.csv\nslow.csv\n")
-    with pytest.raises(dc.InputError, match="Did you mean 'fast.csv'"):
+    with pytest.raises(dc.InputError, match=r"Did you mean 'fast\.csv'"):
         dc.load_dataset(root).select(["Fast"])

@@ -16,7 +16,7 @@ import discover as dc
 dc.Fluid
 import jax, jax.numpy as jnp
 def constant():
-    ones = jnp.ones((100, 100))
+    ones = jnp.ones((60, 60))
     return jax.lax.reduce_window(ones, 0.0, jax.lax.add, (25, 25), (1, 1), "SAME")
 jax.jit(constant)().block_until_ready()
 """
