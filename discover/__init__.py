@@ -142,7 +142,7 @@ _PACKAGES = (
     "statistics",
     "study",
 )
-"""Packages that need no import of their own; of these, `effects` and `laws` answer calls too."""
+"""Packages that need no import of their own, and are not listed: the door is `__all__`."""
 
 
 def __getattr__(name: str) -> Any:
@@ -156,4 +156,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_PACKAGES})
+    return [*__all__, "__version__"]

@@ -14,6 +14,7 @@ from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicE
 from discover.effects.library_term import library_term
 from discover.errors import InputError
 from discover.new_names import require_new_name
+from discover.words import unknown_name
 from tensor_library.registry import Registry
 from tensor_library.terms import parse_term
 
@@ -108,6 +109,6 @@ def make_effect(name: str) -> AbstractEffect:
         return library_term(parse_term(name))
     except ValueError as error:
         raise InputError(
-            f"Unknown effect {name!r}; write a term of the library, such as 'tr(sigma)*sigma', or "
-            f"one of {', '.join(effects)}."
+            f"{unknown_name('effect', name, effects)} A term of the library is an effect too, such "
+            "as 'tr(sigma)*sigma'."
         ) from error

@@ -26,7 +26,7 @@ from discover.plain_numbers import as_number, as_whole_number
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
-from discover.words import did_you_mean
+from discover.words import did_you_mean, unknown_name
 
 _STARTS = 8
 """Starts of a fit, spread evenly over the ranges   [Sobol 1967]; the best end counts."""
@@ -97,7 +97,7 @@ def fit(
     >>> dc.fit("giesekus", data).summary()  # doctest: +SKIP
     """
     if not isinstance(law, str) or law not in LAWS:
-        raise InputError(f"Unknown law {law!r}.{did_you_mean(law, LAWS)} Laws: {', '.join(LAWS)}.")
+        raise InputError(unknown_name("law", law, LAWS))
     if held_out == "each":
         raise InputError("fit has no held_out='each'. Name runs, or use close_loop.")
     bounds, start, fixed = (

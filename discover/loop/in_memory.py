@@ -16,7 +16,7 @@ from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
 from discover.study.schema import Loop
 from discover.validation import validated
-from discover.words import counted
+from discover.words import counted, unknown_name
 
 _OPTIONS = {
     "effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws", "loading",
@@ -80,9 +80,7 @@ def close_loop(
     """
     unknown = sorted(set(options) - _OPTIONS)
     if unknown:
-        raise InputError(
-            f"close_loop has no option {unknown[0]!r}; it has {', '.join(sorted(_OPTIONS))}."
-        )
+        raise InputError(f"close_loop: {unknown_name('option', unknown[0], sorted(_OPTIONS))}")
     asked = _checked(options)
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
@@ -94,7 +92,7 @@ def close_loop(
         f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
         f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
     ).strip()
-    return replace(result, title=data.name, summary=summary)
+    return replace(result, title=data.name, described=summary)
 
 
 def _checked(options: Mapping[str, Any]) -> Loop:

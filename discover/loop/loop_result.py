@@ -39,9 +39,10 @@ from discover.loop.parts import (
 )
 from discover.loop.reading import Reading, read_residual
 from discover.loop.run_record import RunRecord
-from discover.notebook_view import NotebookView, table_of
+from discover.notebook_view import table_of
 from discover.page_view import PageView
 from discover.plain_json import json_text, plain
+from discover.summary_view import Estimate, SummaryView
 from discover.words import percent_of
 from tensor_library.law_terms import LawTerm
 
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LoopResult(PageView, HasEquation, NotebookView):
+class LoopResult(PageView, HasEquation, SummaryView):
     """The outcome of a closed loop.
 
     Attributes
@@ -102,7 +103,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
         are then their means.
     seconds
         Time taken.
-    title, summary
+    title, described
         Name of the data, and data and declared model in words, for the page.
     """
 
@@ -129,7 +130,7 @@ class LoopResult(PageView, HasEquation, NotebookView):
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
-    summary: str = field(repr=False, default="")
+    described: str = field(repr=False, default="")
 
     _page = "discover.report.in_memory:loop_page"
 
@@ -262,6 +263,22 @@ class LoopResult(PageView, HasEquation, NotebookView):
                 lines.append({**line, "aliases": ", ".join(stage.aliases)})
         columns = ["stage", "effect", "kind", "parameter", "value", "unit", "low", "high"]
         return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
+
+    def _estimates(self) -> list[Estimate]:
+        found = [
+            Estimate((name,), p.value, p.ci95, p.unit, notes={"from": "fitted"})
+            for name, p in self.declared_parameters.items()
+        ]
+        parts = [(one, "declared", ()) for one in self.declared_effects]
+        parts += [(stage, "added", stage.aliases) for stage in self.stages]
+        for effect, origin, aliases in parts:
+            for name, p in effect.parameters.items():
+                if p.ci95 is None:
+                    continue  # declared with a value, so nothing was estimated
+                notes = {"from": origin, "indistinguishable_from": ", ".join(aliases)}
+                key = (f"{effect.effect}.{name}",)
+                found.append(Estimate(key, p.value, p.ci95, p.unit or "1", notes=notes))
+        return found
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return `table`: the effects that were added, one line for each of their parameters."""

@@ -41,7 +41,7 @@ def loop_page(result: LoopResult) -> str:
     """Return the report on a closed loop as one page."""
     kept = _PageAlone(_fingerprint(result.to_json()))
     run = made_by(kept.fingerprint, "discover.close_loop(...) in Python", (), "")
-    write_loop(result, kept, result.title or "closed loop", result.summary, run=run)
+    write_loop(result, kept, result.title or "closed loop", result.described, run=run)
     return kept.page
 
 

@@ -97,8 +97,11 @@ class Writing:
         llvm.initialize_native_asmprinter()
         module = llvm.parse_assembly(str(self.module))
         module.verify()
-        # registers as wide as there are: by default LLVM keeps to half of them
-        features = f"{llvm.get_host_cpu_features().flatten()},-prefer-256-bit"
+        features = llvm.get_host_cpu_features().flatten()
+        if llvm.get_default_triple().startswith("x86_64"):
+            # registers as wide as there are: by default LLVM keeps to half of them. Of a feature
+            # that a processor has not, LLVM complains on standard error
+            features = f"{features},-prefer-256-bit"
         machine = llvm.Target.from_default_triple().create_target_machine(
             cpu=llvm.get_host_cpu_name(), features=features, opt=2
         )
