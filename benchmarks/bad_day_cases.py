@@ -28,7 +28,7 @@ from independent.flow import Flow
 from independent.folders import maxwell_sweep
 from independent.instruments import Instrument, Recording
 from independent.material import Material
-from independent.misread import alternation_as_from_rest, nothing, relaxation_as_run, scaled
+from independent.instruments import alternation_as_from_rest, nothing, relaxation_as_run, scaled
 
 G, LAMBDA = 100.0, 1.0
 SCALE = {"modulus": G, "relaxation_time": LAMBDA}

@@ -7,9 +7,9 @@ import numpy as np
 from independent import Giesekus, PhanThienTanner
 from independent.folders import write_table
 from independent.homogeneous import UNIT
-from independent.imposed_stress import strain_at
+from independent.sweeps import strain_at
 from independent.material import integrate
-from independent.structured import Structured
+from independent import Structured
 from independent.sweeps import modulus_of
 
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 from independent import WhiteMetzner
-from independent.curve_records import JUDGE, as_it_is, curve_records
+from independent.instruments import JUDGE, as_it_is, curve_records
 from independent.flow import Flow
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
+from independent import Giesekus
 from independent.instruments import Instrument, Recording
 from independent.material import Material
-from independent.thixotropic import Thixotropic
+from independent import Thixotropic
 
 import discover as dc
 from discover.closed_loop import LoopResult

@@ -16,7 +16,7 @@ from independent import (
     start_up,
 )
 from independent.flow import Flow
-from independent.imposed_stress import strain_at
+from independent.sweeps import strain_at
 from independent.instruments import Instrument
 from independent.material import Material, RateLaw
 from independent.named import material as named

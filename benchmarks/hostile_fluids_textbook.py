@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from independent.flow import Flow
-from independent.k_bkz import KBKZ
+from independent import KBKZ
 from independent.material import (
     Material,
     Rate,

@@ -33,7 +33,7 @@ from hostile_fluids_textbook import (
     of_doi_edwards,
     of_papanastasiou,
 )
-from independent.by_authors import ByAuthors
+from independent.authors import ByAuthors
 from independent.material import RateLaw
 
 _LEONOV = {"planted": {"giesekus_mobility": {"alpha": 0.5}}, "terms": {"sigma.sigma": 0.5}}

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 from independent import Giesekus, PhanThienTanner, oscillation, start_up
-from independent.k_bkz import KBKZ
-from independent.pom_pom import ExtendedPomPom, PomPom
+from independent import KBKZ
+from independent import ExtendedPomPom, PomPom
 
 import discover as dc
 from discover.dataset import Dataset, Run

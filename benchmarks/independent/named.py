@@ -2,17 +2,25 @@
 
 from collections.abc import Mapping
 
-from independent.authors import giesekus_non_affine, rolie_poly_fene, saramito, white_metzner
-from independent.by_authors import ByAuthors
-from independent.fene_p import FenePeterlin
-from independent.giesekus import Giesekus
-from independent.johnson_segalman import JohnsonSegalman
+from independent import (
+    ExtendedPomPom,
+    FenePeterlin,
+    Giesekus,
+    JohnsonSegalman,
+    PhanThienTanner,
+    PomPom,
+    RoliePoly,
+    RoliePolyBlend,
+    UpperConvectedMaxwell,
+)
+from independent.authors import (
+    ByAuthors,
+    giesekus_non_affine,
+    rolie_poly_fene,
+    saramito,
+    white_metzner,
+)
 from independent.material import RateLaw
-from independent.maxwell import UpperConvectedMaxwell
-from independent.phan_thien_tanner import PhanThienTanner
-from independent.pom_pom import ExtendedPomPom, PomPom
-from independent.rolie_poly import RoliePoly
-from independent.rolie_poly_blend import RoliePolyBlend
 
 CONSTANTS: dict[str, dict[str, float]] = {
     "ucm": {},

@@ -1,8 +1,7 @@
 """Runs that are loadings of their own, of laws in and outside the dictionary: records by scipy."""
 
 import pytest
-from independent import Giesekus
-from independent.pom_pom import ExtendedPomPom
+from independent import ExtendedPomPom, Giesekus
 from loadings import FLOWS, drawn
 
 import discover as dc
