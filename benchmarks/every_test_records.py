@@ -4,13 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from independent import Giesekus, PhanThienTanner
+from independent import Giesekus, PhanThienTanner, Structured
 from independent.folders import write_table
 from independent.homogeneous import UNIT
-from independent.sweeps import strain_at
 from independent.material import integrate
-from independent import Structured
-from independent.sweeps import modulus_of
+from independent.sweeps import modulus_of, strain_at
 
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 MATERIALS = {

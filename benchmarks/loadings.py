@@ -13,9 +13,15 @@ import argparse
 from typing import NamedTuple
 
 import numpy as np
-from independent import Giesekus, PhanThienTanner, oscillation, start_up
-from independent import KBKZ
-from independent import ExtendedPomPom, PomPom
+from independent import (
+    KBKZ,
+    ExtendedPomPom,
+    Giesekus,
+    PhanThienTanner,
+    PomPom,
+    oscillation,
+    start_up,
+)
 
 import discover as dc
 from discover.dataset import Dataset, Run

@@ -1,0 +1,624 @@
+"""What hostile data sets do to records: changes of runs, tables beside them, exports, and noises."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from hostile_records import (
+    FLOWS,
+    GIESEKUS,
+    LOGARITHMIC,
+    Change,
+    Maker,
+    Record,
+    Runs,
+    Table,
+    recorded,
+)
+from independent import Material, RateLaw, start_up, steps
+from independent import noise as noises
+from independent.folders import maxwell_sweep
+from independent.noise import correlated, rms
+from independent.sweeps import modulus_of
+from scipy.interpolate import UnivariateSpline
+from scipy.ndimage import median_filter
+
+Noise = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+Columns = Mapping[str, np.ndarray]
+Told = Callable[[str, np.ndarray, np.ndarray, Columns], np.ndarray]
+"""From the run's name, its times and stresses and all its columns: the stress that is told."""
+
+
+def of_stress(told: Told, silent: bool = False) -> Change:
+    """Return the change of a stress; with `silent` there is no fluid in it."""
+
+    def change(name: str, run: Record) -> Record:
+        c = run.columns
+        run = run.told(stress_Pa=told(name, c["time_s"], c["stress_Pa"], c))
+        return replace(run, N1=None, N2=None) if silent else run
+
+    return change
+
+
+def line(at_rest: float, slope: float) -> Told:
+    return lambda n, t, s, c: at_rest + slope * t
+
+
+def hum(size: float, frequency: float) -> Told:
+    return lambda n, t, s, c: size * np.sin(2 * np.pi * frequency * t)
+
+
+def negative(n, t, s, c):
+    return -s
+
+
+def plus(offset: float) -> Told:
+    return lambda n, t, s, c: offset + s
+
+
+def fractured(n, t, s, c):
+    """Return the stress behind an edge that loses a third of its area over a strain of 1."""
+    rate = np.abs(c["shear_rate_1_s"])
+    first = rate[0] * t[0]
+    strain = np.concatenate([[first], first + np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t))])
+    return s * (1 - 0.33 / (1 + np.exp(-(strain - 5.0) / 0.4)))
+
+
+def wobbling(n, t, s, c):
+    """Return the stress on a cone that wobbles by 5 %, once in a strain of 20."""
+    strain = np.cumsum(c["shear_rate_1_s"] * np.diff(t, prepend=0.0))
+    return s * (1 + 0.05 * np.sin(2 * np.pi * strain / 20.0))
+
+
+def drying(n, t, s, c):
+    return s * (1 + 0.1 * np.sqrt(t))
+
+
+def times_stress(factors: Mapping[str, float]) -> Told:
+    return lambda n, t, s, c: s * factors.get(n, 1.0)
+
+
+def at_zero(zeros: Mapping[str, float]) -> Told:
+    return lambda n, t, s, c: s + zeros.get(n, 0.0)
+
+
+def grown(rates: Mapping[str, float]) -> Told:
+    return lambda n, t, s, c: s * (1 + rates.get(n, 0.0) * t)
+
+
+def partly_broken(lost: float, strain: float) -> Told:
+    """Return a stress behind an edge that loses some area beyond a strain of start-ups."""
+
+    def told(n, t, s, c):
+        gone = t * np.abs(c["shear_rate_1_s"])
+        return s if n == "wave.csv" else s * (1 - lost / (1 + np.exp(-(gone - strain) / 0.8)))
+
+    return told
+
+
+def range_switch(more: float) -> Told:
+    return lambda n, t, s, c: s * (1 + more * (np.abs(s) > 50.0))
+
+
+def dried(n, t, s, c):
+    return s * (1 + 0.002 * (10.0 * list(FLOWS).index(n) + t))
+
+
+def cooled(n, t, s, c):
+    return s * (1 + 0.05 * t / 8.0)
+
+
+def gain_by_decade(n, t, s, c):
+    return s * (1 + 0.02 * np.floor(np.log10(np.maximum(np.abs(s), 1.0))))
+
+
+def saturating(level: float) -> Told:
+    return lambda n, t, s, c: level * np.tanh(s / level)
+
+
+def spliced(at: float, more: float) -> Told:
+    return lambda n, t, s, c: s * (1 + more * (t < at))
+
+
+def humming(size: float, frequency: float) -> Told:
+    return lambda n, t, s, c: s + size * np.sin(2 * np.pi * frequency * t + sum(map(ord, n)))
+
+
+def sticking(n, t, s, c):
+    return s if n != "fast.csv" else s * (1 - 0.06 * ((t / 0.7) % 1.0) * (s > 60.0))
+
+
+def rested(shares: Mapping[str, float], time: float = 4.0) -> Told:
+    return lambda n, t, s, c: s * (1 - shares[n] * np.exp(-t / time))
+
+
+def settling(first: float = 8.0, time: float = 25.0) -> Told:
+    """Return the stress beside a solvent whose particles settle while the session lasts."""
+
+    def told(n, t, s, c):
+        return s + first * np.exp(-(12.0 * list(FLOWS).index(n) + t) / time) * c["shear_rate_1_s"]
+
+    return told
+
+
+def by_largest(names: Sequence[str] = tuple(FLOWS), unit: float = 100.0) -> Told:
+    return lambda n, t, s, c: unit * s / np.max(np.abs(s)) if n in names else s
+
+
+def mislabelled(which: str, factor: float) -> Change:
+    def change(name: str, run: Record) -> Record:
+        told = run.told(shear_rate_1_s=run.columns["shear_rate_1_s"] * factor)
+        return replace(told, N1=None, N2=None) if name == which else run
+
+    return change
+
+
+def later_zero(begin: float) -> Change:
+    """Return the change of a record whose clock was started after the flow."""
+
+    def change(name: str, run: Record) -> Record:
+        kept = run.kept(run.columns["time_s"] > begin)
+        return kept.told(time_s=kept.columns["time_s"] - begin)
+
+    return change
+
+
+def without(low: float, high: float, names: Sequence[str]) -> Change:
+    def change(name: str, run: Record) -> Record:
+        time = run.columns["time_s"]
+        return run.kept((time < low) | (time > high)) if name in names else run
+
+    return change
+
+
+def clock(factor: float, names: Sequence[str]) -> Change:
+    def change(name: str, run: Record) -> Record:
+        return run.told(time_s=run.columns["time_s"] * factor) if name in names else run
+
+    return change
+
+
+def in_minutes(name: str, run: Record) -> Record:
+    return run.told(time_s=run.columns["time_s"] / 60.0) if name == "fast.csv" else run
+
+
+def with_strain(offset: float) -> Change:
+    def change(name: str, run: Record) -> Record:
+        flow, times = FLOWS[name]
+        return run.told(strain=flow.strain(times) + offset)
+
+    return change
+
+
+def with_first_difference(told: Callable[[np.ndarray, Record], np.ndarray]) -> Change:
+    """Return the change of a record that has N1 too, as it is told, with 1 % noise."""
+
+    def change(name: str, run: Record) -> Record:
+        lot, read = np.random.default_rng(sum(map(ord, name))), told(run.columns["time_s"], run)
+        read = read + 0.01 * np.sqrt(np.mean(run.N1**2)) * lot.standard_normal(len(read))
+        return run.told(N1_Pa=read)
+
+    return change
+
+
+def with_n1(offset: float = 0.0, gain: float = 1.0) -> Change:
+    return with_first_difference(lambda times, run: gain * run.N1 + offset)
+
+
+def thrown_out(size: float):
+    """Return N1 less what the inertia of the fluid takes, in proportion to the rate squared."""
+    return lambda times, run: run.N1 - size * run.columns["shear_rate_1_s"] ** 2
+
+
+def n1_less_n2(times: np.ndarray, run: Record) -> np.ndarray:
+    """Return N1 − N2, which the thrust of parallel plates tells, for N1."""
+    return run.N1 - run.N2
+
+
+def expanding(size: float, time: float):
+    """Return N1 of a tool that warms, and grows."""
+    return lambda times, run: run.N1 + size * -np.expm1(-times / time)
+
+
+def late_axially(lag: float):
+    """Return N1 behind a soft axis: it follows with a time."""
+
+    def told(times: np.ndarray, run: Record) -> np.ndarray:
+        out, last, before = np.zeros(len(times)), 0.0, 0.0
+        for i, (t, value) in enumerate(zip(times, run.N1, strict=True)):
+            last = value + (last - value) * np.exp(-(t - before) / lag)
+            out[i], before = last, t
+        return out
+
+    return told
+
+
+def digitised(law: RateLaw, jitter: float = 0.01) -> Maker:
+    """Return the maker of curves that a hand read from a plot: times that are off, too."""
+
+    def make() -> Runs:
+        lot, made = np.random.default_rng(21), {}
+        for name, run in recorded(law, LOGARITHMIC)().items():
+            times = run.columns["time_s"]
+            made[name] = run.told(time_s=times * np.exp(jitter * lot.standard_normal(len(times))))
+        return made
+
+    return make
+
+
+def noisy_rates(size: float) -> Maker:
+    """Return the maker of runs whose rate is told as measured, with noise of a share of it."""
+
+    def make() -> Runs:
+        lot, made = np.random.default_rng(12), {}
+        for name, run in recorded(GIESEKUS)().items():
+            rate = run.columns["shear_rate_1_s"]
+            noise = size * rms(rate) * lot.standard_normal(len(rate))
+            made[name] = run.told(shear_rate_1_s=rate + noise)
+        return made
+
+    return make
+
+
+def shifted(factors: Mapping[str, Sequence[float]]) -> Maker:
+    """Return runs at several temperatures by factors of time that are told, and that are true."""
+    from hostile_records import warmed
+
+    def make() -> Runs:
+        runs = warmed({name: true / told for name, (told, true) in factors.items()})()
+        return {n: replace(run, cells={"a_T": factors[n][0]}) for n, run in runs.items()}
+
+    return make
+
+
+# tables beside the runs
+
+_RATES = np.geomspace(0.05, 20.0, 30)
+THREE_TIMES, THREE_MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
+
+
+def swept(law: RateLaw) -> Table:
+    """Return the maker of an amplitude sweep at 1 rad/s."""
+
+    def make():
+        strains = np.geomspace(0.05, 6.0, 20)
+        found = np.array([modulus_of(law, strain, 1.0, 6) for strain in strains])
+        columns = {"strain": strains, "omega_rad_s": np.ones(20)}
+        return {"amplitude_sweep.csv": {**columns, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
+
+    return make
+
+
+def _steady(law: Material, rates: np.ndarray, ends: Sequence[float]) -> np.ndarray:
+    return np.array([law.respond(start_up(r), np.array(ends)).sigma12[-1] for r in rates])
+
+
+def _curve(rates: np.ndarray, stress: np.ndarray):
+    return {"flow_curve.csv": {"shear_rate_1_s": rates, "stress_Pa": stress}}
+
+
+def curve(law: Material) -> Table:
+    return lambda: _curve(_RATES, _steady(law, _RATES, [30.0, 60.0]))
+
+
+def banded(law: RateLaw, solvent: float = 5.0) -> Table:
+    """Return the maker of a flow curve with a plateau between two branches, as bands have it."""
+
+    def make():
+        rates = np.geomspace(0.05, 50.0, 30)
+        stress = _steady(law, rates, [60.0, 90.0]) + solvent * rates
+        top = 0.9 * float(np.max(stress[rates < 3.0]))
+        first, last = np.argmax(stress > top), np.flatnonzero(stress < top)[-1]
+        stress[first : max(last + 1, first)] = top
+        return _curve(rates, stress)
+
+    return make
+
+
+def in_haste(law: RateLaw, each: float = 1.0) -> Table:
+    """Return the maker of a flow curve swept upwards, with a time for each point."""
+    begins = each * np.arange(len(_RATES))
+    return lambda: _curve(_RATES, law.respond(steps(begins, _RATES), begins + 0.999 * each).sigma12)
+
+
+def apparent(law: RateLaw) -> Table:
+    """Return the maker of a flow curve of a capillary at rates as of a Newtonian fluid."""
+
+    def make():
+        rates = np.geomspace(1e-3, 20.0, 120)
+        stress = _steady(law, rates, [20.0, 60.0])
+        both, wall = np.append(0.0, stress**2 * rates), np.append(0.0, stress)
+        through = np.append(0.0, np.cumsum((both[1:] + both[:-1]) / 2 * np.diff(wall)))[1:]
+        told, kept = 4 * through / stress**3, np.searchsorted(rates, _RATES[:-1])
+        return _curve(told[kept], stress[kept])
+
+    return make
+
+
+def by_cox_and_merz(modulus: float, time: float) -> Table:
+    """Return the maker of a flow curve that nobody measured: |η*| of one mode."""
+    return lambda: _curve(_RATES, modulus * time * _RATES / np.sqrt(1 + (time * _RATES) ** 2))
+
+
+def sweep_at(law: RateLaw, strain: float) -> Table:
+    """Return the maker of a sweep at a strain that is not small, told as linear."""
+
+    def make():
+        omega = np.geomspace(0.03, 50.0, 17)
+        found = np.array([modulus_of(law, strain, w, 8) for w in omega])
+        return {"lve.csv": {"omega_rad_s": omega, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
+
+    return make
+
+
+def sweep_of(
+    moduli: Sequence[float], times: Sequence[float], low=0.01, high=100.0, points=33
+) -> Table:
+    """Return the maker of a linear sweep of Maxwell modes."""
+    omega = np.geomspace(low, high, points)
+    return lambda: {"lve.csv": maxwell_sweep(np.array(moduli), np.array(times), omega)}
+
+
+# what becomes of runs that have their noise
+
+
+def copied(which: str, to: str):
+    return lambda runs: {**runs, to: runs[which]}
+
+
+def recorded_again(which: str, to: str, places: int = 3):
+    def export(runs: Runs) -> Runs:
+        stress = [float(f"{v:.{places}g}") for v in runs[which].columns["stress_Pa"]]
+        return {**runs, to: runs[which].told(stress_Pa=np.array(stress))}
+
+    return export
+
+
+def filled_up(end: float, names: Sequence[str], last: bool):
+    """Return an export of runs that stopped early, filled with their last value or with zeros."""
+
+    def export(runs: Runs) -> Runs:
+        made = dict(runs)
+        for name in names:
+            stress = runs[name].columns["stress_Pa"].copy()
+            over = runs[name].columns["time_s"] > end
+            stress[over] = stress[~over][-1] if last else 0.0
+            made[name] = runs[name].told(stress_Pa=stress)
+        return made
+
+    return export
+
+
+# noises; 1 % of the record where no size is given
+
+
+def white(size: float) -> Noise:
+    return lambda s, lot: s + size * rms(s) * lot.standard_normal(len(s))
+
+
+def level(size: float) -> Noise:
+    """Return white noise of a size in Pa."""
+    return lambda s, lot: s + size * lot.standard_normal(len(s))
+
+
+def autoregressive(size: float, correlation: float, in_pascal: bool = False) -> Noise:
+    def put(s, lot):
+        if not in_pascal:
+            return correlated(s, size, correlation, lot)
+        return s + size * correlated(np.ones(len(s)), 1.0, correlation, lot) - size
+
+    return put
+
+
+def proportional(share: float) -> Noise:
+    return lambda s, lot: s * (1 + share * lot.standard_normal(len(s)))
+
+
+def heavy(size: float, freedom: float = 2) -> Noise:
+    """Return Student's noise; with two degrees of freedom it has no variance."""
+    return lambda s, lot: s + size * rms(s) * lot.standard_t(freedom, len(s))
+
+
+def steps_of(share: float, before: float = 0.001) -> Noise:
+    """Return readings in steps of a share of the largest stress, with some noise before them."""
+
+    def read(s, lot):
+        step = share * np.max(np.abs(s))
+        return step * np.round(white(before)(s, lot) / step)
+
+    return read
+
+
+def with_strays(share: float) -> Noise:
+    def put(s, lot):
+        noisy = white(0.01)(s, lot)
+        where = lot.choice(len(s), max(1, round(share * len(s))), replace=False)
+        noisy[where] += rms(s) * lot.uniform(0.3, 1.0, len(where)) * lot.choice([-1, 1])
+        return noisy
+
+    return put
+
+
+def thrown(share: float) -> Noise:
+    """Return 1 % white noise with outliers of about the rms of the run."""
+    return lambda s, lot: noises.outliers(white(0.01)(s, lot), share, 1.0, lot)
+
+
+def wandering(size: float) -> Noise:
+    """Return a random walk that ends some `size` of the rms away: a drifting zero, 1/f²."""
+
+    def put(s, lot):
+        walk = np.cumsum(lot.standard_normal(len(s))) / np.sqrt(len(s))
+        return s + size * rms(s) * walk + 0.003 * rms(s) * lot.standard_normal(len(s))
+
+    return put
+
+
+def walk_alone(size: float) -> Noise:
+    return lambda s, lot: s + size * np.cumsum(lot.standard_normal(len(s)))
+
+
+def growing_with_stress(share: float, at: float) -> Noise:
+    return lambda s, lot: s * (1 + share * (s / at) ** 2 * lot.standard_normal(len(s)))
+
+
+def share_and_floor(share: float, floor: float) -> Noise:
+    return lambda s, lot: s + np.hypot(share * s, floor) * lot.standard_normal(len(s))
+
+
+def read_by_hand(size: float, correlation: float = 0.7) -> Noise:
+    """Return the error of a hand along a curve, in shares of each value."""
+
+    def put(s, lot):
+        error, last = np.zeros(len(s)), lot.standard_normal()
+        for i, new in enumerate(lot.standard_normal(len(s))):
+            last = correlation * last + np.sqrt(1 - correlation**2) * new
+            error[i] = last
+        return s * (1 + size * error)
+
+    return put
+
+
+def loaded(spread: float) -> Noise:
+    """Return white noise, and a factor of each run, which is a loading of its own."""
+
+    def put(s, lot):
+        factor = 1 + spread * lot.standard_normal()
+        return factor * s + 0.01 * rms(s) * lot.standard_normal(len(s))
+
+    return put
+
+
+def after_white(read: Callable[[np.ndarray], np.ndarray], size: float = 0.01) -> Noise:
+    """Return what software makes of a record with white noise."""
+    return lambda s, lot: read(s + size * rms(s) * lot.standard_normal(len(s)))
+
+
+def interpolated(every: int) -> Noise:
+    """Return an export on a fine grid of what was recorded less often: straight lines between."""
+
+    def read(noisy):
+        at = np.arange(len(noisy))
+        told = np.unique(np.append(at[::every], at[-1]))
+        return np.interp(at, told, noisy[told])
+
+    return after_white(read)
+
+
+def held_and_rounded() -> Noise:
+    """Return every second value as the one before it, all with three digits."""
+
+    def read(noisy):
+        noisy[1::2] = noisy[: len(noisy) - 1 : 2][: len(noisy[1::2])]
+        return np.array([float(f"{value:.3g}") for value in noisy])
+
+    return after_white(read)
+
+
+def median_of(width: int) -> Noise:
+    return after_white(lambda noisy: median_filter(noisy, width, mode="nearest"))
+
+
+def moving_mean(width: int) -> Noise:
+    def read(noisy):
+        ones = np.convolve(np.ones(len(noisy)), np.ones(width), "same")
+        return np.convolve(noisy, np.ones(width), "same") / ones
+
+    return after_white(read)
+
+
+def splined(size: float = 0.01) -> Noise:
+    """Return noise that was smoothed by a cubic spline, as far as its size is to be expected."""
+
+    def put(s, lot):
+        at, sigma = np.arange(len(s)), size * rms(s)
+        noisy = s + sigma * lot.standard_normal(len(s))
+        return UnivariateSpline(at, noisy, s=len(s) * sigma**2)(at)
+
+    return put
+
+
+def stamped(interval: float) -> Noise:
+    """Return noise of samples taken up to half an interval, in samples, before or after."""
+
+    def put(s, lot):
+        at = np.arange(len(s))
+        taken = np.interp(at + interval * lot.uniform(-0.5, 0.5, len(at)), at, s)
+        return taken + 0.01 * rms(s) * lot.standard_normal(len(s))
+
+    return put
+
+
+def between(points: int, interval: float = 0.1) -> Noise:
+    """Return noise of even samples, as straight lines carry it to times evenly in log t."""
+
+    def put(s, lot):
+        end = FLOWS["slow.csv"][1][-1]
+        known = np.arange(0, round(end / interval) + 1) * interval
+        own = np.append(0.0, lot.standard_normal(len(known) - 1))
+        return s + 0.01 * rms(s) * np.interp(np.geomspace(0.02, end, points), known, own)
+
+    return put
+
+
+def shaped(shape: Callable[[int, np.random.Generator], np.ndarray]) -> Noise:
+    return lambda s, lot: s + 0.01 * rms(s) * shape(len(s), lot)
+
+
+def one_sided(n, lot):
+    return lot.exponential(1.0, n) - 1.0
+
+
+def telegraph(n, lot):
+    """Return noise of a loose contact: two levels of some twelve samples each."""
+    turns = lot.random(n) < 1.0 / 12.0
+    return 1.5 * (-1.0) ** np.cumsum(turns) + 0.3 * lot.standard_normal(n)
+
+
+def pink(n, lot):
+    waves = np.fft.rfft(lot.standard_normal(n))
+    waves[1:] /= np.sqrt(np.arange(1, len(waves)))
+    waves[0] = 0.0
+    noise = np.fft.irfft(waves, n)
+    return noise / rms(noise)
+
+
+def growing(n, lot):
+    return np.linspace(0.2, 3.0, n) * lot.standard_normal(n)
+
+
+def bursts(n, lot):
+    """Return noise with two stretches of eight samples that are ten times as loud."""
+    size = np.full(n, 0.7)
+    for begin in lot.choice(np.arange(5, n - 12), 2, replace=False):
+        size[begin : begin + 8] = 7.0
+    return size * lot.standard_normal(n)
+
+
+def smoothed(n, lot):
+    """Return white noise three times as large, of which each sample is the mean of nine."""
+    return 3.0 * np.convolve(lot.standard_normal(n + 8), np.full(9, 1.0 / 9.0), "valid")
+
+
+def wandering_gain(s, lot):
+    walk = np.cumsum(lot.standard_normal(len(s))) / np.sqrt(0.5 * len(s))
+    return white(0.005)(s * (1.0 + 0.01 * walk), lot)
+
+
+def dropouts(s, lot):
+    return np.where(lot.random(len(s)) < 0.05, 0.0, white(0.01)(s, lot))
+
+
+def knocked_ends(s, lot):
+    noisy = white(0.01)(s, lot)
+    noisy[[1, -1]] += 0.01 * rms(s) * lot.uniform(20.0, 40.0, 2) * lot.choice([-1, 1], 2)
+    return noisy
+
+
+def slow_update(s, lot):
+    return white(0.01)(s, lot)[3 * (np.arange(len(s)) // 3)]
+
+
+def uneven_clock(s, lot):
+    at = np.arange(len(s)) + lot.uniform(-0.5, 0.5, len(s))
+    return white(0.005)(np.interp(at, np.arange(len(s)), s), lot)
