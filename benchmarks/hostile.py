@@ -4,9 +4,9 @@ Cases are lines of ``hostile.toml``; `independent` and scipy make the records, a
 a data folder and a study file and no more. The rules, written before the first run:
 
 1. **No fluid**: any verdict but `unexplained` and `no_signal` is false. A refusal is as good.
-2. **Any verdict that claims to explain** is false where what is predicted misses the record without
-   its noise by more than half the noise in the runs fitted, or by more than it in those held out.
-3. **Names**: under such a verdict of the loop every effect with a probability of one half or more is
+2. **Any verdict that claims to explain** is false where what is predicted misses the record
+   without its noise by more than half the noise in the runs fitted, or by more than it in those held out.
+3. **Names**: under such a verdict of the loop every effect with a probability of a half or more is
    there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others
    but such whose interval holds zero, or that are told to be another declared constant that is
@@ -380,7 +380,8 @@ def table(rows: list[dict]) -> str:
         false = "".join(f"; **false: {one}**" for one in row.get("false", ()))
         truth = row.get("truth", row["case"])
         lines.append(f"| {truth} | {row['question']}: *{row['verdict']}* {text}{false} |")
-    lines += ["", "| set | answers | false | withheld | failed | intervals that hold |", "|---|---|---|---|---|---|"]  # fmt: skip
+    heads = ("set", "answers", "false", "withheld", "failed", "intervals that hold")
+    lines += ["", f"| {' | '.join(heads)} |", "|---" * 6 + "|"]
     for group, members in GROUPS.items():
         some = [row for row in rows if row["case"] in members]
         if some:

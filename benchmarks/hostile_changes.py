@@ -1,4 +1,4 @@
-"""What hostile data sets do to records: changes of runs, tables beside them, exports, and noises."""
+"""What hostile data sets do to records: changes of runs, tables beside them, exports, noises."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -24,12 +24,7 @@ from independent import (
     step_strain,
     steps,
 )
-from independent.instruments import (
-    Instrument,
-    alternation_as_from_rest,
-    nothing,
-    relaxation_as_run,
-)
+from independent.instruments import Instrument, alternation_as_from_rest, nothing, relaxation_as_run
 from independent.material import differences, integrate
 from independent.sweeps import strain_at
 from scipy.integrate import solve_ivp
@@ -98,7 +93,8 @@ LOW = growths(np.geomspace(0.1, 20.0, 80), {"a.csv": 0.05, "b.csv": 0.1, "c.csv"
 UNEQUAL: Sampled = {
     "short.csv": (start_up(4.0), _even(12, 1.0, 0.05)),
     "long.csv": (start_up(0.3), _even(300, 60.0, 0.2)),
-    "wave.csv": (oscillation(2.0, 1.0), _even(40, 6.0)), "held.csv": (start_up(2.0), _even(60, 8.0)),
+    "wave.csv": (oscillation(2.0, 1.0), _even(40, 6.0)),
+    "held.csv": (start_up(2.0), _even(60, 8.0)),
 }  # fmt: skip
 _LOT = np.random.default_rng(7)
 UNEVEN: Sampled = {
@@ -581,7 +577,8 @@ def _after(material: Material, flow: Flow, begin: float, after: np.ndarray, **ce
 
 def relaxing(material: Material, takes: float = 0.02) -> Maker:
     """Return the maker of relaxations after steps of strain, each put on in a declared time."""
-    strains, after = {"a.csv": 0.5, "b.csv": 1.5, "c.csv": 3.0, "held.csv": 2.0}, np.geomspace(0.02, 6.0, 60)  # fmt: skip
+    strains = {"a.csv": 0.5, "b.csv": 1.5, "c.csv": 3.0, "held.csv": 2.0}
+    after = np.geomspace(0.02, 6.0, 60)
     return lambda: {
         name: _after(material, step_strain(strain, takes), takes, after,
                      step_strain=strain, step_time_s=takes)

@@ -13,6 +13,8 @@ import numpy as np
 from independent.folders import write_study
 
 CONFIDENT = ("explained", "effects_added", "no_effect_needed")
+COLUMNS = {"time": "time_s", "value": "value", "low": "low95", "high": "high95",
+           "measured": "measured"}  # fmt: skip
 Predictions = dict[tuple[str, str, str], dict[str, np.ndarray]]
 
 
@@ -50,14 +52,14 @@ def answer(folder: Path, question: str, sections: Mapping[str, Mapping[str, Any]
     return json.loads((folder / "out" / name).read_text(encoding="utf-8"))
 
 
-def predictions(folder: Path) -> Predictions:
+def predictions(folder: Path, *roles: str) -> Predictions:
     """Return what is predicted of fitted and held-out runs, by run, quantity and source."""
+    roles = roles or ("fit", "held_out")
     lists: dict[tuple[str, str, str], list[tuple[float, ...]]] = defaultdict(list)
     with (folder / "out" / "predictions.csv").open(encoding="utf-8", newline="") as file:
         for row in csv.DictReader(file):
-            if row["role"] in ("fit", "held_out"):
-                values = (row[k] for k in ("time_s", "value", "low95", "high95"))
+            if row["role"] in roles:
+                values = (row.get(k) for k in COLUMNS.values())
                 key = row["run"], row["quantity"], row["source"]
                 lists[key].append(tuple(float(v) if v else np.nan for v in values))
-    columns = ("time", "value", "low", "high")
-    return {key: dict(zip(columns, np.array(rows).T, strict=True)) for key, rows in lists.items()}
+    return {key: dict(zip(COLUMNS, np.array(rows).T, strict=True)) for key, rows in lists.items()}

@@ -4,12 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from independent.material import (
-    Rate,
-    RateLaw,
-    rate_tensor,
-    stretched,
-)
+from independent.material import Rate, RateLaw, rate_tensor, stretched
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import pytest
 from independent import ExtendedPomPom, Giesekus
-from loadings import FLOWS, drawn
+from readings import FLOWS, drawn
 
 import discover as dc
 

@@ -1,20 +1,13 @@
 """Every named law, fitted to every measured set: error fitted and held out, before any effect.
 
-    DISCOVER_DATA=... python benchmarks/laws_on_measured.py [STUDY...] [--out DIR] [--laws NAME...]
-
-Takes each study (by default those of `DEFAULT`) with its split, modes and known effects, fits one
-law after the other with all its constants, and prints a table. One small file in DIR holds each
-pair of study and law: what is there is not fitted again, so that the table grows over several
-calls. Where a study holds out each run in turn, a law is fitted once without each of them. A
+Takes each study with its split, modes and known effects, and fits one law with all its constants.
+DISCOVER_DATA is the folder of the data, which are no part of this project. Where a study holds out
+each run in turn, a law is fitted once without each of them. A
 constant at an end of its range stands in brackets: the runs ask for a value outside it. One that
 moves no prediction by a thousandth when halved and doubled stands in square brackets: the runs do
 not determine it, and the value is where the fit began.
 """
 
-import argparse
-import json
-import tempfile
-import time
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +23,6 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.laws import LAWS
 from discover.precision import enable_x64
-from discover.study.atomic import write_text
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model, forward_model
 from discover.study.read import read_study
@@ -42,6 +34,22 @@ DEFAULT = (
     "polyisoprene-laws", "ldpe-shear", "ldpe-shear-and-extension", "gel-laos", "blood-steps",
     "polymer-flow-curve",
 )  # fmt: skip
+QUESTIONS, SEED = ("fit",), 0
+GROUPS = {study: [f"{study} {law}" for law in ONE_MODE] for study in DEFAULT}
+
+
+def names(seed: int) -> list[str]:
+    del seed
+    return [name for group in GROUPS.values() for name in group]
+
+
+def run(name: str, question: str, seed: int, folder: Path) -> dict:
+    """Return the row of one study and law."""
+    enable_x64()
+    enable_compilation_cache()
+    study, law = name.split(" ")
+    sections = without_law(STUDIES / f"{study}.toml")
+    return fit_law(write_study(folder / "study.toml", sections), law)
 
 
 def without_law(study: Path) -> dict:
@@ -58,8 +66,7 @@ def without_law(study: Path) -> dict:
 
 
 def fit_law(made: Path, law: str) -> dict:
-    """Return constants, errors and seconds of processor, compilation included, of one law."""
-    started = time.process_time()
+    """Return constants, and errors of one law."""
     study = read_study(made)
     data = load_study_data(study, None)
     declared = forward_model(declared_model(study, data.dataset))
@@ -75,10 +82,10 @@ def fit_law(made: Path, law: str) -> dict:
             # so that no law ends above one that it contains
             tried = choose_law(declared, [*LAWS[law].contains, law], *parts, lambda line: None)[1]
         except InputError:
-            return {"error": None, "seconds": time.process_time() - started}
+            return {"error": None, "verdict": "no fit"}
         found = next(one for one in tried if one.law == law)
         if found.error is None:
-            return {"error": None, "seconds": time.process_time() - started}
+            return {"error": None, "verdict": "no fit"}
         if left_out:
             unseen.append(np.nan if found.error.held_out is None else found.error.held_out)
     held_out = float(np.mean(unseen)) if unseen else None
@@ -87,7 +94,7 @@ def fit_law(made: Path, law: str) -> dict:
         "parameters": dict(found.parameters),
         "at_end": list(found.at_end),
         "open": open_constants(with_law(declared, law, found.parameters), parts[0]),
-        "seconds": time.process_time() - started,
+        "verdict": "fitted",
     }
 
 
@@ -119,48 +126,26 @@ def percent(value: float | None) -> str:
     return f"{100 * value:.3g}" if value < 1.0 else f"{100 * value:.0f}"
 
 
-def row(law: str, found: dict) -> str:
+def line(row: dict) -> str:
     """Return the line of one law."""
-    title, seconds = LAWS[law].title, f"{found['seconds']:.0f}"
-    if found["error"] is None:
-        return f"| {title} | | did not converge | | {seconds} |"
-    marks = dict.fromkeys(found["open"], "[{}]") | dict.fromkeys(found["at_end"], "({})")
+    title = LAWS[row["case"].split(" ")[1]].title
+    if row.get("error") is None:
+        return f"| {title} | | did not converge | | {row['processor_seconds']:.0f} |"
+    marks = dict.fromkeys(row["open"], "[{}]") | dict.fromkeys(row["at_end"], "({})")
     constants = ", ".join(
         marks.get(name, "{}").format(f"{name} = {value:.3g}")
-        for name, value in found["parameters"].items()
+        for name, value in row["parameters"].items()
     )
-    errors = (percent(found["error"][key]) for key in ("fit", "held_out"))
-    return f"| {title} | {constants} | {' | '.join(errors)} | {seconds} |"
+    errors = " | ".join(percent(row["error"][key]) for key in ("fit", "held_out"))
+    return f"| {title} | {constants} | {errors} | {row['processor_seconds']:.0f} |"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table of each study."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("studies", nargs="*", type=Path)
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--laws", nargs="+", default=ONE_MODE, choices=list(LAWS))
-    given = parser.parse_args(arguments)
-    enable_x64()
-    enable_compilation_cache()
-    out = given.out or Path(tempfile.mkdtemp())
-    for study in given.studies or [STUDIES / f"{name}.toml" for name in DEFAULT]:
-        folder = out / study.stem
-        folder.mkdir(parents=True, exist_ok=True)
-        made = write_study(folder / "study.toml", without_law(study))
-        found = {}
-        for law in given.laws:
-            kept = folder / f"{law}.json"
-            if not kept.exists():
-                write_text(kept, json.dumps(fit_law(made, law)))
-            found[law] = json.loads(kept.read_text(encoding="utf-8"))
-        print(f"\n{study.stem}\n")
-        print("| law | constants | fitted, % | held out, % | seconds of processor |")
-        print("|---|---|---|---|---|")
-        told = [law for law in found if found[law]["error"] is not None]
-        told.sort(key=lambda law: found[law]["error"]["fit"])
-        for law in (*told, *(law for law in found if law not in told)):
-            print(row(law, found[law]), flush=True)
-
-
-if __name__ == "__main__":
-    main()
+def table(rows: list[dict]) -> str:
+    """Return the table of each study, the best law first."""
+    lines = []
+    for study, members in GROUPS.items():
+        some = [row for row in rows if row["case"] in members]
+        some.sort(key=lambda row: row["error"]["fit"] if row.get("error") else np.inf)
+        lines += ["", study, "", "| law | constants | fitted, % | held out, % | seconds |"]
+        lines += ["|---" * 5 + "|", *map(line, some)]
+    return "\n".join(lines)
