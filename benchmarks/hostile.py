@@ -5,7 +5,7 @@ a data folder and a study file and no more. The rules, written before the first 
 
 1. **No fluid**: any verdict but `unexplained` and `no_signal` is false. A refusal is as good.
 2. **Any verdict that claims to explain** is false where what is predicted misses the record
-   without its noise by more than half the noise in the runs fitted, or by more than it in those held out.
+   without its noise by more than half the noise in the runs fitted, or than it in those held out.
 3. **Names**: under such a verdict of the loop every effect with a probability of a half or more is
    there, or is an alias of one that is. A name that is less likely than not is listed.
 4. **Terms**: where the library holds what is missing, `explained` is by these terms and no others

@@ -24,7 +24,8 @@ from types import ModuleType
 
 TASKS = {
     "calibration": "calibration", "field": "field.task", "five-hundred": "five_hundred",
-    "hostile": "hostile", "measured": "measured", "measured-laws": "measured_laws",
+    "hostile": "hostile", "malformed": "malformed", "measured": "measured",
+    "measured-laws": "measured_laws",
     "readings": "readings", "several-modes": "several_modes", "several-tests": "several_tests",
 }  # fmt: skip
 FAILED = ("refused", "fault", "late")

@@ -9,10 +9,10 @@ import random
 
 import numpy as np
 import pytest
+from harm import TOKENS, mutate_text
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from malformed_cases import FOLDER, RUN
-from mutations import TOKENS, mutate_text
+from malformed_files import FOLDER, RUN
 from typer.testing import CliRunner
 
 from discover.cli import app

@@ -1,12 +1,13 @@
-"""What users, editors and disks do to files: seeded mutations of text, nested values and folders.
+"""What users, editors and disks do to files: seeded harm to text, nested values and folders.
 
-A mutation need not break a file; whoever uses it has to ask.
+Harm need not break a file; whoever does it has to ask.
 """
 
 import json
 import os
 import random
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,10 +23,10 @@ TOKENS = (
 """Pieces of text that have broken a reader somewhere."""
 
 VALUES: tuple[Any, ...] = (
-    None, True, False, -1, 0, 1, 2**31, 2**70, 1e308, -1e-300, float("nan"), float("inf"), "", "0",
-    "fit", "lve", "each", "a" * 300, "../up", "/", "\x00", "\u202e", "<b>", "\ud800", "exp(sigma)",
-    "sigma.sigma.sigma.sigma", [], [1], [[]], ["x", "x"], {}, {"a": 1}, {"": {}}, [None],
-    [1e400, -1],
+    None, True, False, -1, 0, 1, 2**31, 2**70, 10**400, 1e308, -1e-300, float("nan"), float("inf"),
+    "", "0", "fit", "lve", "each", "a" * 3000, "../up", "/", "/dev/zero", "\x00", "\u202e", "<b>",
+    "\ud800", "exp(sigma)", "sigma" + ".sigma" * 99, "(" * 5000, [], [1], [[]] * 3, ["x", "x"], {},
+    {"a": 1}, {"": {}}, [None], [1e400, -1],
 )  # fmt: skip
 """Values of every type, many of them wrong anywhere."""
 
@@ -34,27 +35,24 @@ def mutate_text(text: str, source: random.Random) -> bytes:
     """Return the text with one to four things done to it."""
     data = text
     for _ in range(source.randint(1, 4)):
-        lines = data.split("\n")
-        i = source.randrange(len(data) + 1)
-        row = source.randrange(len(lines))
-        match source.randrange(11):
+        lines, token = data.split("\n"), source.choice(TOKENS)
+        i, row = source.randrange(len(data) + 1), source.randrange(len(lines))
+        match source.randrange(10):
             case 0:
-                data = data[:i] + source.choice(TOKENS) + data[i:]
+                data = data[:i] + token + data[i:]
             case 1:
                 data = data[:i] + data[i + source.randint(1, 9) :]
             case 2:
-                data = data[:i]
+                data = source.choice((data[:i], token + data, data + token))
             case 3:
-                del lines[row]
-                data = "\n".join(lines)
+                data = "\n".join(lines[:row] + lines[row + 1 :])
             case 4:
                 lines.insert(row, lines[source.randrange(len(lines))])
                 data = "\n".join(lines)
             case 5:
                 cells = lines[row].split(",")
-                cells[source.randrange(len(cells))] = source.choice(TOKENS)
-                lines[row] = ",".join(cells)
-                data = "\n".join(lines)
+                cells[source.randrange(len(cells))] = token
+                data = "\n".join([*lines[:row], ",".join(cells), *lines[row + 1 :]])
             case 6:
                 data = data.replace(*source.choice(((",", ";"), (".", ","), ("\n", "\r\n"))))
             case 7:
@@ -62,18 +60,17 @@ def mutate_text(text: str, source: random.Random) -> bytes:
                 data = "\n".join(lines)
             case 8:
                 key, equals, _ = lines[row].partition("=")
-                lines[row] = f"{key}= {source.choice(TOKENS)}" if equals else lines[row]
+                lines[row] = f"{key}= {token}" if equals else lines[row]
                 data = "\n".join(lines)
-            case 9:
-                data = source.choice(TOKENS) + data
             case _:
-                data += source.choice(TOKENS)
+                nested = source.choice(("[" * 10**5, '{"a":' * 10**4, "[x" + ".y" * 10**4 + "]"))
+                data += nested if source.random() < 0.2 else token
     raw = data.encode("utf-8", "surrogatepass")
     match source.randrange(12):
         case 0:
             raw = raw[: source.randrange(len(raw) + 1)] + source.randbytes(3)
         case 1:
-            raw = data.encode("utf-16", "replace")
+            raw = data.encode(source.choice(("utf-16", "utf-32", "cp037")), "replace")
         case 2:
             raw = data.encode("latin-1", "replace")
     return raw
@@ -83,17 +80,15 @@ def mutate_values(content: Any, source: random.Random) -> Any:
     """Return a copy of nested lists and dictionaries with one to three entries wronged."""
     for _ in range(source.randint(1, 3)):
         content = json.loads(json.dumps(content))  # a copy, in which no two places are one
-        places = list(_places(content))
-        if not places:
+        if not (places := list(holders(content))):
             break
         holder, key = source.choice(places)
         match source.randrange(6):
             case 0:
                 del holder[key]
             case 1 if isinstance(holder, dict):
-                holder[source.choice((key + "x", key.upper(), "", "a.b", *TOKENS[:4]))] = (
-                    holder.pop(key)
-                )
+                name = source.choice((key + "x", key.upper(), "", "a.b", *TOKENS[:4]))
+                holder[name] = holder.pop(key)
             case 2 if isinstance(holder, dict):
                 holder[source.choice(("units", "law", "noise", "x" * 200))] = holder[key]
             case 3:
@@ -103,23 +98,21 @@ def mutate_values(content: Any, source: random.Random) -> Any:
     return json.loads(json.dumps(content))
 
 
-def _places(content: Any):
-    keys = content if isinstance(content, dict) else range(len(content))
-    for key in list(keys):
+def holders(content: Any) -> Iterator[tuple[Any, Any]]:
+    """Yield every place of nested values as what holds it, and its key."""
+    for key in list(content if isinstance(content, dict) else range(len(content))):
         yield content, key
         if isinstance(content[key], dict | list):
-            yield from _places(content[key])
+            yield from holders(content[key])
 
 
 def to_toml(content: dict[str, Any]) -> str:
     """Return nested values as TOML, tables at the top as sections; what TOML lacks becomes text."""
     tables = {key: value for key, value in content.items() if isinstance(value, dict)}
-    lines = [
-        f"{_toml(key)} = {_toml(value)}" for key, value in content.items() if key not in tables
-    ]
+    top = {key: value for key, value in content.items() if key not in tables}
+    lines = [f"{_toml(key)} = {_toml(value)}" for key, value in top.items()]
     for name, table in tables.items():
-        lines.append(f"[{_toml(name)}]")
-        lines += [f"{_toml(key)} = {_toml(value)}" for key, value in table.items()]
+        lines += [f"[{_toml(name)}]", *(f"{_toml(k)} = {_toml(v)}" for k, v in table.items())]
     return "\n".join(lines) + "\n"
 
 
@@ -136,24 +129,29 @@ def _toml(value: Any) -> str:
 
 def spoil_file(path: Path, source: random.Random) -> None:
     """Put something in a file's place that is no such file."""
-    other = path.with_name("elsewhere")
-    match source.randrange(7):
-        case 0:
-            path.unlink()
-        case 1:
-            path.unlink()
+    kind = source.choice(("absent", "folder", "pipe", "loop", "link", "empty", "other"))
+    if kind in ("absent", "folder", "pipe", "loop", "link"):
+        path.unlink()
+    match kind:
+        case "folder":
             path.mkdir()
-        case 2:
-            path.unlink()
+        case "pipe":
             os.mkfifo(path)
-        case 3:
-            path.unlink()
+        case "loop":
             path.symlink_to(path.name)
-        case 4:
-            path.unlink()
+        case "link":
             path.symlink_to(source.choice(("/etc/passwd", "/dev/zero", "nowhere")))
-        case 5:
+        case "empty":
             path.write_bytes(b"")
-        case _:
-            shutil.move(path, other)
+        case "other":
+            shutil.move(path, path.with_name("elsewhere"))
             path.write_bytes(source.randbytes(source.randint(1, 2000)))
+
+
+def spoil(root: Path, name: str, source: random.Random) -> None:
+    """Harm a file of a folder, or put something else in its place."""
+    path = root / name
+    if source.random() < 0.15:
+        spoil_file(path, source)
+    else:
+        path.write_bytes(mutate_text(path.read_text("utf-8"), source))
