@@ -1,6 +1,6 @@
 """Comparisons of measured data: each set ends with exit 0, a whole page and a verdict.
 
-All five sets, whole, are compared by `benchmarks/measured_comparisons.py`, which asks the same.
+All five sets, whole, are compared by `benchmarks/measured.py`, which asks the same.
 """
 
 import json

@@ -15,14 +15,14 @@ from discover.closed_loop.search import Search
 
 _UNSEEN = 45.0
 """Sum of squares, over the variance of the noise, of a smooth misfit that the test of what is left
-sees in about half of all draws: 30 to 60 in 280 and 480 samples (benchmarks/other_shapes.py)."""
+sees in about half of all draws: 30 to 60 in 280 and 480 samples."""
 
 
 def most_believed(search: Search, carried: Sequence[Carried]) -> list[float]:
     """Return how probable each set can be at most, by the effect in it that takes least away.
 
     Where a wrong shape is the best there is, what it leaves, over what it takes away, is about as
-    likely to be any number from 0 to 1 (benchmarks/other_shapes.py). So it passes in a share s of
+    likely to be any number from 0 to 1. So it passes in a share s of
     cases, where s is what may pass unseen over what the effect takes away, both root-mean-square,
     and at even odds before the data the right shape has 1/(1 + s).
 
