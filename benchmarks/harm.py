@@ -11,6 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+SANE: dict[str, Any] = json.loads(Path(__file__).with_name("malformed.json").read_text("utf-8"))
+"""Files of every sort that the command line reads, with nothing wrong in them."""
+
 TOKENS = (
     "nan", "inf", "-inf", "1e400", "-1", "0", "1e300", "1e-320", "", " ", "\t", ";", ",", ",,", '"',
     "'", "\n", "\r\n", "\r", "\n\n", "#", "0,5", "1.2.3", "--", "true", "0x10", "1_000", "é", "µ",
@@ -155,3 +158,8 @@ def spoil(root: Path, name: str, source: random.Random) -> None:
         spoil_file(path, source)
     else:
         path.write_bytes(mutate_text(path.read_text("utf-8"), source))
+
+
+def write_files(root: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        (root / name).write_text(text, encoding="utf-8", errors="surrogatepass")

@@ -20,7 +20,6 @@ To say `unexplained` of what could be explained is no falsehood; it is noted.
 """
 
 import ast
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -33,7 +32,7 @@ import hostile_records
 import independent
 import numpy as np
 import product
-from hostile_records import SCALE, Runs
+from hostile_records import FILE, SAMPLED, SCALE, Runs
 from independent import authors
 from independent import named as by_name
 from independent.folders import write_table
@@ -48,7 +47,6 @@ FLOOR = 2e-3
 """Of the rms: what sampling of the commanded rate and text cost."""
 CONSTANT = {"sigma": "relaxation_time_s", "gammadot": "modulus_Pa"}
 QUANTITY = {"stress_Pa": "sigma12", "tensile_stress_Pa": "tensile_stress"}
-FILE = tomllib.loads((Path(__file__).parent / "hostile.toml").read_text("utf-8"))
 GROUPS = {name: [n for n in cases if n != "all"] for name, cases in FILE["sets"].items()}
 
 
@@ -62,6 +60,9 @@ def words() -> dict[str, Any]:
     known: dict[str, Any] = {}
     for module in (authors, independent, hostile_materials, hostile_records, hostile_changes):
         known |= vars(module)
+    known |= SAMPLED
+    for table in ("STRESSES", "FIRST_DIFFERENCES", "TABLES", "SHAPES", "NOISES"):
+        known |= getattr(hostile_changes, table)
     known |= {"linspace": np.linspace, "material": by_name.material, "named": _named}
     for name, text in FILE["names"].items():
         known[name] = evaluated(ast.parse(text, mode="eval").body, known)

@@ -7,7 +7,7 @@ import numpy as np
 from hostile_records import (
     FLOWS,
     GIESEKUS,
-    LOGARITHMIC,
+    SAMPLED,
     Change,
     Maker,
     Record,
@@ -40,23 +40,7 @@ def of_stress(told: Told, silent: bool = False) -> Change:
     return change
 
 
-def line(at_rest: float, slope: float) -> Told:
-    return lambda n, t, s, c: at_rest + slope * t
-
-
-def hum(size: float, frequency: float) -> Told:
-    return lambda n, t, s, c: size * np.sin(2 * np.pi * frequency * t)
-
-
-def negative(n, t, s, c):
-    return -s
-
-
-def plus(offset: float) -> Told:
-    return lambda n, t, s, c: offset + s
-
-
-def fractured(n, t, s, c):
+def _fractured(n, t, s, c):
     """Return the stress behind an edge that loses a third of its area over a strain of 1."""
     rate = np.abs(c["shear_rate_1_s"])
     first = rate[0] * t[0]
@@ -64,29 +48,13 @@ def fractured(n, t, s, c):
     return s * (1 - 0.33 / (1 + np.exp(-(strain - 5.0) / 0.4)))
 
 
-def wobbling(n, t, s, c):
+def _wobbling(n, t, s, c):
     """Return the stress on a cone that wobbles by 5 %, once in a strain of 20."""
     strain = np.cumsum(c["shear_rate_1_s"] * np.diff(t, prepend=0.0))
     return s * (1 + 0.05 * np.sin(2 * np.pi * strain / 20.0))
 
 
-def drying(n, t, s, c):
-    return s * (1 + 0.1 * np.sqrt(t))
-
-
-def times_stress(factors: Mapping[str, float]) -> Told:
-    return lambda n, t, s, c: s * factors.get(n, 1.0)
-
-
-def at_zero(zeros: Mapping[str, float]) -> Told:
-    return lambda n, t, s, c: s + zeros.get(n, 0.0)
-
-
-def grown(rates: Mapping[str, float]) -> Told:
-    return lambda n, t, s, c: s * (1 + rates.get(n, 0.0) * t)
-
-
-def partly_broken(lost: float, strain: float) -> Told:
+def _at_edge(lost, strain):
     """Return a stress behind an edge that loses some area beyond a strain of start-ups."""
 
     def told(n, t, s, c):
@@ -96,53 +64,44 @@ def partly_broken(lost: float, strain: float) -> Told:
     return told
 
 
-def range_switch(more: float) -> Told:
-    return lambda n, t, s, c: s * (1 + more * (np.abs(s) > 50.0))
+def _age(n, t, each):
+    return each * list(FLOWS).index(n) + t
 
 
-def dried(n, t, s, c):
-    return s * (1 + 0.002 * (10.0 * list(FLOWS).index(n) + t))
-
-
-def cooled(n, t, s, c):
-    return s * (1 + 0.05 * t / 8.0)
-
-
-def gain_by_decade(n, t, s, c):
-    return s * (1 + 0.02 * np.floor(np.log10(np.maximum(np.abs(s), 1.0))))
-
-
-def saturating(level: float) -> Told:
-    return lambda n, t, s, c: level * np.tanh(s / level)
-
-
-def spliced(at: float, more: float) -> Told:
-    return lambda n, t, s, c: s * (1 + more * (t < at))
-
-
-def humming(size: float, frequency: float) -> Told:
-    return lambda n, t, s, c: s + size * np.sin(2 * np.pi * frequency * t + sum(map(ord, n)))
-
-
-def sticking(n, t, s, c):
-    return s if n != "fast.csv" else s * (1 - 0.06 * ((t / 0.7) % 1.0) * (s > 60.0))
-
-
-def rested(shares: Mapping[str, float], time: float = 4.0) -> Told:
-    return lambda n, t, s, c: s * (1 - shares[n] * np.exp(-t / time))
-
-
-def settling(first: float = 8.0, time: float = 25.0) -> Told:
-    """Return the stress beside a solvent whose particles settle while the session lasts."""
-
-    def told(n, t, s, c):
-        return s + first * np.exp(-(12.0 * list(FLOWS).index(n) + t) / time) * c["shear_rate_1_s"]
-
-    return told
-
-
-def by_largest(names: Sequence[str] = tuple(FLOWS), unit: float = 100.0) -> Told:
-    return lambda n, t, s, c: unit * s / np.max(np.abs(s)) if n in names else s
+STRESSES: dict[str, Callable] = {
+    "line": lambda at_rest, slope: lambda n, t, s, c: at_rest + slope * t,
+    "hum": lambda size, hertz: lambda n, t, s, c: size * np.sin(2 * np.pi * hertz * t),
+    "negative": lambda n, t, s, c: -s,
+    "plus": lambda offset: lambda n, t, s, c: offset + s,
+    "fractured": _fractured, "wobbling": _wobbling, "partly_broken": _at_edge,
+    "drying": lambda n, t, s, c: s * (1 + 0.1 * np.sqrt(t)),
+    "times_stress": lambda factors: lambda n, t, s, c: s * factors.get(n, 1.0),
+    "at_zero": lambda zeros: lambda n, t, s, c: s + zeros.get(n, 0.0),
+    "grown": lambda rates: lambda n, t, s, c: s * (1 + rates.get(n, 0.0) * t),
+    "range_switch": lambda more: lambda n, t, s, c: s * (1 + more * (np.abs(s) > 50.0)),
+    "dried": lambda n, t, s, c: s * (1 + 0.002 * _age(n, t, 10.0)),
+    "cooled": lambda n, t, s, c: s * (1 + 0.05 * t / 8.0),
+    "gain_by_decade": lambda n, t, s, c: (
+        s * (1 + 0.02 * np.floor(np.log10(np.maximum(np.abs(s), 1.0))))
+    ),
+    "saturating": lambda level: lambda n, t, s, c: level * np.tanh(s / level),
+    "spliced": lambda at, more: lambda n, t, s, c: s * (1 + more * (t < at)),
+    "humming": lambda size, hertz: lambda n, t, s, c: (
+        s + size * np.sin(2 * np.pi * hertz * t + sum(map(ord, n)))
+    ),
+    "sticking": lambda n, t, s, c: (
+        s if n != "fast.csv" else s * (1 - 0.06 * ((t / 0.7) % 1.0) * (s > 60.0))
+    ),
+    "rested": lambda shares: lambda n, t, s, c: s * (1 - shares[n] * np.exp(-t / 4.0)),
+    # a solvent whose particles settle while the session lasts
+    "settling": lambda: lambda n, t, s, c: (
+        s + 8.0 * np.exp(-_age(n, t, 12.0) / 25.0) * c["shear_rate_1_s"]
+    ),
+    "by_largest": lambda names=tuple(FLOWS): lambda n, t, s, c: (
+        100.0 * s / np.max(np.abs(s)) if n in names else s
+    ),
+}  # fmt: skip
+"""What is told of a stress; where a name takes numbers, it makes that."""
 
 
 def mislabelled(which: str, factor: float) -> Change:
@@ -201,23 +160,15 @@ def with_first_difference(told: Callable[[np.ndarray, Record], np.ndarray]) -> C
     return change
 
 
-def with_n1(offset: float = 0.0, gain: float = 1.0) -> Change:
-    return with_first_difference(lambda times, run: gain * run.N1 + offset)
-
-
-def thrown_out(size: float):
-    """Return N1 less what the inertia of the fluid takes, in proportion to the rate squared."""
-    return lambda times, run: run.N1 - size * run.columns["shear_rate_1_s"] ** 2
-
-
-def n1_less_n2(times: np.ndarray, run: Record) -> np.ndarray:
-    """Return N1 − N2, which the thrust of parallel plates tells, for N1."""
-    return run.N1 - run.N2
-
-
-def expanding(size: float, time: float):
-    """Return N1 of a tool that warms, and grows."""
-    return lambda times, run: run.N1 + size * -np.expm1(-times / time)
+FIRST_DIFFERENCES: dict[str, Callable] = {
+    "as_read": lambda offset, gain: lambda times, run: gain * run.N1 + offset,
+    # the inertia of the fluid takes a part in proportion to the rate squared
+    "thrown_out": lambda size: (
+        lambda times, run: run.N1 - size * run.columns["shear_rate_1_s"] ** 2
+    ),
+    "n1_less_n2": lambda times, run: run.N1 - run.N2,  # what the thrust of parallel plates tells
+    "expanding": lambda size, time: lambda times, run: run.N1 + size * -np.expm1(-times / time),
+}
 
 
 def late_axially(lag: float):
@@ -238,7 +189,7 @@ def digitised(law: RateLaw, jitter: float = 0.01) -> Maker:
 
     def make() -> Runs:
         lot, made = np.random.default_rng(21), {}
-        for name, run in recorded(law, LOGARITHMIC)().items():
+        for name, run in recorded(law, SAMPLED["LOGARITHMIC"])().items():
             times = run.columns["time_s"]
             made[name] = run.told(time_s=times * np.exp(jitter * lot.standard_normal(len(times))))
         return made
@@ -297,10 +248,6 @@ def _curve(rates: np.ndarray, stress: np.ndarray):
     return {"flow_curve.csv": {"shear_rate_1_s": rates, "stress_Pa": stress}}
 
 
-def curve(law: Material) -> Table:
-    return lambda: _curve(_RATES, _steady(law, _RATES, [30.0, 60.0]))
-
-
 def banded(law: RateLaw, solvent: float = 5.0) -> Table:
     """Return the maker of a flow curve with a plateau between two branches, as bands have it."""
 
@@ -315,12 +262,6 @@ def banded(law: RateLaw, solvent: float = 5.0) -> Table:
     return make
 
 
-def in_haste(law: RateLaw, each: float = 1.0) -> Table:
-    """Return the maker of a flow curve swept upwards, with a time for each point."""
-    begins = each * np.arange(len(_RATES))
-    return lambda: _curve(_RATES, law.respond(steps(begins, _RATES), begins + 0.999 * each).sigma12)
-
-
 def apparent(law: RateLaw) -> Table:
     """Return the maker of a flow curve of a capillary at rates as of a Newtonian fluid."""
 
@@ -333,11 +274,6 @@ def apparent(law: RateLaw) -> Table:
         return _curve(told[kept], stress[kept])
 
     return make
-
-
-def by_cox_and_merz(modulus: float, time: float) -> Table:
-    """Return the maker of a flow curve that nobody measured: |η*| of one mode."""
-    return lambda: _curve(_RATES, modulus * time * _RATES / np.sqrt(1 + (time * _RATES) ** 2))
 
 
 def sweep_at(law: RateLaw, strain: float) -> Table:
@@ -359,17 +295,32 @@ def sweep_of(
     return lambda: {"lve.csv": maxwell_sweep(np.array(moduli), np.array(times), omega)}
 
 
+_HASTE = np.arange(len(_RATES))
+TABLES: dict[str, Callable] = {
+    "curve": lambda law: lambda: _curve(_RATES, _steady(law, _RATES, [30.0, 60.0])),
+    # swept upwards, with a second for each point
+    "in_haste": lambda law: (
+        lambda: _curve(
+            _RATES, law.respond(steps(1.0 * _HASTE, _RATES), 1.0 * _HASTE + 0.999).sigma12
+        )
+    ),
+    # a curve that nobody measured: |η*| of one mode
+    "by_cox_and_merz": lambda modulus, time: (
+        lambda: _curve(_RATES, modulus * time * _RATES / np.sqrt(1 + (time * _RATES) ** 2))
+    ),
+}
+
+
 # what becomes of runs that have their noise
 
 
-def copied(which: str, to: str):
-    return lambda runs: {**runs, to: runs[which]}
+def copied(which: str, to: str, places: int = 0):
+    """Return an export that has a run under two names, once with fewer digits."""
 
-
-def recorded_again(which: str, to: str, places: int = 3):
     def export(runs: Runs) -> Runs:
-        stress = [float(f"{v:.{places}g}") for v in runs[which].columns["stress_Pa"]]
-        return {**runs, to: runs[which].told(stress_Pa=np.array(stress))}
+        stress = runs[which].columns["stress_Pa"]
+        told = np.array([float(f"{v:.{places}g}") for v in stress]) if places else stress
+        return {**runs, to: runs[which].told(stress_Pa=told)}
 
     return export
 
@@ -396,30 +347,7 @@ def white(size: float) -> Noise:
     return lambda s, lot: s + size * rms(s) * lot.standard_normal(len(s))
 
 
-def level(size: float) -> Noise:
-    """Return white noise of a size in Pa."""
-    return lambda s, lot: s + size * lot.standard_normal(len(s))
-
-
-def autoregressive(size: float, correlation: float, in_pascal: bool = False) -> Noise:
-    def put(s, lot):
-        if not in_pascal:
-            return correlated(s, size, correlation, lot)
-        return s + size * correlated(np.ones(len(s)), 1.0, correlation, lot) - size
-
-    return put
-
-
-def proportional(share: float) -> Noise:
-    return lambda s, lot: s * (1 + share * lot.standard_normal(len(s)))
-
-
-def heavy(size: float, freedom: float = 2) -> Noise:
-    """Return Student's noise; with two degrees of freedom it has no variance."""
-    return lambda s, lot: s + size * rms(s) * lot.standard_t(freedom, len(s))
-
-
-def steps_of(share: float, before: float = 0.001) -> Noise:
+def _steps(share, before=0.001):
     """Return readings in steps of a share of the largest stress, with some noise before them."""
 
     def read(s, lot):
@@ -429,7 +357,7 @@ def steps_of(share: float, before: float = 0.001) -> Noise:
     return read
 
 
-def with_strays(share: float) -> Noise:
+def _strays(share):
     def put(s, lot):
         noisy = white(0.01)(s, lot)
         where = lot.choice(len(s), max(1, round(share * len(s))), replace=False)
@@ -439,12 +367,7 @@ def with_strays(share: float) -> Noise:
     return put
 
 
-def thrown(share: float) -> Noise:
-    """Return 1 % white noise with outliers of about the rms of the run."""
-    return lambda s, lot: noises.outliers(white(0.01)(s, lot), share, 1.0, lot)
-
-
-def wandering(size: float) -> Noise:
+def _wandering(size):
     """Return a random walk that ends some `size` of the rms away: a drifting zero, 1/f²."""
 
     def put(s, lot):
@@ -454,19 +377,7 @@ def wandering(size: float) -> Noise:
     return put
 
 
-def walk_alone(size: float) -> Noise:
-    return lambda s, lot: s + size * np.cumsum(lot.standard_normal(len(s)))
-
-
-def growing_with_stress(share: float, at: float) -> Noise:
-    return lambda s, lot: s * (1 + share * (s / at) ** 2 * lot.standard_normal(len(s)))
-
-
-def share_and_floor(share: float, floor: float) -> Noise:
-    return lambda s, lot: s + np.hypot(share * s, floor) * lot.standard_normal(len(s))
-
-
-def read_by_hand(size: float, correlation: float = 0.7) -> Noise:
+def _by_hand(size, correlation=0.7):
     """Return the error of a hand along a curve, in shares of each value."""
 
     def put(s, lot):
@@ -479,7 +390,7 @@ def read_by_hand(size: float, correlation: float = 0.7) -> Noise:
     return put
 
 
-def loaded(spread: float) -> Noise:
+def _loaded(spread):
     """Return white noise, and a factor of each run, which is a loading of its own."""
 
     def put(s, lot):
@@ -489,9 +400,9 @@ def loaded(spread: float) -> Noise:
     return put
 
 
-def after_white(read: Callable[[np.ndarray], np.ndarray], size: float = 0.01) -> Noise:
+def after_white(read: Callable[[np.ndarray], np.ndarray]) -> Noise:
     """Return what software makes of a record with white noise."""
-    return lambda s, lot: read(s + size * rms(s) * lot.standard_normal(len(s)))
+    return lambda s, lot: read(s + 0.01 * rms(s) * lot.standard_normal(len(s)))
 
 
 def interpolated(every: int) -> Noise:
@@ -513,10 +424,6 @@ def held_and_rounded() -> Noise:
         return np.array([float(f"{value:.3g}") for value in noisy])
 
     return after_white(read)
-
-
-def median_of(width: int) -> Noise:
-    return after_white(lambda noisy: median_filter(noisy, width, mode="nearest"))
 
 
 def moving_mean(width: int) -> Noise:
@@ -561,21 +468,13 @@ def between(points: int, interval: float = 0.1) -> Noise:
     return put
 
 
-def shaped(shape: Callable[[int, np.random.Generator], np.ndarray]) -> Noise:
-    return lambda s, lot: s + 0.01 * rms(s) * shape(len(s), lot)
-
-
-def one_sided(n, lot):
-    return lot.exponential(1.0, n) - 1.0
-
-
-def telegraph(n, lot):
+def _telegraph(n, lot):
     """Return noise of a loose contact: two levels of some twelve samples each."""
     turns = lot.random(n) < 1.0 / 12.0
     return 1.5 * (-1.0) ** np.cumsum(turns) + 0.3 * lot.standard_normal(n)
 
 
-def pink(n, lot):
+def _pink(n, lot):
     waves = np.fft.rfft(lot.standard_normal(n))
     waves[1:] /= np.sqrt(np.arange(1, len(waves)))
     waves[0] = 0.0
@@ -583,11 +482,7 @@ def pink(n, lot):
     return noise / rms(noise)
 
 
-def growing(n, lot):
-    return np.linspace(0.2, 3.0, n) * lot.standard_normal(n)
-
-
-def bursts(n, lot):
+def _bursts(n, lot):
     """Return noise with two stretches of eight samples that are ten times as loud."""
     size = np.full(n, 0.7)
     for begin in lot.choice(np.arange(5, n - 12), 2, replace=False):
@@ -595,30 +490,55 @@ def bursts(n, lot):
     return size * lot.standard_normal(n)
 
 
-def smoothed(n, lot):
-    """Return white noise three times as large, of which each sample is the mean of nine."""
-    return 3.0 * np.convolve(lot.standard_normal(n + 8), np.full(9, 1.0 / 9.0), "valid")
-
-
-def wandering_gain(s, lot):
+def _wandering_gain(s, lot):
     walk = np.cumsum(lot.standard_normal(len(s))) / np.sqrt(0.5 * len(s))
     return white(0.005)(s * (1.0 + 0.01 * walk), lot)
 
 
-def dropouts(s, lot):
-    return np.where(lot.random(len(s)) < 0.05, 0.0, white(0.01)(s, lot))
-
-
-def knocked_ends(s, lot):
+def _knocked_ends(s, lot):
     noisy = white(0.01)(s, lot)
     noisy[[1, -1]] += 0.01 * rms(s) * lot.uniform(20.0, 40.0, 2) * lot.choice([-1, 1], 2)
     return noisy
 
 
-def slow_update(s, lot):
-    return white(0.01)(s, lot)[3 * (np.arange(len(s)) // 3)]
-
-
-def uneven_clock(s, lot):
+def _uneven_clock(s, lot):
     at = np.arange(len(s)) + lot.uniform(-0.5, 0.5, len(s))
     return white(0.005)(np.interp(at, np.arange(len(s)), s), lot)
+
+
+SHAPES: dict[str, Callable] = {
+    "one_sided": lambda n, lot: lot.exponential(1.0, n) - 1.0,
+    "growing": lambda n, lot: np.linspace(0.2, 3.0, n) * lot.standard_normal(n),
+    # white noise three times as large, of which each sample is the mean of nine
+    "smoothed": lambda n, lot: (
+        3.0 * np.convolve(lot.standard_normal(n + 8), np.full(9, 1.0 / 9.0), "valid")
+    ),
+    "telegraph": _telegraph, "pink": _pink, "bursts": _bursts,
+}  # fmt: skip
+NOISES: dict[str, Callable] = {
+    "shaped": lambda shape: lambda s, lot: s + 0.01 * rms(s) * shape(len(s), lot),
+    "level": lambda size: lambda s, lot: s + size * lot.standard_normal(len(s)),  # in Pa
+    "autoregressive": lambda size, rho: lambda s, lot: correlated(s, size, rho, lot),
+    "autoregressive_pascal": lambda size, rho: lambda s, lot: (
+        s + size * correlated(np.ones(len(s)), 1.0, rho, lot) - size
+    ),
+    "proportional": lambda share: lambda s, lot: s * (1 + share * lot.standard_normal(len(s))),
+    # Student's: with two degrees of freedom it has no variance
+    "heavy": lambda size, freedom=2: lambda s, lot: (
+        s + size * rms(s) * lot.standard_t(freedom, len(s))
+    ),
+    "thrown": lambda share: lambda s, lot: noises.outliers(white(0.01)(s, lot), share, 1.0, lot),
+    "walk_alone": lambda size: lambda s, lot: s + size * np.cumsum(lot.standard_normal(len(s))),
+    "growing_with_stress": lambda share, at: lambda s, lot: (
+        s * (1 + share * (s / at) ** 2 * lot.standard_normal(len(s)))
+    ),
+    "share_and_floor": lambda share, floor: lambda s, lot: (
+        s + np.hypot(share * s, floor) * lot.standard_normal(len(s))
+    ),
+    "median_of": lambda width: after_white(lambda s: median_filter(s, width, mode="nearest")),
+    "dropouts": lambda s, lot: np.where(lot.random(len(s)) < 0.05, 0.0, white(0.01)(s, lot)),
+    "slow_update": lambda s, lot: white(0.01)(s, lot)[3 * (np.arange(len(s)) // 3)],
+    "steps_of": _steps, "with_strays": _strays, "wandering": _wandering, "loaded": _loaded,
+    "read_by_hand": _by_hand, "wandering_gain": _wandering_gain, "knocked_ends": _knocked_ends,
+    "uneven_clock": _uneven_clock,
+}  # fmt: skip

@@ -4,8 +4,10 @@ A maker takes nothing and returns runs by file name; a change takes the name and
 of cases name what is here.
 """
 
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,107 +68,34 @@ Change = Callable[[str, Record], Record]
 Table = Callable[[], dict[str, dict[str, np.ndarray]]]
 
 
-def growths(times: np.ndarray, rates: Mapping[str, float]) -> Sampled:
-    """Return start-ups, each with its samples."""
-    return {name: (start_up(rate), times) for name, rate in rates.items()}
+def flow_of(told: Mapping[str, Any]) -> tuple[Flow, np.ndarray]:
+    """Return a flow, which is a rate, a wave or steps, and its samples, even in t or in log t."""
+    made = {"rate": start_up, "wave": oscillation, "steps": steps}
+    (flow,) = (make(*told[how]) for how, make in made.items() if how in told)
+    times = np.linspace(*told["even"]) if "even" in told else np.geomspace(*told["log"])
+    return flow, np.union1d(times, told["and"]) if "and" in told else times
 
 
-def _even(samples: int, end: float, begin: float = 0.1) -> np.ndarray:
-    return np.linspace(begin, end, samples)
-
-
-_GROWTH, _WAVE = _even(80, 8.0), _even(120, 12.0)
-_HELD = {"held.csv": 3.0}
-FLOWS: Sampled = {
-    **growths(_GROWTH, {"slow.csv": 0.5, "fast.csv": 2.0}),
-    "wave.csv": (oscillation(2.0, 1.0), _WAVE), **growths(_GROWTH, _HELD),
-}  # fmt: skip
-WITHIN = {**FLOWS, "held.csv": (start_up(1.2), _GROWTH)}
-ALL = {name: flow for name, flow in FLOWS.items() if name != "held.csv"}
-TWO = {name: FLOWS[name] for name in ("slow.csv", "fast.csv")}
-ONE: Sampled = {"only.csv": (start_up(2.0), _GROWTH)}
-ONE_HELD = {**ONE, "held.csv": FLOWS["held.csv"]}
-_RATES = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.0}
-FEW, FIVE = growths(_even(8, 6.0, 0.3), _RATES), growths(_GROWTH, _RATES)
-FEW_LOG = growths(np.geomspace(0.05, 8.0, 15), _RATES)
-LOW = growths(np.geomspace(0.1, 20.0, 80), {"a.csv": 0.05, "b.csv": 0.1, "c.csv": 0.2})
-UNEQUAL: Sampled = {
-    "short.csv": (start_up(4.0), _even(12, 1.0, 0.05)),
-    "long.csv": (start_up(0.3), _even(300, 60.0, 0.2)),
-    "wave.csv": (oscillation(2.0, 1.0), _even(40, 6.0)),
-    "held.csv": (start_up(2.0), _even(60, 8.0)),
-}  # fmt: skip
+FILE = tomllib.loads((Path(__file__).parent / "hostile.toml").read_text("utf-8"))
+SAMPLED: dict[str, Sampled] = {
+    name: {run: flow_of(one) for run, one in runs.items()} for name, runs in FILE["flows"].items()
+}
+FLOWS, STARTS, BAD_DAYS = (SAMPLED[name] for name in ("FLOWS", "STARTS", "BAD_DAYS"))
+_GROWTH = FLOWS["slow.csv"][1]
 _LOT = np.random.default_rng(7)
 UNEVEN: Sampled = {
     name: (flow, np.sort(_LOT.uniform(0.02, times[-1], len(times))))
     for name, (flow, times) in FLOWS.items()
 }
-SLOW: Sampled = {
-    "a.csv": (start_up(0.02), _GROWTH), "b.csv": (start_up(0.02), np.geomspace(0.1, 20.0, 80)),
-    "c.csv": (oscillation(0.02, 0.5), _even(120, 25.0)), "held.csv": (start_up(2.0), _GROWTH),
-}  # fmt: skip
-SLOW_ALONE = {name: flow for name, flow in SLOW.items() if name != "held.csv"}
-SLOW_THEN_FASTER: Sampled = {
-    **growths(_GROWTH, {"a.csv": 0.3, "b.csv": 0.6, "c.csv": 1.0}),
-    "held.csv": (start_up(10.0), _even(80, 2.0, 0.02)),
-}
-SLOW_START = growths(_GROWTH, {"slow.csv": 0.3, "held.csv": 0.6})
-TWO_RATES = growths(_GROWTH, {"a.csv": 1.0, "b.csv": 2.0, "held.csv": 3.0})
-LOGARITHMIC = growths(
-    np.geomspace(0.06, 8.0, 22),
-    {"slow.csv": 0.5, "middle.csv": 1.0, "fast.csv": 2.0, "held.csv": 3.0},
-)
-WEAK: Sampled = {
-    **growths(_GROWTH, {"slow.csv": 0.1, "fast.csv": 0.2}),
-    "wave.csv": (oscillation(0.2, 1.0), _WAVE), "held.csv": (start_up(0.3), _GROWTH),
-}  # fmt: skip
-CUT = {
-    name: (flow, times[: {"fast.csv": 10, "wave.csv": 30}.get(name)])
-    for name, (flow, times) in FLOWS.items()
-}
-OF_THREE_MODES: Sampled = {
-    "a.csv": (start_up(0.1), np.geomspace(0.1, 40.0, 80)),
-    "b.csv": (start_up(1.0), np.geomspace(0.05, 20.0, 80)),
-    "c.csv": (start_up(5.0), np.geomspace(0.02, 6.0, 80)),
-    "held.csv": (start_up(2.0), np.geomspace(0.03, 10.0, 80)),
-}
-STARTS = {
-    **{name: flow for name, flow in FLOWS.items() if name != "wave.csv"},
-    "third.csv": (start_up(1.0), _GROWTH),
-}
-STEPPED: Sampled = {
-    name: (steps([0.0, *when], rates), _even(120, 9.0, 0.05))
-    for name, when, rates in (
-        ("a.csv", (3.0, 6.0), (0.5, 2.0, 1.0)), ("b.csv", (2.0, 5.0), (2.0, 0.3, 1.5)),
-        ("c.csv", (4.0, 6.0), (1.0, 3.0, 0.2)), ("held.csv", (3.0, 5.0), (1.5, 0.5, 2.5)),
-    )
-}  # fmt: skip
-PAUSED: Sampled = {
-    name: (
-        steps([0.0, 4.0, 7.0], [rate, 0.0, rate]),
-        np.union1d(_even(140, 12.0, 0.05), [3.995, 4.0, 6.995, 7.0]),
-    )
-    for name, rate in {"a.csv": 0.3, "b.csv": 1.0, "c.csv": 3.0, "held.csv": 2.0}.items()
-}
-_BAD = np.geomspace(0.05, 10.0, 60)
-BAD_DAYS: Sampled = {
-    **growths(_BAD, {"slow.csv": 0.5, "fast.csv": 2.0}),
-    "wave.csv": (oscillation(2.0, 1.0), np.linspace(0.0, 12.0, 121)), **growths(_BAD, _HELD),
-}  # fmt: skip
-OF_LAWS: Sampled = {
-    **growths(_even(60, 8.0), {"start_0.5.csv": 0.5, "start_2.csv": 2.0}),
-    **{f"wave_{a:g}.csv": (oscillation(a, 1.0), np.linspace(0.0, 4.0 * np.pi, 81))
-       for a in (1.0, 2.0)},
-    "start_4.csv": (start_up(4.0), _even(60, 8.0)),
-    "wave_4.csv": (oscillation(4.0, 1.0), np.linspace(0.0, 4.0 * np.pi, 81)),
-}  # fmt: skip
-
-
 AGAIN = {**FLOWS, "again.csv": FLOWS["fast.csv"]}
 REPEATED = {
     one: flow
     for name, flow in FLOWS.items()
     for one in ([name] if name == "held.csv" else [name, name.replace(".csv", "_again.csv")])
+}
+CUT = {
+    name: (flow, times[: {"fast.csv": 10, "wave.csv": 30}.get(name)])
+    for name, (flow, times) in FLOWS.items()
 }
 
 
@@ -177,7 +106,8 @@ def late(begin: float) -> Sampled:
 
 def to_strain(strain: float) -> Sampled:
     """Return start-ups that end at a strain."""
-    return {n: (start_up(r), np.linspace(0.02, strain / r, 60)) for n, r in _RATES.items()}
+    rates = {"a.csv": 0.5, "b.csv": 1.0, "c.csv": 2.0, "d.csv": 4.0, "held.csv": 3.0}
+    return {n: (start_up(r), np.linspace(0.02, strain / r, 60)) for n, r in rates.items()}
 
 
 def record_of(run, **cells) -> Record:
@@ -597,7 +527,8 @@ def stopped(material: Material, then: Mapping[str, float] = {}) -> Maker:
                          start="steady", rate_before_1_s=rate)
             for name, rate in rates.items()
         }  # fmt: skip
-        return made | recorded(material, growths(_GROWTH, then))()
+        starts = {name: (start_up(rate), _GROWTH) for name, rate in then.items()}
+        return made | recorded(material, starts)()
 
     return make
 

@@ -25,20 +25,11 @@ from pathlib import Path
 from unittest.mock import patch
 
 import harm
-from harm import to_toml
-from malformed_files import (
-    COMPARISON,
-    ESTIMATOR,
-    EXPORTS,
-    FOLDER,
-    MAPPING,
-    OVERLAY,
-    RESULTS,
-    STUDY,
-    SWEEP,
-    write_files,
-)
+from harm import SANE, to_toml, write_files
 
+FOLDER, STUDY, COMPARISON, RESULTS, EXPORTS = (
+    SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON", "RESULTS", "EXPORTS")
+)
 QUESTIONS, SEED, LIMIT = ("harm",), 0, 120.0
 """Seconds: a case takes some 10 ms, the first some seconds on a busy machine."""
 MEMORY = 16 * 2**30
@@ -154,7 +145,8 @@ def run_call(call: list[str] | Callable[[], object]) -> Outcome:
 _REMEDY = re.compile(
     r"\b(add|change|check|choose|close|copy|correct|declare|download|export|give|install|keep"
     r"|known keys|leave|make|mend|must|name|names are case-sensitive|needs|one of|put|remove|rename"
-    r"|replace|run|sample|save|say|see|set|should|sort|take|try|use|wait|widen|write|is \S+ meant)\b",
+    r"|replace|run|sample|save|say|see|set|should|sort|take|try|use|wait|widen|write"
+    r"|is \S+ meant)\b",
     re.IGNORECASE,
 )
 
@@ -277,7 +269,7 @@ def told_by_a_result(root: Path, source: random.Random) -> Case:
 
 
 def overlaid(root: Path, source: random.Random) -> Case:
-    write_files(root, {**FOLDER, "o.csv": OVERLAY})
+    write_files(root, {**FOLDER, "o.csv": SANE["OVERLAY"]})
     harm.spoil(root, "o.csv", source)
     table = '[[report.overlay]]\nlabel = "x"\nfile = "o.csv"\n'
     write_files(root, {"study.toml": to_toml(STUDY) + table})
@@ -334,7 +326,7 @@ def batch(root: Path, source: random.Random) -> Case:
 
 def imported(root: Path, source: random.Random) -> Case:
     name = source.choice(list(EXPORTS))
-    write_files(root, {**EXPORTS, "sweep.txt": SWEEP})
+    write_files(root, {**EXPORTS, "sweep.txt": SANE["SWEEP"]})
     with_sweep = source.random() < 0.3
     harm.spoil(root, "sweep.txt" if with_sweep else name, source)
     call = ["data", "import", str(root / name), "--out", str(root / "data")]
@@ -380,7 +372,9 @@ def estimator(root: Path, source: random.Random) -> Case:
     kind = source.choice(("<f8", "|O", "<U9999", "V0", "|b1"))
     head = repr({"descr": kind, "fortran_order": False, "shape": shape}).encode() + b"\n"
     array = b"\x93NUMPY\1\0" + struct.pack("<H", len(head)) + head + b"\0" * 16
-    header = json.dumps(harm.mutate_values(ESTIMATOR, source)).encode("utf-8", "surrogatepass")
+    header = json.dumps(harm.mutate_values(SANE["ESTIMATOR"], source)).encode(
+        "utf-8", "surrogatepass"
+    )
     raw = _packed({"estimator.json": header, "array0.npy": array})
     if source.random() < 0.2:  # encrypted, says the directory; or the sizes declared are others
         at = raw.index(b"PK\1\2") + source.choice((8, 20, 24))
@@ -414,7 +408,7 @@ def frame(root: Path, source: random.Random) -> Case:
 
 def mapped(root: Path, source: random.Random) -> Case:
     write_files(root, EXPORTS)
-    _study(root, MAPPING, source, "map.toml")
+    _study(root, SANE["MAPPING"], source, "map.toml")
     call = ["data", "import", "--mapping", str(root / "map.toml"), "--out", str(root / "data")]
     return Case(call, ("map.toml", "trios", "runs.csv", "--", "[[source]]"))
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import harm
 import malformed
-import malformed_files
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -86,7 +85,7 @@ def test_a_fault_of_the_software_is_seen(tmp_path, monkeypatch, error):
         raise error
 
     monkeypatch.setattr("discover.dataset.checking.folder.read_index", fail)
-    malformed_files.write_files(tmp_path, malformed_files.FOLDER)
+    harm.write_files(tmp_path, harm.SANE["FOLDER"])
     case = Case(["data", "check", str(tmp_path)])
     assert complaint(case, malformed.run_call(case.call)) in (
         "fails in the software",
@@ -141,7 +140,7 @@ def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
     mine, other = tmp_path / "mine", tmp_path / "other"
     for folder in (mine, other):
         folder.mkdir()
-        malformed_files.write_files(folder, malformed_files.FOLDER)
+        harm.write_files(folder, harm.SANE["FOLDER"])
     for path, told in ((".", False), ("../other", True), (str(other), True)):
         (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
         outcome = malformed.run_call(
@@ -168,7 +167,7 @@ def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
         'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
     ):
         synthetic = "sweep" in section
-        malformed_files.write_files(tmp_path, malformed_files.FOLDER)
+        harm.write_files(tmp_path, harm.SANE["FOLDER"])
         data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
         (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
         outcome = malformed.run_call(
