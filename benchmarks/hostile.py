@@ -26,9 +26,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import hostile_benches
 import hostile_changes
 import hostile_materials
+import hostile_noises
 import hostile_records
+import hostile_tests
 import independent
 import numpy as np
 import product
@@ -58,11 +61,12 @@ def _named(law: str):
 def words() -> dict[str, Any]:
     """Return what the expressions of the file may name."""
     known: dict[str, Any] = {}
-    for module in (authors, independent, hostile_materials, hostile_records, hostile_changes):
+    own = (hostile_materials, hostile_benches, hostile_records, hostile_tests, hostile_changes)
+    for module in (authors, independent, *own):
         known |= vars(module)
     known |= SAMPLED
-    for table in ("STRESSES", "FIRST_DIFFERENCES", "TABLES", "SHAPES", "NOISES"):
-        known |= getattr(hostile_changes, table)
+    for tables in (hostile_changes, hostile_noises):
+        known |= {k: v for table in tables.OF_NAMES for k, v in table.items()}
     known |= {"linspace": np.linspace, "material": by_name.material, "named": _named}
     for name, text in FILE["names"].items():
         known[name] = evaluated(ast.parse(text, mode="eval").body, known)
@@ -85,18 +89,36 @@ def evaluated(node: ast.AST, known: Mapping[str, Any]) -> Any:
             return -evaluated(one, known)
         case ast.BinOp(left, ast.Mult(), right):
             return evaluated(left, known) * evaluated(right, known)
-        case ast.Call(function, arguments, keywords):
-            given = []
-            for one in arguments:
-                starred = isinstance(one, ast.Starred)
-                value = evaluated(one.value if starred else one, known)
-                given += value if starred else [value]
-            named: dict[str, Any] = {}
-            for one in keywords:
-                value = evaluated(one.value, known)
-                named |= {one.arg: value} if one.arg else value
-            return evaluated(function, known)(*given, **named)
+        case ast.Call():
+            function, given, named = called(node, known)
+            return function(*given, **named)
     raise ValueError(f"{ast.unparse(node)} is no expression of hostile.toml.")
+
+
+def called(node: ast.Call, known: Mapping[str, Any]) -> tuple[Callable, list, dict[str, Any]]:
+    """Return a function with what it is called with."""
+    given, named = [], {}
+    for one in node.args:
+        starred = isinstance(one, ast.Starred)
+        value = evaluated(one.value if starred else one, known)
+        given += value if starred else [value]
+    for one in node.keywords:
+        value = evaluated(one.value, known)
+        named |= {one.arg: value} if one.arg else value
+    return evaluated(node.func, known), given, named
+
+
+def bound(text: str) -> Callable:
+    """Return the call of an expression, for which what comes first is still to be given."""
+    node = ast.parse(text, mode="eval").body
+    if isinstance(node, ast.Name):
+        return words()[node.id]
+
+    def call(*first):
+        function, given, named = called(node, words())
+        return function(*first, *given, **named)
+
+    return call
 
 
 @dataclass(frozen=True)
@@ -161,7 +183,7 @@ def case_named(name: str) -> Case:
     for key in ("records", "noise", "tables", "export"):
         text = told.get(key, defaults.get(key))
         if text is not None:
-            told[key] = evaluated(ast.parse(text, mode="eval").body, words())
+            told[key] = bound(text)
     return Case(**told)
 
 

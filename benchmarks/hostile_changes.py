@@ -9,21 +9,16 @@ from hostile_records import (
     GIESEKUS,
     SAMPLED,
     Change,
-    Maker,
     Record,
     Runs,
-    Table,
+    Tables,
     recorded,
 )
 from independent import Material, RateLaw, start_up, steps
-from independent import noise as noises
 from independent.folders import maxwell_sweep
-from independent.noise import correlated, rms
+from independent.noise import rms
 from independent.sweeps import modulus_of
-from scipy.interpolate import UnivariateSpline
-from scipy.ndimage import median_filter
 
-Noise = Callable[[np.ndarray, np.random.Generator], np.ndarray]
 Columns = Mapping[str, np.ndarray]
 Told = Callable[[str, np.ndarray, np.ndarray, Columns], np.ndarray]
 """From the run's name, its times and stresses and all its columns: the stress that is told."""
@@ -184,42 +179,31 @@ def late_axially(lag: float):
     return told
 
 
-def digitised(law: RateLaw, jitter: float = 0.01) -> Maker:
-    """Return the maker of curves that a hand read from a plot: times that are off, too."""
-
-    def make() -> Runs:
-        lot, made = np.random.default_rng(21), {}
-        for name, run in recorded(law, SAMPLED["LOGARITHMIC"])().items():
-            times = run.columns["time_s"]
-            made[name] = run.told(time_s=times * np.exp(jitter * lot.standard_normal(len(times))))
-        return made
-
-    return make
+def digitised(law: RateLaw, jitter: float = 0.01) -> Runs:
+    """Return curves that a hand read from a plot: times that are off, too."""
+    lot, made = np.random.default_rng(21), {}
+    for name, run in recorded(law, SAMPLED["LOGARITHMIC"]).items():
+        times = run.columns["time_s"]
+        made[name] = run.told(time_s=times * np.exp(jitter * lot.standard_normal(len(times))))
+    return made
 
 
-def noisy_rates(size: float) -> Maker:
-    """Return the maker of runs whose rate is told as measured, with noise of a share of it."""
-
-    def make() -> Runs:
-        lot, made = np.random.default_rng(12), {}
-        for name, run in recorded(GIESEKUS)().items():
-            rate = run.columns["shear_rate_1_s"]
-            noise = size * rms(rate) * lot.standard_normal(len(rate))
-            made[name] = run.told(shear_rate_1_s=rate + noise)
-        return made
-
-    return make
+def noisy_rates(size: float) -> Runs:
+    """Return runs whose rate is told as measured, with noise of a share of it."""
+    lot, made = np.random.default_rng(12), {}
+    for name, run in recorded(GIESEKUS).items():
+        rate = run.columns["shear_rate_1_s"]
+        noise = size * rms(rate) * lot.standard_normal(len(rate))
+        made[name] = run.told(shear_rate_1_s=rate + noise)
+    return made
 
 
-def shifted(factors: Mapping[str, Sequence[float]]) -> Maker:
+def shifted(factors: Mapping[str, Sequence[float]]) -> Runs:
     """Return runs at several temperatures by factors of time that are told, and that are true."""
     from hostile_records import warmed
 
-    def make() -> Runs:
-        runs = warmed({name: true / told for name, (told, true) in factors.items()})()
-        return {n: replace(run, cells={"a_T": factors[n][0]}) for n, run in runs.items()}
-
-    return make
+    runs = warmed({name: true / told for name, (told, true) in factors.items()})()
+    return {n: replace(run, cells={"a_T": factors[n][0]}) for n, run in runs.items()}
 
 
 # tables beside the runs
@@ -228,16 +212,12 @@ _RATES = np.geomspace(0.05, 20.0, 30)
 THREE_TIMES, THREE_MODULI = (10.0, 1.0, 0.1), (20.0, 60.0, 120.0)
 
 
-def swept(law: RateLaw) -> Table:
-    """Return the maker of an amplitude sweep at 1 rad/s."""
-
-    def make():
-        strains = np.geomspace(0.05, 6.0, 20)
-        found = np.array([modulus_of(law, strain, 1.0, 6) for strain in strains])
-        columns = {"strain": strains, "omega_rad_s": np.ones(20)}
-        return {"amplitude_sweep.csv": {**columns, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
-
-    return make
+def swept(law: RateLaw) -> Tables:
+    """Return an amplitude sweep at 1 rad/s."""
+    strains = np.geomspace(0.05, 6.0, 20)
+    found = np.array([modulus_of(law, strain, 1.0, 6) for strain in strains])
+    columns = {"strain": strains, "omega_rad_s": np.ones(20)}
+    return {"amplitude_sweep.csv": {**columns, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
 
 
 def _steady(law: Material, rates: np.ndarray, ends: Sequence[float]) -> np.ndarray:
@@ -248,65 +228,51 @@ def _curve(rates: np.ndarray, stress: np.ndarray):
     return {"flow_curve.csv": {"shear_rate_1_s": rates, "stress_Pa": stress}}
 
 
-def banded(law: RateLaw, solvent: float = 5.0) -> Table:
-    """Return the maker of a flow curve with a plateau between two branches, as bands have it."""
-
-    def make():
-        rates = np.geomspace(0.05, 50.0, 30)
-        stress = _steady(law, rates, [60.0, 90.0]) + solvent * rates
-        top = 0.9 * float(np.max(stress[rates < 3.0]))
-        first, last = np.argmax(stress > top), np.flatnonzero(stress < top)[-1]
-        stress[first : max(last + 1, first)] = top
-        return _curve(rates, stress)
-
-    return make
+def banded(law: RateLaw, solvent: float = 5.0) -> Tables:
+    """Return a flow curve with a plateau between two branches, as bands have it."""
+    rates = np.geomspace(0.05, 50.0, 30)
+    stress = _steady(law, rates, [60.0, 90.0]) + solvent * rates
+    top = 0.9 * float(np.max(stress[rates < 3.0]))
+    first, last = np.argmax(stress > top), np.flatnonzero(stress < top)[-1]
+    stress[first : max(last + 1, first)] = top
+    return _curve(rates, stress)
 
 
-def apparent(law: RateLaw) -> Table:
-    """Return the maker of a flow curve of a capillary at rates as of a Newtonian fluid."""
-
-    def make():
-        rates = np.geomspace(1e-3, 20.0, 120)
-        stress = _steady(law, rates, [20.0, 60.0])
-        both, wall = np.append(0.0, stress**2 * rates), np.append(0.0, stress)
-        through = np.append(0.0, np.cumsum((both[1:] + both[:-1]) / 2 * np.diff(wall)))[1:]
-        told, kept = 4 * through / stress**3, np.searchsorted(rates, _RATES[:-1])
-        return _curve(told[kept], stress[kept])
-
-    return make
+def apparent(law: RateLaw) -> Tables:
+    """Return a flow curve of a capillary at rates as of a Newtonian fluid."""
+    rates = np.geomspace(1e-3, 20.0, 120)
+    stress = _steady(law, rates, [20.0, 60.0])
+    both, wall = np.append(0.0, stress**2 * rates), np.append(0.0, stress)
+    through = np.append(0.0, np.cumsum((both[1:] + both[:-1]) / 2 * np.diff(wall)))[1:]
+    told, kept = 4 * through / stress**3, np.searchsorted(rates, _RATES[:-1])
+    return _curve(told[kept], stress[kept])
 
 
-def sweep_at(law: RateLaw, strain: float) -> Table:
-    """Return the maker of a sweep at a strain that is not small, told as linear."""
-
-    def make():
-        omega = np.geomspace(0.03, 50.0, 17)
-        found = np.array([modulus_of(law, strain, w, 8) for w in omega])
-        return {"lve.csv": {"omega_rad_s": omega, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
-
-    return make
+def sweep_at(law: RateLaw, strain: float) -> Tables:
+    """Return a sweep at a strain that is not small, told as linear."""
+    omega = np.geomspace(0.03, 50.0, 17)
+    found = np.array([modulus_of(law, strain, w, 8) for w in omega])
+    return {"lve.csv": {"omega_rad_s": omega, "Gp_Pa": found.real, "Gpp_Pa": found.imag}}
 
 
 def sweep_of(
     moduli: Sequence[float], times: Sequence[float], low=0.01, high=100.0, points=33
-) -> Table:
-    """Return the maker of a linear sweep of Maxwell modes."""
+) -> Tables:
+    """Return a linear sweep of Maxwell modes."""
     omega = np.geomspace(low, high, points)
-    return lambda: {"lve.csv": maxwell_sweep(np.array(moduli), np.array(times), omega)}
+    return {"lve.csv": maxwell_sweep(np.array(moduli), np.array(times), omega)}
 
 
 _HASTE = np.arange(len(_RATES))
 TABLES: dict[str, Callable] = {
-    "curve": lambda law: lambda: _curve(_RATES, _steady(law, _RATES, [30.0, 60.0])),
+    "curve": lambda law: _curve(_RATES, _steady(law, _RATES, [30.0, 60.0])),
     # swept upwards, with a second for each point
-    "in_haste": lambda law: (
-        lambda: _curve(
-            _RATES, law.respond(steps(1.0 * _HASTE, _RATES), 1.0 * _HASTE + 0.999).sigma12
-        )
+    "in_haste": lambda law: _curve(
+        _RATES, law.respond(steps(1.0 * _HASTE, _RATES), 1.0 * _HASTE + 0.999).sigma12
     ),
     # a curve that nobody measured: |η*| of one mode
-    "by_cox_and_merz": lambda modulus, time: (
-        lambda: _curve(_RATES, modulus * time * _RATES / np.sqrt(1 + (time * _RATES) ** 2))
+    "by_cox_and_merz": lambda modulus, time: _curve(
+        _RATES, modulus * time * _RATES / np.sqrt(1 + (time * _RATES) ** 2)
     ),
 }
 
@@ -314,231 +280,22 @@ TABLES: dict[str, Callable] = {
 # what becomes of runs that have their noise
 
 
-def copied(which: str, to: str, places: int = 0):
-    """Return an export that has a run under two names, once with fewer digits."""
-
-    def export(runs: Runs) -> Runs:
-        stress = runs[which].columns["stress_Pa"]
-        told = np.array([float(f"{v:.{places}g}") for v in stress]) if places else stress
-        return {**runs, to: runs[which].told(stress_Pa=told)}
-
-    return export
-
-
-def filled_up(end: float, names: Sequence[str], last: bool):
-    """Return an export of runs that stopped early, filled with their last value or with zeros."""
-
-    def export(runs: Runs) -> Runs:
-        made = dict(runs)
-        for name in names:
-            stress = runs[name].columns["stress_Pa"].copy()
-            over = runs[name].columns["time_s"] > end
-            stress[over] = stress[~over][-1] if last else 0.0
-            made[name] = runs[name].told(stress_Pa=stress)
-        return made
-
-    return export
-
-
-# noises; 1 % of the record where no size is given
-
-
-def white(size: float) -> Noise:
-    return lambda s, lot: s + size * rms(s) * lot.standard_normal(len(s))
-
-
-def _steps(share, before=0.001):
-    """Return readings in steps of a share of the largest stress, with some noise before them."""
-
-    def read(s, lot):
-        step = share * np.max(np.abs(s))
-        return step * np.round(white(before)(s, lot) / step)
-
-    return read
-
-
-def _strays(share):
-    def put(s, lot):
-        noisy = white(0.01)(s, lot)
-        where = lot.choice(len(s), max(1, round(share * len(s))), replace=False)
-        noisy[where] += rms(s) * lot.uniform(0.3, 1.0, len(where)) * lot.choice([-1, 1])
-        return noisy
-
-    return put
-
-
-def _wandering(size):
-    """Return a random walk that ends some `size` of the rms away: a drifting zero, 1/f²."""
-
-    def put(s, lot):
-        walk = np.cumsum(lot.standard_normal(len(s))) / np.sqrt(len(s))
-        return s + size * rms(s) * walk + 0.003 * rms(s) * lot.standard_normal(len(s))
-
-    return put
-
-
-def _by_hand(size, correlation=0.7):
-    """Return the error of a hand along a curve, in shares of each value."""
-
-    def put(s, lot):
-        error, last = np.zeros(len(s)), lot.standard_normal()
-        for i, new in enumerate(lot.standard_normal(len(s))):
-            last = correlation * last + np.sqrt(1 - correlation**2) * new
-            error[i] = last
-        return s * (1 + size * error)
-
-    return put
-
-
-def _loaded(spread):
-    """Return white noise, and a factor of each run, which is a loading of its own."""
-
-    def put(s, lot):
-        factor = 1 + spread * lot.standard_normal()
-        return factor * s + 0.01 * rms(s) * lot.standard_normal(len(s))
-
-    return put
-
-
-def after_white(read: Callable[[np.ndarray], np.ndarray]) -> Noise:
-    """Return what software makes of a record with white noise."""
-    return lambda s, lot: read(s + 0.01 * rms(s) * lot.standard_normal(len(s)))
-
-
-def interpolated(every: int) -> Noise:
-    """Return an export on a fine grid of what was recorded less often: straight lines between."""
-
-    def read(noisy):
-        at = np.arange(len(noisy))
-        told = np.unique(np.append(at[::every], at[-1]))
-        return np.interp(at, told, noisy[told])
-
-    return after_white(read)
-
-
-def held_and_rounded() -> Noise:
-    """Return every second value as the one before it, all with three digits."""
-
-    def read(noisy):
-        noisy[1::2] = noisy[: len(noisy) - 1 : 2][: len(noisy[1::2])]
-        return np.array([float(f"{value:.3g}") for value in noisy])
-
-    return after_white(read)
-
-
-def moving_mean(width: int) -> Noise:
-    def read(noisy):
-        ones = np.convolve(np.ones(len(noisy)), np.ones(width), "same")
-        return np.convolve(noisy, np.ones(width), "same") / ones
-
-    return after_white(read)
-
-
-def splined(size: float = 0.01) -> Noise:
-    """Return noise that was smoothed by a cubic spline, as far as its size is to be expected."""
-
-    def put(s, lot):
-        at, sigma = np.arange(len(s)), size * rms(s)
-        noisy = s + sigma * lot.standard_normal(len(s))
-        return UnivariateSpline(at, noisy, s=len(s) * sigma**2)(at)
-
-    return put
-
-
-def stamped(interval: float) -> Noise:
-    """Return noise of samples taken up to half an interval, in samples, before or after."""
-
-    def put(s, lot):
-        at = np.arange(len(s))
-        taken = np.interp(at + interval * lot.uniform(-0.5, 0.5, len(at)), at, s)
-        return taken + 0.01 * rms(s) * lot.standard_normal(len(s))
-
-    return put
-
-
-def between(points: int, interval: float = 0.1) -> Noise:
-    """Return noise of even samples, as straight lines carry it to times evenly in log t."""
-
-    def put(s, lot):
-        end = FLOWS["slow.csv"][1][-1]
-        known = np.arange(0, round(end / interval) + 1) * interval
-        own = np.append(0.0, lot.standard_normal(len(known) - 1))
-        return s + 0.01 * rms(s) * np.interp(np.geomspace(0.02, end, points), known, own)
-
-    return put
-
-
-def _telegraph(n, lot):
-    """Return noise of a loose contact: two levels of some twelve samples each."""
-    turns = lot.random(n) < 1.0 / 12.0
-    return 1.5 * (-1.0) ** np.cumsum(turns) + 0.3 * lot.standard_normal(n)
-
-
-def _pink(n, lot):
-    waves = np.fft.rfft(lot.standard_normal(n))
-    waves[1:] /= np.sqrt(np.arange(1, len(waves)))
-    waves[0] = 0.0
-    noise = np.fft.irfft(waves, n)
-    return noise / rms(noise)
-
-
-def _bursts(n, lot):
-    """Return noise with two stretches of eight samples that are ten times as loud."""
-    size = np.full(n, 0.7)
-    for begin in lot.choice(np.arange(5, n - 12), 2, replace=False):
-        size[begin : begin + 8] = 7.0
-    return size * lot.standard_normal(n)
-
-
-def _wandering_gain(s, lot):
-    walk = np.cumsum(lot.standard_normal(len(s))) / np.sqrt(0.5 * len(s))
-    return white(0.005)(s * (1.0 + 0.01 * walk), lot)
-
-
-def _knocked_ends(s, lot):
-    noisy = white(0.01)(s, lot)
-    noisy[[1, -1]] += 0.01 * rms(s) * lot.uniform(20.0, 40.0, 2) * lot.choice([-1, 1], 2)
-    return noisy
-
-
-def _uneven_clock(s, lot):
-    at = np.arange(len(s)) + lot.uniform(-0.5, 0.5, len(s))
-    return white(0.005)(np.interp(at, np.arange(len(s)), s), lot)
-
-
-SHAPES: dict[str, Callable] = {
-    "one_sided": lambda n, lot: lot.exponential(1.0, n) - 1.0,
-    "growing": lambda n, lot: np.linspace(0.2, 3.0, n) * lot.standard_normal(n),
-    # white noise three times as large, of which each sample is the mean of nine
-    "smoothed": lambda n, lot: (
-        3.0 * np.convolve(lot.standard_normal(n + 8), np.full(9, 1.0 / 9.0), "valid")
-    ),
-    "telegraph": _telegraph, "pink": _pink, "bursts": _bursts,
-}  # fmt: skip
-NOISES: dict[str, Callable] = {
-    "shaped": lambda shape: lambda s, lot: s + 0.01 * rms(s) * shape(len(s), lot),
-    "level": lambda size: lambda s, lot: s + size * lot.standard_normal(len(s)),  # in Pa
-    "autoregressive": lambda size, rho: lambda s, lot: correlated(s, size, rho, lot),
-    "autoregressive_pascal": lambda size, rho: lambda s, lot: (
-        s + size * correlated(np.ones(len(s)), 1.0, rho, lot) - size
-    ),
-    "proportional": lambda share: lambda s, lot: s * (1 + share * lot.standard_normal(len(s))),
-    # Student's: with two degrees of freedom it has no variance
-    "heavy": lambda size, freedom=2: lambda s, lot: (
-        s + size * rms(s) * lot.standard_t(freedom, len(s))
-    ),
-    "thrown": lambda share: lambda s, lot: noises.outliers(white(0.01)(s, lot), share, 1.0, lot),
-    "walk_alone": lambda size: lambda s, lot: s + size * np.cumsum(lot.standard_normal(len(s))),
-    "growing_with_stress": lambda share, at: lambda s, lot: (
-        s * (1 + share * (s / at) ** 2 * lot.standard_normal(len(s)))
-    ),
-    "share_and_floor": lambda share, floor: lambda s, lot: (
-        s + np.hypot(share * s, floor) * lot.standard_normal(len(s))
-    ),
-    "median_of": lambda width: after_white(lambda s: median_filter(s, width, mode="nearest")),
-    "dropouts": lambda s, lot: np.where(lot.random(len(s)) < 0.05, 0.0, white(0.01)(s, lot)),
-    "slow_update": lambda s, lot: white(0.01)(s, lot)[3 * (np.arange(len(s)) // 3)],
-    "steps_of": _steps, "with_strays": _strays, "wandering": _wandering, "loaded": _loaded,
-    "read_by_hand": _by_hand, "wandering_gain": _wandering_gain, "knocked_ends": _knocked_ends,
-    "uneven_clock": _uneven_clock,
-}  # fmt: skip
+def copied(runs: Runs, which: str, to: str, places: int = 0) -> Runs:
+    """Return runs of which one has two names, once with fewer digits."""
+    stress = runs[which].columns["stress_Pa"]
+    told = np.array([float(f"{v:.{places}g}") for v in stress]) if places else stress
+    return {**runs, to: runs[which].told(stress_Pa=told)}
+
+
+def filled_up(runs: Runs, end: float, names: Sequence[str], last: bool) -> Runs:
+    """Return runs that stopped early, filled with their last value or with zeros."""
+    made = dict(runs)
+    for name in names:
+        stress = runs[name].columns["stress_Pa"].copy()
+        over = runs[name].columns["time_s"] > end
+        stress[over] = stress[~over][-1] if last else 0.0
+        made[name] = runs[name].told(stress_Pa=stress)
+    return made
+
+
+OF_NAMES = STRESSES, FIRST_DIFFERENCES, TABLES
