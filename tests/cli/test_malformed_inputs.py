@@ -10,7 +10,8 @@ import malformed
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from malformed import KINDS, Case, Outcome, attempt, complaint
+from malformed import Outcome, attempt, complaint
+from malformed_kinds import KINDS, Case, complete_results
 
 from discover import cli
 from discover.batch.run import folder_names
@@ -119,7 +120,7 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
 
 
 def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
-    malformed.complete_results(tmp_path)
+    complete_results(tmp_path)
     again = ["close-loop", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--json"]
     assert malformed.run_call(again).code == 0
     (tmp_path / "out" / "loop.json").write_bytes(b"\x90")
