@@ -112,15 +112,23 @@ def of_comparison(folder: Path) -> dict:
         learner: [said["lack_of_fit"].get(learner, {}).get("misfit"), found["errors"]]
         for learner, found in said["learners"].items()
     }
+    missing = what_is_missing(folder / "out")
+    return {"verdict": said["verdict"], "laws": laws, "notes": [f"missing: {m}" for m in missing]}
+
+
+def what_is_missing(out: Path) -> list[str]:
+    """Return what a finished comparison should hold and does not; nothing where it is whole."""
+    said = json.loads((out / "comparison.json").read_text("utf-8"))
     missing = [] if said["lack_of_fit"] else ["a test of what any learner leaves"]
     if said["verdict"] not in ("explained", "unexplained", "no_signal"):
         missing.append(f"a verdict: {said['verdict']}")
-    for learner, told in said["lack_of_fit"].items():
-        wanted = {"misfit", "noise", "lag_one_correlation", "probability"}
+    wanted = {"misfit", "noise", "lag_one_correlation", "probability"}
+    for learner in said["learners"]:
+        told = said["lack_of_fit"].get(learner, {})
         missing += [f"{key} of {learner}" for key in sorted(wanted - set(told))]
-    if "could not be drawn" in (folder / "out" / "report.html").read_text("utf-8"):
+    if "could not be drawn" in (out / "report.html").read_text("utf-8"):
         missing.append("a picture")
-    return {"verdict": said["verdict"], "laws": laws, "notes": [f"missing: {m}" for m in missing]}
+    return missing
 
 
 def line(row: dict) -> str:

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 import pytest
-from measured_comparisons import what_is_missing
+from measured import what_is_missing
 from typer.testing import CliRunner
 
 from discover.cli import app
