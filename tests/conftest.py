@@ -63,7 +63,7 @@ def as_users_run_it() -> Iterator[None]:
 # shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
     "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
-    "test_tbnn_training.py", "test_planting.py", "test_tensor_sindy_estimator.py",
+    "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
     "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
     "test_modulus_errors.py", "test_modes_of_a_stiff_fluid.py", "test_flows_of_fluids.py",
     "test_constants_by_mode.py", "test_loop.py", "test_law_choice.py",

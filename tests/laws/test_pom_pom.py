@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import PomPom as Independent
 from independent.homogeneous import UNIT
-from independent.pom_pom import PomPom as Independent
 from independent.sweeps import modulus_of
 from scipy.integrate import solve_ivp
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from independent import Giesekus
 from independent.folders import maxwell_sweep, write_table
-from independent.giesekus import Giesekus
 from independent.sweeps import giesekus_modulus
 
 import discover as dc

@@ -4,12 +4,10 @@ import tomllib
 
 import numpy as np
 import pytest
+from independent import Giesekus, JohnsonSegalman, UpperConvectedMaxwell
 from independent.flow import oscillation, start_up
 from independent.folders import with_noise, write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
-from independent.johnson_segalman import JohnsonSegalman
-from independent.maxwell import UpperConvectedMaxwell
 from sklearn.linear_model import BayesianRidge
 
 import discover as dc

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
+from independent import Giesekus, JohnsonSegalman, Thixotropic
 from independent.flow import start_up
 from independent.folders import with_noise, write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
-from independent.johnson_segalman import JohnsonSegalman
-from independent.thixotropic import Thixotropic
 
 import discover as dc
 

@@ -6,11 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from independent.curve_records import JUDGE, NOISE, curve_records
+from independent import Giesekus
 from independent.flow import start_up
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
-from independent.instruments import Instrument
+from independent.instruments import JUDGE, NOISE, Instrument, curve_records
 from scipy.integrate import cumulative_simpson
 
 import discover as dc

@@ -6,13 +6,10 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import PhanThienTanner, PomPom, WhiteMetzner
-from independent.curve_records import JUDGE, NOISE, curve_records
+from independent import Giesekus, PhanThienTanner, PomPom, Thixotropic, WhiteMetzner
 from independent.flow import start_up
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
-from independent.instruments import Instrument
-from independent.thixotropic import Thixotropic
+from independent.instruments import JUDGE, NOISE, Instrument, curve_records
 
 import discover as dc
 from discover.closed_loop.beyond import free_in_model

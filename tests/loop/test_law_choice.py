@@ -5,13 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from independent import ExtendedPomPom, Giesekus, RoliePoly, Thixotropic, UpperConvectedMaxwell
 from independent.flow import start_up as flow_at
-from independent.giesekus import Giesekus
-from independent.maxwell import UpperConvectedMaxwell
 from independent.noise import white
-from independent.pom_pom import ExtendedPomPom
-from independent.rolie_poly import RoliePoly
-from independent.thixotropic import Thixotropic
 
 import discover as dc
 from discover.loop import law_choice

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation, start_up
-from independent.k_bkz import KBKZ
+from independent import KBKZ, Giesekus, oscillation, start_up
 
 import discover as dc
 from discover.dataset import Dataset, Run

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from independent import Giesekus
 from independent.flow import start_up
 from independent.folders import with_noise, write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc

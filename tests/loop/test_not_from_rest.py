@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from independent import Modes, UpperConvectedMaxwell
-from independent.misread import relaxation_as_run
+from independent.instruments import relaxation_as_run
 
 from discover.loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run

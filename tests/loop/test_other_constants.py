@@ -4,11 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from independent import Giesekus, UpperConvectedMaxwell
 from independent.flow import oscillation, start_up
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
-from independent.maxwell import UpperConvectedMaxwell
 
 import discover as dc
 from discover.closed_loop.explanations.other_constants import FACTOR

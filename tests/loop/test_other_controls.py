@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from independent import Giesekus
 from independent.folders import write_table
-from independent.giesekus import Giesekus
 from scipy.integrate import solve_ivp
 
 import discover as dc

@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import Giesekus
 from independent.flow import start_up
 from independent.flow import steps as stepped
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc

@@ -1,9 +1,8 @@
 """Runs that are loadings of their own, of laws in and outside the dictionary: records by scipy."""
 
 import pytest
-from independent import Giesekus
-from independent.pom_pom import ExtendedPomPom
-from loadings import FLOWS, drawn
+from independent import ExtendedPomPom, Giesekus
+from readings import FLOWS, drawn
 
 import discover as dc
 
