@@ -11,7 +11,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -30,7 +30,11 @@ _MANY = 8
 # Of the runs that were laid out for the kernel
 _KEPT = 8
 
-_OF_RUNS = ("last", "width", "jump", "flow", "weight", "recorded")
+# Steps of the grid from which on vectors choose their own, and how much shorter these may become in
+# a steady flow before the record, whose beginning the grid does not resolve
+_FEWEST, _OF_HISTORY = 8, 0.05
+
+_OF_RUNS = ("last", "held", "width", "whole", "least", "jump", "flow", "weight", "recorded")
 
 
 class _Runs(NamedTuple):
@@ -42,6 +46,9 @@ class _Runs(NamedTuple):
         How many steps of each are taken.
     width, jump
         Of the steps, and the width up to which one only marks a jump of the rate, in s.
+    held, whole, least
+        Of how many steps that follow the commanded rate may be a straight line, from each on, how
+        long these are together, in s, and how short a vector's own may become; see `OwnWidths`.
     flow
         Kinematics of each run.
     sample
@@ -55,7 +62,10 @@ class _Runs(NamedTuple):
     """
 
     last: np.ndarray
+    held: np.ndarray
     width: np.ndarray
+    whole: np.ndarray
+    least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray
     sample: np.ndarray
@@ -64,6 +74,33 @@ class _Runs(NamedTuple):
     rate: np.ndarray
     tool_rate: np.ndarray
     in_lanes: np.ndarray
+
+
+def intervals(
+    times: Float[np.ndarray, "runs s"],
+    sample: Int[np.ndarray, "runs n"],
+    last: Int[np.ndarray, " runs"],
+    jump: Float[np.ndarray, " runs"],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each step how many from it on are one interval, its length, and the least step.
+
+    An interval ends at a sample and where a rate jumps. One of few steps is left as it is.
+    """
+    width = np.diff(times)
+    held = np.ones(width.shape, np.int64)
+    whole, least = width.copy(), width.copy()
+    for row, (own, at) in enumerate(zip(times, sample, strict=True)):
+        jumps = np.flatnonzero(width[row] <= jump[row])
+        starts = np.searchsorted(own, 0.0)
+        ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
+        ends = ends[ends <= last[row]]
+        for first, end in zip(ends[:-1], ends[1:], strict=True):
+            if end - first >= _FEWEST:
+                length = own[end] - own[first]
+                held[row, first], whole[row, first] = end - first, length
+                share = _OF_HISTORY if own[first] < 0.0 else 1.0
+                least[row, first] = share * length / (end - first)
+    return held, whole, least
 
 
 class SideBySide:
@@ -213,11 +250,16 @@ class SideBySide:
         np.add.at(weight, places, np.asarray(judging.weight))
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
+        jump = JUMP * times[:, -1]
+        held, whole, least = intervals(times, sample, last, jump)
         found = _Runs(
             # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
+            held,
             np.diff(times),
-            JUMP * times[:, -1],
+            whole,
+            least,
+            jump,
             self._kernel.flows(part.kinematics),
             sample,
             weight,
