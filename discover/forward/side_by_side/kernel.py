@@ -190,8 +190,13 @@ class Kernel:
         count, is_held = self._held.steps(run, number, half)
         w.builder.store(w.at((number, 1), (count, 1)), self._next)
         last = w.load("rate", w.at((half, 1), (count, 2)))
-        with self._held.parts(run, number, is_held, rates, last) as (width, felt):
+        first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
+        with self._held.parts(run, number, is_held, rates, last) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
+            # what series elements take at the beginning is looked at from the interval before
+            is_first = self._arithmetic.compare("==", begin, 0.0)
+            taken = self._arithmetic.chosen(is_first, self._kept(_EARLIER), w.load("felt", first))
+            w.store(self._arithmetic.lanes(taken), "felt", first)
         number = w.at((number, 1), (count, 1), (-1, 1))
         self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), last)
 

@@ -18,7 +18,7 @@ from discover.programs.lanes.arithmetic import INTEGER
 # By how much halves and whole may differ, of the stress of a mode. States of the fluid are of
 # second order where the modes are of fourth, and may differ by more
 import os
-TOLERANCE = float(os.environ.get('TOL','1e-7'))
+TOLERANCE = float(os.environ.get('TOL','1e-6'))
 _OF_STATES = float(os.environ.get('OS','1e-2'))
 
 # A stress over its modulus, and a structure variable, below which less than the tolerance counts
@@ -130,10 +130,11 @@ class OwnWidths:
     @contextmanager
     def parts(
         self, run: Any, number: Any, is_held: Any, rates: Sequence[Any], last: Any
-    ) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    ) -> Iterator[tuple[Any, Any, tuple[Any, ...]]]:
         """Write a step again and again until each vector has come to the end of an interval.
 
-        Yields its width and the rates at its beginning, in its middle and at its end.
+        Yields the time in it, the width, and the rates at its beginning, in its middle and at its
+        end.
         """
         w, b, a = self._w, self._w.builder, self._arithmetic
         place = w.at((run, w.counts["steps"]), (number, 1))
@@ -176,7 +177,7 @@ class OwnWidths:
                     )
                     for share, rate in zip((0.0, 0.5, 1.0), rates, strict=True)
                 )
-                yield step, felt
+                yield begin, step, felt
             with b.if_then(is_held), a.apart():
                 self._judge(whole, least, left, own, slope)
 

@@ -103,6 +103,19 @@ def intervals(
     return held, whole, least
 
 
+def _between(
+    values: Float[np.ndarray, "runs n lanes"], part: TransientFlows
+) -> Float[np.ndarray, "runs s lanes"]:
+    """Return values at samples as straight lines between these, at all step ends."""
+    times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
+    return np.array(
+        [
+            np.stack([np.interp(own, own[at], one) for one in of_run.T], axis=-1)
+            for of_run, own, at in zip(values, times, sample, strict=False)
+        ]
+    )
+
+
 class SideBySide:
     """Predictions of transients for one structure of law and effects.
 
@@ -217,18 +230,20 @@ class SideBySide:
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
-        stress, felt, goes_on = self._kernel(
-            runs,
-            declared,
-            used,
-            {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
-            | {name: getattr(laid_out, name) for name in _OF_RUNS},
-        )
+        given = {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
+        given |= {name: getattr(laid_out, name) for name in _OF_RUNS}
+        stress, felt, goes_on = self._kernel(runs, declared, used, given)
         if not goes_on:
             stress[:] = np.nan
         rows = np.arange(runs)[:, None]
+        at_samples = stress[rows, laid_out.sample[:runs]]
         if not np.any(thetas[:, self._distorting]):
-            return stress[rows, laid_out.sample[:runs]]
+            return at_samples
+        if np.any(laid_out.held > 1):
+            # what alters a signal looks beyond its samples, at all steps of the grid
+            given["held"] = np.ones_like(laid_out.held)
+            stress, felt, _ = self._kernel(runs, declared, used, given)
+            stress[:runs] += _between(at_samples - stress[rows, laid_out.sample[:runs]], part)
         beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
         felt = np.where(beyond, in_lanes[:, ::2], felt)
         stress = np.where(beyond, 0.0, stress)
