@@ -14,7 +14,7 @@ import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.side_by_side.own_widths import OwnWidths
+from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
@@ -32,8 +32,10 @@ _EIGHT_BITS = ir.IntType(8)
 
 # Where in the scratch array what stands; the last few, and the modes behind them, are the state that
 # is carried from step to step
-_MISSED, _TAKEN, _SUM, _OTHER_SUM, _ELAPSED, _WIDTH, _OFF, _MOVED = range(8)
-_STATE, _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = 8, *range(8, 13)
+_MISSED, _TAKEN, _SUM, _OTHER_SUM = range(4)
+_OWN = range(4, 4 + len(OWN))
+_STATE = _OWN.stop
+_MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
 
 class Kernel:
@@ -138,7 +140,7 @@ class Kernel:
         self._keep(0.0, _MISSED)
         self._next = w.builder.alloca(INTEGER)
         self._held = OwnWidths(
-            w, self._arithmetic, _ELAPSED, _WIDTH, _OFF, _MOVED, _STATE, range(_LEVELS, self._state_at),
+            w, self._arithmetic, _OWN, _STATE, range(_LEVELS, self._state_at),
             self._state_at, self._variables, self._on["states"],
         )  # fmt: skip
         w.store(INTEGER(1), "goes_on", 0)
@@ -162,7 +164,7 @@ class Kernel:
         size = self._flow.size
         kinematics = [self._splat("flow", w.at((run, size), (i, 1))) for i in range(size)]
         flow = self._flow.tree(kinematics) if size else None
-        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, _WIDTH):
+        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, *_OWN):
             self._keep(0.0, place)
         w.builder.store(INTEGER(0), self._next)
         place = _LEVELS
@@ -191,7 +193,7 @@ class Kernel:
         w.builder.store(w.at((number, 1), (count, 1)), self._next)
         last = w.load("rate", w.at((half, 1), (count, 2)))
         first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
-        with self._held.parts(run, number, is_held, rates, last) as (begin, width, felt):
+        with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
             # what series elements take at the beginning is looked at from the interval before
             is_first = self._arithmetic.compare("==", begin, 0.0)

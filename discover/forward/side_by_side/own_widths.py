@@ -27,12 +27,19 @@ _SMALL = 1e-3
 # By how much a step is longer or shorter than the one before
 _SURE, _LONGEST, _SHORTEST, _ORDER = 0.9, 3e-4, 0.2, 5.0
 
+# Of what is left of an interval, the longest step that is taken however much its halves differ
+_OF_THE_REST = 0.1
+
 # By how much a state may still change until the end of an interval of constant rate, where it is
 # taken to be steady
 _STEADY = 1e-10
 
 # How far a rate may be from the straight line, of itself
 _STRAIGHT = 1e-9
+
+OWN = ("elapsed", "width", "own", "slope", "off", "moved")
+"""Of an interval the time that has passed, and the width that comes next; of a step its width; the
+slope of the rate; by how much halves and whole differ, and how far both went."""
 
 _EIGHT_BITS = ir.IntType(8)
 _ENOUGH = 10**9
@@ -45,9 +52,8 @@ class OwnWidths:
     ----------
     w, arithmetic
         Where it is written.
-    elapsed, width, off, moved
-        Places in the scratch array: of the time since such steps began, of the width that comes
-        next, and of what was wrong with the last and how far it went.
+    at
+        Places in the scratch array of what is `OWN`.
     state
         Where the state begins that a step changes.
     levels, modes
@@ -62,10 +68,7 @@ class OwnWidths:
         self,
         w: Writing,
         arithmetic: Arithmetic,
-        elapsed: int,
-        width: int,
-        off: int,
-        moved: int,
+        at: Sequence[int],
         state: int,
         levels: range,
         modes: int,
@@ -73,13 +76,11 @@ class OwnWidths:
         has_states: Any,
     ):
         self._w, self._arithmetic = w, arithmetic
-        self._straight = w.builder.alloca(INTEGER)
-        self._elapsed, self._width, self._state = elapsed, width, state
-        self._off_at, self._moved_at = off, moved
-        self._levels, self._modes, self._variables = levels, modes, variables
+        self._straight, self._left = (w.builder.alloca(INTEGER) for _ in range(2))
+        self._at = dict(zip(OWN, at, strict=True))
+        self._state, self._levels, self._modes = state, levels, modes
         self._numbers = 4 + variables
-        size = w.at((w.counts["modes"], self._numbers), (modes - state, 1))
-        self._size = size
+        self._size = w.at((w.counts["modes"], self._numbers), (modes - state, 1))
         # of an error of fifth order the halves have a fifteenth of what they differ by, of one of
         # third order a third
         self._further = arithmetic.chosen(has_states, 1.0 / 3.0, 1.0 / 15.0)
@@ -95,41 +96,41 @@ class OwnWidths:
         return self._w.builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
 
     def steps(self, run: Any, number: Any, half: Any) -> tuple[Any, Any]:
-        """Return how many steps of the grid are one interval, and whether they are several.
+        """Return how many steps of the grid are one interval, and whether widths in it are chosen.
 
-        One where the rate of any vector is no straight line over all of them: an instrument may
-        shape what was commanded.
+        They are where the rate of every vector is a straight line over all of them: an instrument
+        may shape what was commanded.
         """
         w, b, a = self._w, self._w.builder, self._arithmetic
         place = w.at((run, w.counts["steps"]), (number, 1))
         several = w.load("held", place)
-        first, whole = w.load("rate", half), a.splat(w.load("whole", place))
-        slope = a.divide(a.subtract(w.load("rate", w.at((half, 1), (several, 2))), first), whole)
-        most = a.multiply(_STRAIGHT, a.add(a.size(first), a.multiply(a.size(slope), whole)))
-        straight = self._straight
-        b.store(INTEGER(1), straight)
-        self._keep(0.0, self._elapsed)
-        is_several = b.icmp_signed(">", several, INTEGER(1))
-        count = b.select(is_several, several, INTEGER(0))
-        with w.loop(count, lambda: self._is_straight()) as more, a.apart():
-            width = a.splat(w.load("width", w.at((place, 1), (more, 1))))
-            begin = self._kept(self._elapsed)
-            for i, share in ((1, 0.5), (2, 1.0)):
-                line = a.add(first, a.multiply(slope, a.add(begin, a.multiply(share, width))))
-                rate = w.load("rate", w.at((half, 1), (more, 2), (i, 1)))
-                off = a.compare(">", a.size(a.subtract(rate, line)), most, of_nothing=True)
-                with b.if_then(self._any(off)):
-                    b.store(INTEGER(0), straight)
-            self._keep(a.add(begin, width), self._elapsed)
-        is_several = b.and_(is_several, self._is_straight())
-        return b.select(is_several, several, INTEGER(1)), is_several
+        b.store(INTEGER(0), self._straight)
+        with b.if_then(b.icmp_signed(">", several, INTEGER(1))), a.apart():
+            first, whole = w.load("rate", half), a.splat(w.load("whole", place))
+            change = a.subtract(w.load("rate", w.at((half, 1), (several, 2))), first)
+            slope = a.divide(change, whole)
+            most = a.multiply(_STRAIGHT, a.add(a.size(first), a.size(change)))
+            b.store(INTEGER(1), self._straight)
+            self._keep(slope, self._at["slope"])
+            self._keep(0.0, self._at["elapsed"])
+            with w.loop(several, self._is_straight) as more, a.apart():
+                width = a.splat(w.load("width", w.at((place, 1), (more, 1))))
+                begin = self._kept(self._at["elapsed"])
+                for i, share in ((1, 0.5), (2, 1.0)):
+                    line = a.add(first, a.multiply(slope, a.add(begin, a.multiply(share, width))))
+                    rate = w.load("rate", w.at((half, 1), (more, 2), (i, 1)))
+                    off = a.compare(">", a.size(a.subtract(rate, line)), most, of_nothing=True)
+                    with b.if_then(self._any(off)):
+                        b.store(INTEGER(0), self._straight)
+                self._keep(a.add(begin, width), self._at["elapsed"])
+        return b.select(self._is_straight(), several, INTEGER(1)), self._is_straight()
 
     def _is_straight(self) -> Any:
         return self._w.builder.icmp_signed("!=", self._w.builder.load(self._straight), INTEGER(0))
 
     @contextmanager
     def parts(
-        self, run: Any, number: Any, is_held: Any, rates: Sequence[Any], last: Any
+        self, run: Any, number: Any, is_own: Any, rates: Sequence[Any]
     ) -> Iterator[tuple[Any, Any, tuple[Any, ...]]]:
         """Write a step again and again until each vector has come to the end of an interval.
 
@@ -137,28 +138,24 @@ class OwnWidths:
         end.
         """
         w, b, a = self._w, self._w.builder, self._arithmetic
-        place = w.at((run, w.counts["steps"]), (number, 1))
-        width = w.load("width", place)
-        whole = a.splat(b.select(is_held, w.load("whole", place), width))
-        least = a.splat(w.load("least", place))
-        slope = a.divide(a.subtract(last, rates[0]), whole)
-        self._keep(0.0, self._elapsed)
+        place, at = w.at((run, w.counts["steps"]), (number, 1)), self._at
+        width, whole, least = (a.splat(w.load(n, place)) for n in ("width", "whole", "least"))
+        self._keep(0.0, at["elapsed"])
+        self._keep(width, at["own"])
         # after a step of the grid the rate may have changed
-        self._keep(a.chosen(is_held, a.larger(self._kept(self._width), least), 0.0), self._width)
+        known = a.chosen(is_own, a.larger(self._kept(at["width"]), least), 0.0)
+        self._keep(known, at["width"])
+        b.store(INTEGER(1), self._left)
 
         def is_left():
-            return self._any(a.builder.fcmp_ordered("<", self._kept(self._elapsed), whole))
+            return b.icmp_signed("!=", b.load(self._left), INTEGER(0))
 
-        with w.loop(b.select(is_held, INTEGER(_ENOUGH), INTEGER(1)), is_left), a.apart():
-            elapsed, width = self._kept(self._elapsed), self._kept(self._width)
-            left = a.subtract(whole, elapsed)
-            # two of one length rather than one and what it leaves
-            inside = a.smaller(width, a.multiply(0.5, left))
-            chosen = a.chosen(a.compare("<=", left, width), left, inside)
-            own = a.chosen(is_held, chosen, whole)
-            with b.if_then(is_held), a.apart():
+        with w.loop(b.select(is_own, INTEGER(_ENOUGH), INTEGER(1)), is_left), a.apart():
+            with b.if_then(is_own), a.apart():
+                self._choose(whole)
                 self._copy(0, 1)
-            with w.loop(b.select(is_held, INTEGER(3), INTEGER(1))) as part, a.apart():
+            elapsed, own = self._kept(at["elapsed"]), self._kept(at["own"])
+            with w.loop(b.select(is_own, INTEGER(3), INTEGER(1))) as part, a.apart():
                 with b.if_then(b.icmp_signed("==", part, INTEGER(1))), a.apart():
                     self._copy(0, 2)
                     self._copy(1, 0)
@@ -166,20 +163,22 @@ class OwnWidths:
                 step = a.chosen(is_half, a.multiply(0.5, own), own)
                 is_second = b.icmp_signed("==", part, INTEGER(2))
                 begin = a.chosen(is_second, a.add(elapsed, step), elapsed)
-                felt = tuple(
-                    a.chosen(
-                        is_held,
-                        a.add(
-                            rates[0],
-                            a.multiply(slope, a.add(begin, a.multiply(share, step))),
-                        ),
-                        rate,
-                    )
-                    for share, rate in zip((0.0, 0.5, 1.0), rates, strict=True)
-                )
-                yield begin, step, felt
-            with b.if_then(is_held), a.apart():
-                self._judge(whole, least, left, own, slope)
+                slope, felt = self._kept(at["slope"]), []
+                for share, rate in zip((0.0, 0.5, 1.0), rates, strict=True):
+                    then = a.add(begin, a.multiply(share, step))
+                    felt.append(a.chosen(is_own, a.add(rates[0], a.multiply(slope, then)), rate))
+                yield begin, step, tuple(felt)
+            with b.if_then(is_own), a.apart():
+                self._judge(whole, least)
+
+    def _choose(self, whole: Any) -> None:
+        """Write how long the next step is."""
+        a = self._arithmetic
+        left = a.subtract(whole, self._kept(self._at["elapsed"]))
+        width = self._kept(self._at["width"])
+        # two of one length rather than one and what it leaves
+        inside = a.smaller(width, a.multiply(0.5, left))
+        self._keep(a.chosen(a.compare("<=", left, width), left, inside), self._at["own"])
 
     def _copy(self, source: int, target: int) -> None:
         w = self._w
@@ -188,38 +187,44 @@ class OwnWidths:
             value = self._kept(w.at((at, 1), (self._size, source)))
             self._keep(value, w.at((at, 1), (self._size, target)))
 
-    def _judge(self, whole: Any, least: Any, left: Any, width: Any, slope: Any) -> None:
+    def _judge(self, whole: Any, least: Any) -> None:
         """Write which vectors take the step, and how long the next one is."""
-        w, a = self._w, self._arithmetic
+        w, b, a, at = self._w, self._w.builder, self._arithmetic, self._at
         off, moved = self._differences()
-        taken = a.compare("<=", off, 1.0)
-        # not shorter than what the grid would take, and what is no number needs no care
+        elapsed, width, known = (self._kept(at[name]) for name in ("elapsed", "own", "width"))
+        left = a.subtract(whole, elapsed)
+        # towards the end of an interval the tolerance alone counts
+        least = a.smaller(least, a.multiply(_OF_THE_REST, left))
+        # where anything is no number no step is short enough
+        taken = a.both("or", a.compare("<=", off, 1.0), a.compare("!=", off, off, of_nothing=True))
         taken = a.both("or", taken, a.compare("<=", width, least, of_nothing=True))
-        taken = a.both("or", taken, a.compare("!=", off, off, of_nothing=True))
         with w.loop(self._size) as number, a.apart():
-            at = w.at((number, 1), (self._state, 1))
-            before, once = (self._kept(w.at((at, 1), (self._size, i))) for i in (1, 2))
-            twice = self._kept(at)
+            place = w.at((number, 1), (self._state, 1))
+            before, once = (self._kept(w.at((place, 1), (self._size, i))) for i in (1, 2))
+            twice = self._kept(place)
             better = a.add(twice, a.multiply(self._further, a.subtract(twice, once)))
-            self._keep(a.chosen(taken, better, before), at)
-        elapsed = self._kept(self._elapsed)
+            self._keep(a.chosen(taken, better, before), place)
         ahead = a.divide(a.multiply(moved, left), width)
-        steady = a.both("and", a.compare("==", slope, 0.0), a.compare("<=", ahead, _STEADY))
-        steady = a.both("or", steady, a.compare(">=", width, left))
-        arrived = a.chosen(steady, whole, a.add(elapsed, width))
-        self._keep(a.chosen(taken, arrived, elapsed), self._elapsed)
+        arrived = a.compare("==", self._kept(at["slope"]), 0.0)
+        arrived = a.both("and", arrived, a.compare("<=", ahead, _STEADY))
+        arrived = a.both("or", arrived, a.compare(">=", width, left))
+        elapsed = a.chosen(
+            taken, a.chosen(arrived, whole, a.add(elapsed, width)), elapsed
+        )
+        self._keep(elapsed, at["elapsed"])
         factor = a.multiply(_SURE, a.power(a.add(off, _LONGEST), -1.0 / _ORDER))
         following = a.larger(a.multiply(width, a.larger(factor, _SHORTEST)), least)
-        known = self._kept(self._width)
         # what ended early at the end of an interval says nothing against a longer one
         ended = a.both("and", taken, a.compare("<", width, known))
         following = a.chosen(ended, a.larger(known, following), following)
-        self._keep(a.chosen(a.compare(">", width, 0.0), following, known), self._width)
+        self._keep(a.chosen(a.compare(">", width, 0.0), following, known), at["width"])
+        is_left = self._any(a.compare("<", elapsed, whole))
+        b.store(b.zext(is_left, INTEGER), self._left)
 
     def _differences(self) -> tuple[Any, Any]:
         """Return how far halves and whole are apart, over what they may be, and how far both went."""
         w, a = self._w, self._arithmetic
-        size, places = self._size, (self._off_at, self._moved_at)
+        size, places = self._size, (self._at["off"], self._at["moved"])
         for place in places:
             self._keep(0.0, place)
 
@@ -237,4 +242,4 @@ class OwnWidths:
             sheared = a.add(a.size(self._kept(w.at((at, 1), (3, 1)))), _SMALL)
             for i in range(self._numbers):
                 seen(w.at((at, 1), (i, 1)), sheared if i < 4 else 1.0, 1.0 / TOLERANCE)
-        return self._kept(self._off_at), self._kept(self._moved_at)
+        return tuple(self._kept(place) for place in places)

@@ -98,8 +98,7 @@ def intervals(
             if end - first >= _FEWEST:
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
-                share = _OF_HISTORY if own[first] < 0.0 else 1.0
-                least[row, first] = share * length / (end - first)
+                least[row, first] = 2.0 * length / (end - first)
     return held, whole, least
 
 
