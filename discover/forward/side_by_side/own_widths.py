@@ -34,6 +34,10 @@ _OF_THE_REST = 0.1
 # taken to be steady
 _STEADY = 1e-10
 
+# The same of what is nearly steady, the share of a step by which its halves then differ at the limit
+# of stability, and how much shorter the next one is there
+_NEARLY, _AWAY, _SHORTER = 1e-2, 0.1, 0.7
+
 # How far a rate may be from the straight line, of itself
 _STRAIGHT = 1e-9
 
@@ -214,6 +218,12 @@ class OwnWidths:
         self._keep(elapsed, at["elapsed"])
         factor = a.multiply(_SURE, a.power(a.add(off, _LONGEST), -1.0 / _ORDER))
         following = a.larger(a.multiply(width, a.larger(factor, _SHORTEST)), least)
+        # near a steady state halves and whole come closer as it does, but for steps at the limit of
+        # their stability, which keep away from it
+        keeps = a.compare(">", a.multiply(TOLERANCE, off), a.multiply(_AWAY, moved))
+        keeps = a.both("and", keeps, a.compare("<", ahead, _NEARLY))
+        shorter = a.smaller(following, a.multiply(_SHORTER, width))
+        following = a.chosen(keeps, shorter, following)
         # what ended early at the end of an interval says nothing against a longer one
         ended = a.both("and", taken, a.compare("<", width, known))
         following = a.chosen(ended, a.larger(known, following), following)
