@@ -30,8 +30,11 @@ _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 _EIGHT_BITS = ir.IntType(8)
 
-# Where in the scratch array what stands; the last few, and the modes behind them, are the state that
-# is carried from step to step
+# Where the number of steps stands, beside whether any vector is of use
+_STEPS = 1
+
+# Where in the scratch array what stands; the last few, and the modes behind them, are the state
+# that is carried from step to step
 _MISSED, _TAKEN, _SUM, _OTHER_SUM = range(4)
 _OWN = range(4, 4 + len(OWN))
 _STATE = _OWN.stop
@@ -45,6 +48,8 @@ class Kernel:
     ----------
     flags
         Which parts of it a vector needs.
+    steps_taken
+        By eight vectors at once, in all calls so far.
 
     Parameters
     ----------
@@ -62,7 +67,7 @@ class Kernel:
     """
 
     def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
-        self.flags = Flags(fluid)
+        self.flags, self.steps_taken = Flags(fluid), 0
         self._times_at = self.flags.names.index("times")
         theta = jax.ShapeDtypeStruct((fluid.size,), float)
         found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
@@ -103,7 +108,7 @@ class Kernel:
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
-        felt, goes_on = np.zeros_like(stress), np.ones(1, np.int64)
+        felt, goes_on = np.zeros_like(stress), np.zeros(2, np.int64)
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * (4 + self._variables)
@@ -115,6 +120,7 @@ class Kernel:
         # contiguous already; were one of them not, the code would read what is not its own
         laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
         self._call(runs, steps, modes, tabled, *(array.ctypes.data for array in laid))
+        self.steps_taken += int(goes_on[_STEPS])
         return stress, felt, bool(goes_on[0])
 
     def packed(self, tree: Any, of_mode: bool) -> jax.Array:
@@ -195,6 +201,8 @@ class Kernel:
         first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
+            taken = w.builder.add(w.load("goes_on", _STEPS), INTEGER(1))
+            w.store(taken, "goes_on", _STEPS)
             # what series elements take at the beginning is looked at from the interval before
             is_first = self._arithmetic.compare("==", begin, 0.0)
             taken = self._arithmetic.chosen(is_first, self._kept(_EARLIER), w.load("felt", first))

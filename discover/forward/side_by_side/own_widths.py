@@ -17,12 +17,11 @@ from discover.programs.lanes.arithmetic import INTEGER
 
 # By how much halves and whole may differ, of the stress of a mode. States of the fluid are of
 # second order where the modes are of fourth, and may differ by more
-import os
-TOLERANCE = float(os.environ.get('TOL','1e-6'))
-_OF_STATES = float(os.environ.get('OS','1e-2'))
+_TOLERANCE = 1e-6
+_OF_STATES = 1e-2
 
-# A stress over its modulus, and a structure variable, below which less than the tolerance counts
-_SMALL = 1e-3
+# A stress over its modulus, and a state of the fluid, below which less than the tolerance counts
+_SMALL, _SMALL_STATE = 1e-3, 1e-2
 
 # By how much a step is longer or shorter than the one before
 _SURE, _LONGEST, _SHORTEST, _ORDER = 0.9, 3e-4, 0.2, 5.0
@@ -34,8 +33,8 @@ _OF_THE_REST = 0.1
 # taken to be steady
 _STEADY = 1e-10
 
-# The same of what is nearly steady, the share of a step by which its halves then differ at the limit
-# of stability, and how much shorter the next one is there
+# The same of what is nearly steady, the share of a step by which its halves then differ at the
+# limit of stability, and how much shorter the next one is there
 _NEARLY, _AWAY, _SHORTER = 1e-2, 0.1, 0.7
 
 # How far a rate may be from the straight line, of itself
@@ -212,15 +211,13 @@ class OwnWidths:
         arrived = a.compare("==", self._kept(at["slope"]), 0.0)
         arrived = a.both("and", arrived, a.compare("<=", ahead, _STEADY))
         arrived = a.both("or", arrived, a.compare(">=", width, left))
-        elapsed = a.chosen(
-            taken, a.chosen(arrived, whole, a.add(elapsed, width)), elapsed
-        )
+        elapsed = a.chosen(taken, a.chosen(arrived, whole, a.add(elapsed, width)), elapsed)
         self._keep(elapsed, at["elapsed"])
         factor = a.multiply(_SURE, a.power(a.add(off, _LONGEST), -1.0 / _ORDER))
         following = a.larger(a.multiply(width, a.larger(factor, _SHORTEST)), least)
         # near a steady state halves and whole come closer as it does, but for steps at the limit of
         # their stability, which keep away from it
-        keeps = a.compare(">", a.multiply(TOLERANCE, off), a.multiply(_AWAY, moved))
+        keeps = a.compare(">", a.multiply(_TOLERANCE, off), a.multiply(_AWAY, moved))
         keeps = a.both("and", keeps, a.compare("<", ahead, _NEARLY))
         shorter = a.smaller(following, a.multiply(_SHORTER, width))
         following = a.chosen(keeps, shorter, following)
@@ -232,7 +229,7 @@ class OwnWidths:
         b.store(b.zext(is_left, INTEGER), self._left)
 
     def _differences(self) -> tuple[Any, Any]:
-        """Return how far halves and whole are apart, over what they may be, and how far both went."""
+        """Return how far halves and whole are apart, over what they may be, and how far they went."""
         w, a = self._w, self._arithmetic
         size, places = self._size, (self._at["off"], self._at["moved"])
         for place in places:
@@ -246,10 +243,10 @@ class OwnWidths:
                 self._keep(a.larger(self._kept(place), apart), place)
 
         for place in self._levels:
-            seen(place, 1e-2, _OF_STATES / TOLERANCE)
+            seen(place, _SMALL_STATE, _OF_STATES / _TOLERANCE)
         with w.loop(w.counts["modes"]) as mode, a.apart():
             at = w.at((mode, self._numbers), (self._modes, 1))
             sheared = a.add(a.size(self._kept(w.at((at, 1), (3, 1)))), _SMALL)
             for i in range(self._numbers):
-                seen(w.at((at, 1), (i, 1)), sheared if i < 4 else 1.0, 1.0 / TOLERANCE)
+                seen(w.at((at, 1), (i, 1)), sheared if i < 4 else 1.0, 1.0 / _TOLERANCE)
         return tuple(self._kept(place) for place in places)

@@ -6,6 +6,7 @@ which is called only where a vector asks for it.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
@@ -30,9 +31,9 @@ _MANY = 8
 # Of the runs that were laid out for the kernel
 _KEPT = 8
 
-# Steps of the grid from which on vectors choose their own, and how much shorter these may become in
-# a steady flow before the record, whose beginning the grid does not resolve
-_FEWEST, _OF_HISTORY = 8, 0.05
+# Steps of the grid from which on vectors choose their own, and as how many of them a step may
+# always be long: two halves, extrapolated, err no more than two steps of the grid
+_FEWEST, _ALWAYS = 8, 2.0
 
 _OF_RUNS = ("last", "held", "width", "whole", "least", "jump", "flow", "weight", "recorded")
 
@@ -94,11 +95,11 @@ def intervals(
         starts = np.searchsorted(own, 0.0)
         ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
         ends = ends[ends <= last[row]]
-        for first, end in zip(ends[:-1], ends[1:], strict=True):
+        for first, end in pairwise(ends):
             if end - first >= _FEWEST:
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
-                least[row, first] = 2.0 * length / (end - first)
+                least[row, first] = _ALWAYS * length / (end - first)
     return held, whole, least
 
 
