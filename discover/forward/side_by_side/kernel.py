@@ -201,8 +201,7 @@ class Kernel:
         first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
-            taken = w.builder.add(w.load("goes_on", _STEPS), INTEGER(1))
-            w.store(taken, "goes_on", _STEPS)
+            w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
             # what series elements take at the beginning is looked at from the interval before
             is_first = self._arithmetic.compare("==", begin, 0.0)
             taken = self._arithmetic.chosen(is_first, self._kept(_EARLIER), w.load("felt", first))

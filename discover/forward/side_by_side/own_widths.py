@@ -198,9 +198,8 @@ class OwnWidths:
         left = a.subtract(whole, elapsed)
         # towards the end of an interval the tolerance alone counts
         least = a.smaller(least, a.multiply(_OF_THE_REST, left))
-        # where anything is no number no step is short enough
-        taken = a.both("or", a.compare("<=", off, 1.0), a.compare("!=", off, off, of_nothing=True))
-        taken = a.both("or", taken, a.compare("<=", width, least, of_nothing=True))
+        taken = a.compare("<=", width, least, of_nothing=True)
+        taken = a.both("or", taken, a.compare("<=", off, 1.0))
         with w.loop(self._size) as number, a.apart():
             place = w.at((number, 1), (self._state, 1))
             before, once = (self._kept(w.at((place, 1), (self._size, i))) for i in (1, 2))
@@ -214,6 +213,9 @@ class OwnWidths:
         elapsed = a.chosen(taken, a.chosen(arrived, whole, a.add(elapsed, width)), elapsed)
         self._keep(elapsed, at["elapsed"])
         factor = a.multiply(_SURE, a.power(a.add(off, _LONGEST), -1.0 / _ORDER))
+        # what ran away goes on in steps of no width, and what a long step made of no number is
+        # tried again
+        factor = a.chosen(a.both("or", taken, a.compare("==", off, off)), factor, _SHORTEST)
         following = a.larger(a.multiply(width, a.larger(factor, _SHORTEST)), least)
         # near a steady state halves and whole come closer as it does, but for steps at the limit of
         # their stability, which keep away from it
@@ -229,7 +231,7 @@ class OwnWidths:
         b.store(b.zext(is_left, INTEGER), self._left)
 
     def _differences(self) -> tuple[Any, Any]:
-        """Return how far halves and whole are apart, over what they may be, and how far they went."""
+        """Return by how much halves and whole differ, over what they may, and how far they went."""
         w, a = self._w, self._arithmetic
         size, places = self._size, (self._at["off"], self._at["moved"])
         for place in places:
