@@ -6,12 +6,13 @@ which is called only where a vector asks for it.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -30,7 +31,11 @@ _MANY = 8
 # Of the runs that were laid out for the kernel
 _KEPT = 8
 
-_OF_RUNS = ("last", "width", "jump", "flow", "weight", "recorded")
+# Steps of the grid from which on vectors choose their own, and as how many of them a step may
+# always be long: two halves, extrapolated, err no more than two steps of the grid
+_FEWEST, _ALWAYS = 8, 2.0
+
+_OF_RUNS = ("last", "held", "width", "whole", "least", "jump", "flow", "weight", "recorded")
 
 
 class _Runs(NamedTuple):
@@ -42,6 +47,9 @@ class _Runs(NamedTuple):
         How many steps of each are taken.
     width, jump
         Of the steps, and the width up to which one only marks a jump of the rate, in s.
+    held, whole, least
+        Of how many steps that follow the commanded rate may be a straight line, from each on, how
+        long these are together, in s, and how short a vector's own may become; see `OwnWidths`.
     flow
         Kinematics of each run.
     sample
@@ -55,7 +63,10 @@ class _Runs(NamedTuple):
     """
 
     last: np.ndarray
+    held: np.ndarray
     width: np.ndarray
+    whole: np.ndarray
+    least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray
     sample: np.ndarray
@@ -64,6 +75,45 @@ class _Runs(NamedTuple):
     rate: np.ndarray
     tool_rate: np.ndarray
     in_lanes: np.ndarray
+
+
+def intervals(
+    times: Float[np.ndarray, "runs s"],
+    sample: Int[np.ndarray, "runs n"],
+    last: Int[np.ndarray, " runs"],
+    jump: Float[np.ndarray, " runs"],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each step how many from it on are one interval, its length, and the least step.
+
+    An interval ends at a sample and where a rate jumps. One of few steps is left as it is.
+    """
+    width = np.diff(times)
+    held = np.ones(width.shape, np.int64)
+    whole, least = width.copy(), width.copy()
+    for row, (own, at) in enumerate(zip(times, sample, strict=True)):
+        jumps = np.flatnonzero(width[row] <= jump[row])
+        starts = np.searchsorted(own, 0.0)
+        ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
+        ends = ends[ends <= last[row]]
+        for first, end in pairwise(ends):
+            if end - first >= _FEWEST:
+                length = own[end] - own[first]
+                held[row, first], whole[row, first] = end - first, length
+                least[row, first] = _ALWAYS * length / (end - first)
+    return held, whole, least
+
+
+def _between(
+    values: Float[np.ndarray, "runs n lanes"], part: TransientFlows
+) -> Float[np.ndarray, "runs s lanes"]:
+    """Return values at samples as straight lines between these, at all step ends."""
+    times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
+    return np.array(
+        [
+            np.stack([np.interp(own, own[at], one) for one in of_run.T], axis=-1)
+            for of_run, own, at in zip(values, times, sample, strict=False)
+        ]
+    )
 
 
 class SideBySide:
@@ -180,18 +230,20 @@ class SideBySide:
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
-        stress, felt, goes_on = self._kernel(
-            runs,
-            declared,
-            used,
-            {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
-            | {name: getattr(laid_out, name) for name in _OF_RUNS},
-        )
+        given = {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
+        given |= {name: getattr(laid_out, name) for name in _OF_RUNS}
+        stress, felt, goes_on = self._kernel(runs, declared, used, given)
         if not goes_on:
             stress[:] = np.nan
         rows = np.arange(runs)[:, None]
+        at_samples = stress[rows, laid_out.sample[:runs]]
         if not np.any(thetas[:, self._distorting]):
-            return stress[rows, laid_out.sample[:runs]]
+            return at_samples
+        if np.any(laid_out.held > 1):
+            # what alters a signal looks beyond its samples, at all steps of the grid
+            given["held"] = np.ones_like(laid_out.held)
+            stress, felt, _ = self._kernel(runs, declared, used, given)
+            stress[:runs] += _between(at_samples - stress[rows, laid_out.sample[:runs]], part)
         beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
         felt = np.where(beyond, in_lanes[:, ::2], felt)
         stress = np.where(beyond, 0.0, stress)
@@ -213,11 +265,16 @@ class SideBySide:
         np.add.at(weight, places, np.asarray(judging.weight))
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
+        jump = JUMP * times[:, -1]
+        held, whole, least = intervals(times, sample, last, jump)
         found = _Runs(
             # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
+            held,
             np.diff(times),
-            JUMP * times[:, -1],
+            whole,
+            least,
+            jump,
             self._kernel.flows(part.kinematics),
             sample,
             weight,
