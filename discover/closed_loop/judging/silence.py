@@ -49,8 +49,8 @@ def fluid_is_silent(model: AugmentedModel, batch: Batch, fit: Fit, active: Seque
             at = model.positions(effect.name)
             theta[at[0]] = 0.0
             fluid += len(at)
-    off = model.at_moduli(_OFF * declared.modulus, solvent_viscosity=0.0)
-    without = off.residuals([theta], batch)[0]
+    off = np.append(_OFF * declared.modulus, 0.0)
+    without = model.residuals([theta], batch, moduli=off[None])[0]
     weight = np.asarray(batch.weight)
     rows = judging(weight)
     lost, left = (judged_cost(r, weight) for r in (without, fit.residual))
