@@ -237,7 +237,10 @@ class AugmentedModel:
             solvent in Pa s. By default as declared. One that an error of a sweep moves may be
             negative.
         """
-        trials, out = self._trials(thetas, moduli), np.zeros((len(thetas), *batch.recorded.shape))
+        trials, out = (
+            self._trials(thetas, moduli=moduli),
+            np.zeros((len(thetas), *batch.recorded.shape)),
+        )
         for i, rows in enumerate(batch.rows):
             found = self._of_part(trials, batch, i)
             out[:, rows, : found.shape[2]] = found
@@ -248,10 +251,11 @@ class AugmentedModel:
         """Moduli of the declared modes in Pa, and behind them the viscosity of the solvent."""
         return np.append(self.declared.modulus, float(self.declared.solvent_viscosity))
 
-    def _trials(self, thetas, moduli=None) -> "_Trials":
+    def _trials(self, thetas, limits=np.inf, moduli=None) -> "_Trials":
         if moduli is None:
             moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
-        return _Trials(np.asarray(thetas, dtype=float), moduli, np.full(len(thetas), np.inf))
+        limits = np.broadcast_to(limits, len(thetas))
+        return _Trials(np.asarray(thetas, dtype=float), moduli, limits)
 
     def _of_part(
         self, trials: "_Trials", batch: Batch, number: int
@@ -346,7 +350,7 @@ class AugmentedModel:
         """
         if limits is None:
             return batch.records.residual(self.predictions(thetas, batch, moduli))
-        trials, sums = self._trials(thetas, moduli), np.zeros(len(thetas))
+        trials, sums = self._trials(thetas, limits, moduli), np.zeros(len(thetas))
         out = np.zeros((len(thetas), *batch.recorded.shape))
         # a factor may lessen what a loading leaves on the way
         ahead = np.inf if batch.records.loadings is not None else 1.0

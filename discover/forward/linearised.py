@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 _WIDTH = 1e-5
 """Of a parameter, or of its first trial, by which it is moved."""
 
+_BEYOND = 1e-3
+"""By how much a move may lengthen the residuals, whose length is an error over the record."""
+
 
 class Linearised(NamedTuple):
     """Residuals of runs at one vector of parameters, and their derivatives.
@@ -86,7 +89,9 @@ def linearised(model: "AugmentedModel", points: Sequence[Point], batch: Batch) -
             moved = point.theta.copy()
             moved[position] += width
             vectors.append(moved)
-        limits += [point.limit] * point.size
+        limits += [(np.sqrt(point.limit) + _BEYOND) ** 2] * point.size
+        if point.residual is None:
+            limits[-point.size] = point.limit
     if not vectors:
         none = (np.zeros((0, *np.shape(point.residual))) for point in points)
         return [_of(*one) for one in zip(points, none, widths, strict=True)]

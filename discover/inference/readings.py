@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, even
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.inference.modulus_errors import modulus_shifts
 from discover.statistics.noise.outliers import stray
 from discover.statistics.reading.reading_faults import Reading
@@ -37,12 +37,11 @@ def unseen_readings(
     model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit, theta: np.ndarray
 ) -> list[Reading]:
     """Return runs that no fit saw for the same question, as these parameters predict them."""
-    residual = model.residuals([theta], batch)
-    if batch.records.loadings is None:
-        columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
-    else:
+    found = model.linearise(theta, batch, fit.free)
+    columns = found.jacobian
+    if batch.records.loadings is not None:
         columns = _with_factors(model, batch, theta, fit.free)
-    return _readings(batch, runs, residual[0], columns, *_of_moduli(model, batch, theta))
+    return _readings(batch, runs, found.residual, columns, *_of_moduli(model, batch, theta))
 
 
 def beside_one_another(
@@ -78,11 +77,10 @@ def _with_factors(
     """Return changes of the weighted predictions by constants, and by factors of the loadings."""
     own, plain = batch.records.loadings, batch.without_factors()
     assert own is not None
-    residual = model.residuals([theta], plain)
-    columns = jacobians(model, plain, [theta], residual, [free])[0]
-    predicted = residual[0] + batch.recorded * batch.weight
+    found = model.linearise(theta, plain, free)
+    predicted = found.residual + batch.recorded * batch.weight
     factors = np.where(np.asarray(own.members)[..., None], predicted, 0.0)
-    return np.concatenate([columns, factors])
+    return np.concatenate([found.jacobian, factors])
 
 
 def _readings(

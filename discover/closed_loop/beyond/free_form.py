@@ -22,7 +22,7 @@ from discover.dataset import Run
 from discover.forward import Batch
 from discover.inference.evidence import INDISTINGUISHABLE, WINDOW, criterion
 from discover.inference.fit_uncertainty import covariance_and_noise
-from discover.inference.least_squares import gauss_newton_step, jacobians, room_of
+from discover.inference.least_squares import gauss_newton_step, room_of
 from discover.statistics.residual import judged_cost, summarise
 
 KNOTS = (6, 14)
@@ -134,7 +134,7 @@ def _fitted(
     scale = np.where(seen, weight, 1.0)
     free = tuple(search.positions(effects))
     theta, at = start.copy(), list(free)
-    residual = model.residuals([theta], batch)[0]
+    residual, slopes, _ = model.linearise(theta, batch, free)
     if not np.all(np.isfinite(residual)):
         return None
     # of a few rates any function is one, and says nothing between them
@@ -155,7 +155,6 @@ def _fitted(
     for _ in range(_STEPS):
         if not free:
             break
-        slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
         if not np.all(np.isfinite(slopes)):
             return None
         rows = np.concatenate([slopes, np.moveaxis(changed, -1, 0)])
@@ -167,18 +166,17 @@ def _fitted(
             trial = theta.copy()
             moved = theta[at] + step * 0.5**halving
             trial[at] = np.clip(moved, model.low[at], model.high[at])
-            tried = model.residuals([trial], batch)[0]
-            if not np.all(np.isfinite(tried)):
+            tried = model.linearise(trial, batch, free)
+            if not np.all(np.isfinite(tried.residual)):
                 continue
-            found = completed(tried)
+            found = completed(tried.residual)
             if np.sum(found[1] ** 2) < before:
-                theta, residual, (best, left, changed) = trial, tried, found
+                theta, (residual, slopes, _), (best, left, changed) = trial, tried, found
                 break
         else:
             break
         if 1.0 - float(np.sum(left**2)) / before < _SETTLED:
             break
-    slopes = jacobians(model, batch, [theta], residual[None], [free])[0]
     design = np.concatenate([slopes, np.moveaxis(changed, -1, 0)])
     if not np.all(np.isfinite(design)):
         return None

@@ -7,9 +7,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.closed_loop.judging.numerical_resolution import NumericalResolution
-from discover.forward import AugmentedModel, Batch, even
+from discover.forward import AugmentedModel, Batch, Linearised, even
 from discover.inference.fit_uncertainty import covariance_and_noise
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.statistics import root_of
 from discover.statistics.unseen import Unseen
 
@@ -46,46 +46,35 @@ def held_out(
     resolution: NumericalResolution,
 ) -> HeldOut:
     """Return what a final model leaves of runs that no fit saw."""
-    residual = model.residuals([theta], resolution.batch)
-    rows = range(len(residual[0]))
-    unseen = unseen_rows(model, (batch, fit), theta, resolution.batch, residual, rows)
-    return HeldOut(residual[0], resolution, unseen)
+    found = model.linearise(theta, resolution.batch, fit.free)
+    rows = range(len(found.residual))
+    unseen = unseen_rows((batch, fit), found, resolution.batch, rows)
+    return HeldOut(found.residual, resolution, unseen)
 
 
 def unseen_rows(
-    model: AugmentedModel,
-    fitted: tuple[Batch, Fit],
-    theta: np.ndarray,
-    batch: Batch,
-    residual: Float[np.ndarray, "1 runs n"],
-    rows: Iterable[int],
+    fitted: tuple[Batch, Fit], found: Linearised, batch: Batch, rows: Iterable[int]
 ) -> Unseen:
     """Return what a model leaves of some runs that a fit did not see.
 
     Parameters
     ----------
-    model
-        The model.
     fitted
         The runs that were fitted, and the fit, which says how uncertain the constants are.
-    theta
-        The parameters that predict.
-    batch, residual
-        Runs, and what these parameters leave of them.
+    found, batch
+        What the parameters that predict leave of runs, with derivatives by what was fitted.
     rows
         Those of the runs that are asked about.
     """
-    derivative = np.zeros((0, *residual[0].shape))
     root, correlation = np.zeros((0, 0)), np.ones(1)
     if fitted[1].free:
-        derivative = jacobians(model, batch, [theta], residual, [fitted[1].free])[0]
         root, correlation = root_of_covariance(*fitted)
-    columns = np.tensordot(root, derivative, axes=(0, 0))
+    columns = np.tensordot(root, found.jacobian, axes=(0, 0))
     weight, records = np.asarray(batch.weight), np.asarray(batch.recorded)
     kept = {i: weight[i] > 0 for i in rows}
     sizes = {i: even(weight[i, seen]) for i, seen in kept.items()}
     return Unseen(
-        [residual[0, i, seen] / weight[i, seen] / sizes[i] for i, seen in kept.items()],
+        [found.residual[i, seen] / weight[i, seen] / sizes[i] for i, seen in kept.items()],
         [records[i, seen] / sizes[i] for i, seen in kept.items()],
         [columns[:, i, seen] / weight[i, seen] / sizes[i] for i, seen in kept.items()],
         correlation,

@@ -127,9 +127,10 @@ def _of_rows(
 ) -> tuple[float, float]:
     """Return the error of runs by a fit to the others, and how well its constants suit them."""
     model, batch = problem.model, problem.batch
-    residual = model.residuals([other.theta], batch)
-    if not np.all(np.isfinite(residual[0, rows])):
+    found = model.linearise(other.theta, batch, other.free)
+    left = found.residual[list(rows)]
+    if not np.all(np.isfinite(left)):
         return np.inf, 0.0
-    error = float(np.mean(np.sqrt(np.sum(residual[0, rows] ** 2, axis=1))))
-    unseen = unseen_rows(model, (rest.batch, other), other.theta, batch, residual, rows)
+    error = float(np.mean(np.sqrt(np.sum(left**2, axis=1))))
+    unseen = unseen_rows((rest.batch, other), found, batch, rows)
     return error, unseen.moved()[1]

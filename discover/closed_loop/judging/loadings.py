@@ -12,9 +12,9 @@ from jaxtyping import Float
 
 from discover.closed_loop.judging.judgement import Judgement
 from discover.dataset import Run
-from discover.forward import AugmentedModel, Batch, names_of_loadings
+from discover.forward import AugmentedModel, Batch, names_of_loadings, widths_of
 from discover.inference.fit_uncertainty import uncertainty
-from discover.inference.least_squares import Fit, widths_of
+from discover.inference.least_squares import Fit
 from discover.inference.modulus_errors import modulus_shifts, response
 from discover.statistics import HALF_BAND
 from discover.statistics.noise.independent_samples import independent_samples

@@ -15,7 +15,6 @@ from discover.closed_loop.judging.tolerated_misfit import ToleratedMisfit
 from discover.dataset import Run
 from discover.effects import AbstractEffect, simplest_terms
 from discover.forward import AugmentedModel, Batch
-from discover.inference.least_squares import jacobians
 from discover.statistics.projection import rms, without
 from discover.statistics.reading.any_correlation import probability_over_correlations
 from discover.statistics.reading.loadings import ADVICE
@@ -100,7 +99,7 @@ def _of_terms(
         values[asked.positions(effect.name)] = theta[model.positions(effect.name)]
     plain, weight = batch.without_factors(), np.asarray(batch.weight)
     positions = [asked.positions(term.name)[0] for term in terms]
-    changes = jacobians(asked, plain, [values], asked.residuals([values], plain), [positions])[0]
+    changes = asked.linearise(values, plain, positions).jacobian
     rows = []
     for i, (run, size) in enumerate(zip(session.runs, session.weights, strict=True)):
         seen = weight[i] > 0

@@ -9,7 +9,7 @@ from discover.dataset import Run
 from discover.dataset.run_table import kind_of_record
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, Batch
 from discover.inference.fit_uncertainty import sequences_of
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.statistics import Sized, Told, told_by_tests
 
 
@@ -66,8 +66,7 @@ def _constants(model: AugmentedModel, fit: Fit, effects: Sequence[str]) -> list[
 
 
 def _predictions(model, fit, batch: Batch, runs: Sequence[Run]) -> list[Sized]:
-    residual = model.residuals([fit.theta], batch)
-    slopes = jacobians(model, batch, [fit.theta], residual, [fit.free])[0]
+    slopes = model.linearise(fit.theta, batch, fit.free).jacobian
     found = []
     for i, run in enumerate(runs):
         seen = np.asarray(batch.weight)[i] > 0

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 from scipy.optimize import fminbound
 
 from discover.forward import AugmentedModel, Batch
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.statistics import independent_samples
 
 _DECADES = 6.0
@@ -130,5 +130,4 @@ def signatures(
 ) -> Float[np.ndarray, "effects runs n"]:
     """Return what a small amount of each effect changes in the weighted residuals, over it."""
     at = tuple(model.positions(name)[0] for name in effects)
-    residual = model.residuals([fit.theta], batch)
-    return jacobians(model, batch, [fit.theta], residual, [at])[0]
+    return model.linearise(fit.theta, batch, at).jacobian

@@ -13,7 +13,7 @@ from discover.closed_loop.explanations.bands.widening import widening
 from discover.closed_loop.explanations.beam import Carried
 from discover.closed_loop.judging.held_out import root_of_covariance
 from discover.forward import AugmentedModel, Batch
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.inference.modulus_errors import modulus_shifts, response
 from discover.statistics.mixed_normals import quantile
 from discover.statistics.projection import rms
@@ -111,12 +111,12 @@ def _distribution(
     weight, recorded = np.asarray(batch.weight), np.asarray(batch.recorded)
     seen = weight > 0
     scale = np.where(seen, weight, 1.0)
-    residual = model.residuals([fit.theta], batch)
+    residual, jacobian, _ = model.linearise(fit.theta, batch, fit.free)
     if not np.all(np.isfinite(residual)):
         return None
     variance = square / scale**2
     if root is not None:
-        slope = jacobians(model, batch, [fit.theta], residual, [fit.free])[0] / scale
+        slope = jacobian / scale
         columns = np.tensordot(root, np.where(np.isfinite(slope), slope, 0.0), axes=(0, 0))
         variance = variance + np.sum(columns**2, axis=0)
         if off is not None:
@@ -125,7 +125,7 @@ def _distribution(
     samples = np.maximum(np.count_nonzero(seen, axis=1), 1)
     # of a flow curve or sweep each sample has the noise that it is weighted by
     size = np.where(seen, 1.0 / (scale * np.sqrt(samples)[:, None]), 0.0)
-    mean = np.where(seen, residual[0] / scale + recorded, 0.0)
+    mean = np.where(seen, residual / scale + recorded, 0.0)
     return mean, np.sqrt(variance + (left * size) ** 2)
 
 

@@ -49,11 +49,14 @@ def refuse(search: CurrentModel) -> str:
         )
         if not (reason or open_):
             continue
+        without = search.without(name)
+        if not without.usable:
+            continue  # it checks a law that runs away without it
         if open_:
             search.left_open.add(name)
         search.not_named[name] = reason or open_
         search.refused.add(name)
-        search.take(search.without(name), [other for other in search.active if other != name])
+        search.take(without, [other for other in search.active if other != name])
         return name
     return ""
 
