@@ -1,4 +1,4 @@
-"""Residuals and their derivatives by differences: a vector and those moved from it, side by side."""
+"""Residuals and their derivatives by differences, of vectors side by side."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
