@@ -21,7 +21,12 @@ from discover.effects.library_term import (
     simplest_terms,
 )
 from discover.effects.mode_dependence import BY_MODE, ModeDependence
-from discover.effects.registry import effects_table, make_effect, named_effects
+from discover.effects.registry import (
+    built_in_effects,
+    effects_table,
+    make_effect,
+    named_effects,
+)
 from discover.effects.written_state import WrittenState
 
 __all__ = [
@@ -39,6 +44,7 @@ __all__ = [
     "SignalEffect",
     "StateEffect",
     "WrittenState",
+    "built_in_effects",
     "effects_table",
     "known_effects",
     "library_effects",

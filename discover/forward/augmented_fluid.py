@@ -1,6 +1,6 @@
 """The fluid that a vector of parameters is: a declared law with effects, as integrators take it."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -52,8 +52,8 @@ class AugmentedFluid:
     ----------
     slices
         Where the parameters of each effect stand in the vector, by name.
-    instants
-        Where the instants of steps of the rate stand.
+    of_effects, instants
+        Where the parameters of all effects stand, and the instants of steps of the rate.
     size
         Length of the vector.
     series
@@ -68,9 +68,12 @@ class AugmentedFluid:
         position = max(
             [2 + len(structure.free_parameters), *(end for *_, end in structure.by_mode)]
         )
+        first = position
         for effect in effects:
             self.slices[effect.name] = slice(position, position + len(effect.parameters))
             position += len(effect.parameters)
+        self.of_effects = slice(first, position)
+        self._amplitudes = np.array([self.slices[e.name].start for e in effects], dtype=int)
         self.instants = slice(position, position + structure.step_instants)
         self.size = self.instants.stop
         self.constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
@@ -91,6 +94,10 @@ class AugmentedFluid:
     def values(self, theta, effect: AbstractEffect):
         """Return the parameters of an effect."""
         return theta[self.slices[effect.name]]
+
+    def present(self, thetas: Float[Array, "*trials p"] | np.ndarray) -> Any:
+        """Return of each effect whether its amplitude is not zero, in one of several vectors."""
+        return (thetas.reshape(-1, self.size)[:, self._amplitudes] != 0.0).any(axis=0)
 
     def in_use(self, theta: np.ndarray) -> InUse:
         """Return the branches that a parameter vector takes."""

@@ -26,7 +26,7 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
-from discover.forward.side_by_side import Kernel, SideBySide
+from discover.forward.side_by_side import SideBySide, kernel_of
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -53,7 +53,13 @@ class Program:
 
     def __init__(self, structure: Structure):
         self.fluid = AugmentedFluid(structure)
-        kinematic = [e for e in structure.effects if isinstance(e, KinematicEffect)]
+        self._number = {effect.name: i for i, effect in enumerate(structure.effects)}
+        still = KinematicEffect.felt_rate
+        kinematic = [
+            e
+            for e in structure.effects
+            if isinstance(e, KinematicEffect) and type(e).felt_rate is not still
+        ]
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
@@ -94,7 +100,7 @@ class Program:
         kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
         if kind not in self._kernels:
             try:
-                kernel = Kernel(self.fluid, numbers, flow)
+                kernel = kernel_of(self.fluid, numbers, flow)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
@@ -145,7 +151,8 @@ class Program:
         limit,
     ):
         flow = run.kinematics
-        rate, tool_rate = self._rates(theta, run)
+        present = self.fluid.present(theta)
+        rate, tool_rate = self._rates(theta, present, run)
         times = run.times[::2]
         dynamics = self.fluid.dynamics(
             numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
@@ -161,10 +168,13 @@ class Program:
         judged = Judged(weight, recorded, beside, limit)
         stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._at_samples(theta, run, stress, felt, tool_rate)
+        return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
-    def _rates(self, theta, run: TransientFlows):
-        """Return the rate that the fluid feels, at half steps, and that of the tool at steps."""
+    def _rates(self, theta, present, run: TransientFlows):
+        """Return the rate that the fluid feels, at half steps, and that of the tool at steps.
+
+        What effects do is computed where they are present, in one of the vectors at least.
+        """
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -174,22 +184,36 @@ class Program:
         rate = run.commanded_rate
         if run.steps is not None:
             rate = run.steps.in_rate(rate, run.times, theta[self.fluid.instants])
-        for effect in self._upstream:
-            changed = effect.felt_rate(self.fluid.values(theta, effect), instrument_times, rate)
-            rate = where_in_shear(flow, changed, rate)
-        tool_rate = rate[::2]
-        for effect in self._downstream:
-            changed = effect.felt_rate(self.fluid.values(theta, effect), instrument_times, rate)
-            rate = where_in_shear(flow, changed, rate)
-        return rate, tool_rate
 
-    def _at_samples(self, theta, run: TransientFlows, stress, felt, tool_rate):
+        def shaped(rate, effects):
+            for effect in effects:
+
+                def felt(rate, effect=effect):
+                    values = self.fluid.values(theta, effect)
+                    changed = effect.felt_rate(values, instrument_times, rate)
+                    return where_in_shear(flow, changed, rate)
+
+                rate = jax.lax.cond(
+                    present[self._number[effect.name]], felt, lambda rate: rate, rate
+                )
+            return rate
+
+        upstream = shaped(rate, self._upstream)
+        return shaped(upstream, self._downstream), upstream[::2]
+
+    def _at_samples(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
         """Return the recorded stress at the samples, of that at all steps before the signal."""
+        times = run.times[::2]
         for effect in self._signal:
-            record = Record(
-                run.times[::2], felt, stress, run.clock_factor, run.strain_before, tool_rate
+
+            def distorted(stress, effect=effect):
+                strain = run.strain_before
+                record = Record(times, felt, stress, run.clock_factor, strain, tool_rate)
+                return self._as_recorded(theta, effect, record, run.kinematics)
+
+            stress = jax.lax.cond(
+                present[self._number[effect.name]], distorted, lambda stress: stress, stress
             )
-            stress = self._as_recorded(theta, effect, record, run.kinematics)
         return stress[run.sample_index]
 
     def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):

@@ -1,6 +1,6 @@
 """Many vectors at once are predicted as each is by the program that takes them one by one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -13,6 +13,8 @@ from discover.effects.library_term import library_effects
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
 from discover.forward.program import Program
+from discover.programs.lanes import Writing
+from discover.programs.program_cache import Compiled
 from discover.protocols import oscillatory_shear, start_up
 from discover.protocols.protocol import in_flow
 
@@ -117,3 +119,81 @@ def test_an_effect_that_lanes_do_not_know_is_predicted_all_the_same():
     exact = 50.0 * 0.5 * 1.0 * (1.0 - np.exp(-times / 1.0))
     # the error of the steps that a loop takes
     np.testing.assert_allclose(model.predict(theta, batch)[0], exact, rtol=1e-5)
+
+
+def counted(monkeypatch):
+    """Return lists to which kernels and programs that are made from here on are added."""
+    kernels, programs = [], []
+    write, made = Writing.compiled, Compiled._made
+    monkeypatch.setattr(Writing, "compiled", lambda self: kernels.append(1) or write(self))
+    monkeypatch.setattr(
+        Compiled, "_made", lambda self, *of: programs.append(self) or made(self, *of)
+    )
+    return kernels, programs
+
+
+def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
+    batch, declared = make_batch(runs()), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
+
+    def predicted(declared, *names):
+        model = AugmentedModel(declared, [make_effect(name) for name in names])
+        theta = model.zero()
+        for name in names:
+            theta[model.positions(name)] = model.first_trial[model.positions(name)]
+        return model.predict(theta, batch)
+
+    predicted(declared, "giesekus_mobility", "rate_rise_time", "transducer_lag")
+    kernels, programs = counted(monkeypatch)
+    predicted(declared, "thixotropy", "stress_gain", "wall_slip", TERMS[0], "relaxation_mode")
+    predicted(replace(declared, fit_modulus=True), "ptt_exponential")
+    assert (len(kernels), len(programs)) == (0, 0)
+    # negative control: an effect of a user's own is none of those that stand in every kernel
+    model = AugmentedModel(declared, [replace(make_effect("giesekus_mobility"), name="of_my_own")])
+    model.predict(model.zero(), batch)
+    assert (len(kernels), len(programs)) == (1, 1)
+
+
+def test_other_free_constants_of_a_law_share_the_code(monkeypatch):
+    batch = make_batch(runs()[:2])
+    constants = {"epsilon": 0.2, "xi": 0.1}
+
+    def predicted(*free):
+        model = AugmentedModel(
+            DeclaredModel.named("ptt_linear_non_affine", constants, [60.0, 20.0], [0.1, 2.0], free),
+            [],
+        )
+        return model.predict(model.zero(), batch)
+
+    one = predicted("epsilon")
+    kernels, _ = counted(monkeypatch)
+    np.testing.assert_allclose(predicted("xi", "epsilon"), one, rtol=1e-12)
+    assert not kernels
+
+
+def test_a_linearised_model_has_the_derivatives_of_the_closed_form():
+    moduli, times = np.array([60.0, 20.0]), np.array([0.1, 2.0])
+    declared = DeclaredModel.maxwell(moduli, times, solvent_viscosity=1.0, fit_modulus=True)
+    model, batch = AugmentedModel(declared, [make_effect("stress_gain")]), make_batch(runs()[:1])
+    gain = model.positions("stress_gain")[0]
+    moves = np.array([[3.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
+    found = model.linearise(model.zero(), batch, [0, gain], moves)
+    grown = 0.5 * times[:, None] * (1.0 - np.exp(-runs()[0].time / times[:, None]))
+    whole, weight = moduli @ grown, np.asarray(batch.weight)[0]
+    expected = [whole, whole + 0.5, 3.0 * grown[0], 2.0 * grown[1] + 0.5 * 0.5]
+    np.testing.assert_allclose(found.residual[0], (whole + 0.5 - 50.0) * weight, rtol=1e-5)
+    # the error of the steps that a loop takes, and of a difference of one side
+    for column, exact in zip(found.jacobian[:, 0], expected, strict=True):
+        np.testing.assert_allclose(column, exact * weight, rtol=2e-5)
+
+
+def test_at_an_upper_end_a_derivative_is_taken_from_inside():
+    model = AugmentedModel(DeclaredModel.maxwell(50.0, 2.0), [make_effect("giesekus_mobility")])
+    batch, (at,) = make_batch(runs()[:2]), model.positions("giesekus_mobility")
+    tried, residuals = [], model.residuals
+    model.residuals = lambda thetas, *given: tried.extend(thetas) or residuals(thetas, *given)
+    theta = model.zero()
+    theta[at] = model.high[at]
+    found = model.linearise(theta, batch, [at])
+    assert max(vector[at] for vector in tried) == model.high[at]
+    assert np.all(np.isfinite(found.jacobian))
+    assert np.any(found.jacobian < 0.0)  # a larger mobility lowers the stress

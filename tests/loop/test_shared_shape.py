@@ -54,13 +54,13 @@ def test_runs_in_the_room_of_others_are_predicted_as_in_their_own(runs):
 def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
     batches = [make_batch(runs) for runs in (MANY, FEW, MANY[:2], [*MANY, *MANY])]
     shared, theta = model_of(batches[0])
-    program = shared._program
+    program, every = shared._program, shared._of_every_effect
     program.met.clear()
-    program._kernels.clear()
+    every._kernels.clear()
     for batch in batches:
         shared.predict(theta, batch)
     # one kernel for all of them, and no program for vectors one by one
-    assert (len(program._kernels), len(program.met)) == (1, 0)
+    assert (len(every._kernels), len(program.met)) == (1, 0)
 
 
 def test_longer_runs_stay_as_they_are():

@@ -51,10 +51,10 @@ def followed(monkeypatch, model):
     """Return a list to which the number of vectors is added whenever a sweep is followed."""
     counts, of_part = [], model._of_part
 
-    def counting(thetas, batch, number, *limits):
+    def counting(trials, batch, number):
         if isinstance(batch.parts[number], PeriodicFlows):
-            counts.append(len(thetas))
-        return of_part(thetas, batch, number, *limits)
+            counts.append(len(trials.thetas))
+        return of_part(trials, batch, number)
 
     monkeypatch.setattr(model, "_of_part", counting)
     return counts
@@ -123,10 +123,12 @@ def test_a_transient_is_left_where_it_misses_too_much(start_ups):
     costs = np.sum(model.residuals([right, maxwell], batch) ** 2, axis=(1, 2))
     assert costs[0] < 1e-6 < 1.0 < costs[1]
     limits = np.array([0.1, 0.1])
-    whole = model._of_part([right, maxwell], batch, 0)
+    whole = model._of_part(model._trials([right, maxwell]), batch, 0)
     # beside one that is of use it is followed along, which costs nothing, and alone it is not
-    np.testing.assert_array_equal(model._of_part([right, maxwell], batch, 0, limits)[0], whole[0])
-    assert not np.any(np.isfinite(model._of_part([maxwell], batch, 0, limits[:1])))
+    beside = model._of_part(model._trials([right, maxwell], limits), batch, 0)
+    np.testing.assert_array_equal(beside[0], whole[0])
+    alone = model._of_part(model._trials([maxwell], limits[:1]), batch, 0)
+    assert not np.any(np.isfinite(alone))
     both = model.residuals([right, maxwell], batch, limits)
     assert np.all(np.isfinite(both[0]))
     assert np.all(np.isinf(both[1]))
@@ -137,8 +139,8 @@ def test_a_transient_whose_record_is_altered_afterwards_is_followed_to_the_end(s
     model, batch = start_ups
     theta = model.zero()
     theta[model.positions("stress_gain")[0]] = 1e-6
-    found = model._of_part([theta], batch, 0, np.array([0.1]))
-    np.testing.assert_array_equal(found, model._of_part([theta], batch, 0))
+    found = model._of_part(model._trials([theta], np.array([0.1])), batch, 0)
+    np.testing.assert_array_equal(found, model._of_part(model._trials([theta]), batch, 0))
 
 
 def test_fits_to_transients_are_those_of_trials_followed_to_the_end(start_ups, monkeypatch):

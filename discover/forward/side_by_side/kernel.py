@@ -15,7 +15,7 @@ import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.own_widths import OWN, OwnWidths
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
 from discover.programs.lanes.arithmetic import INTEGER
@@ -40,16 +40,12 @@ _OWN = range(4, 4 + len(OWN))
 _STATE = _OWN.stop
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
+_MADE: dict[tuple, "Kernel"] = {}
+_KEPT = 16
 
-class Kernel:
-    """Machine code for one structure of law and effects, with numbers and runs as data.
 
-    Attributes
-    ----------
-    flags
-        Which parts of it a vector needs.
-    steps_taken
-        By eight vectors at once, in all calls so far.
+def kernel_of(fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None) -> "Kernel":
+    """Return the machine code for a fluid, made once for all whose constants alone differ.
 
     Parameters
     ----------
@@ -65,12 +61,53 @@ class Kernel:
     NotTranslatable
         If a law or an effect does what is not known in lanes.
     """
+    theta = jax.ShapeDtypeStruct((fluid.size,), float)
+    found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
+    structure = fluid.structure.without_constants()
+    kinds = [
+        leaf.shape[axes:] if isinstance(leaf, jax.ShapeDtypeStruct) else leaf
+        for tree, axes in zip(found, (1, 0), strict=True)
+        for leaf in jax.tree.leaves(tree)
+    ]
+    key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow))
+    if key not in _MADE:
+        _MADE[key] = Kernel(AugmentedFluid(structure), *found, flow)
+        for earliest in list(_MADE)[:-_KEPT]:
+            del _MADE[earliest]
+    return _MADE[key]
 
-    def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
+
+class Kernel:
+    """Machine code for the effects of a fluid and a law, with all constants and runs as data.
+
+    Attributes
+    ----------
+    flags
+        Which parts of it a vector needs.
+    steps_taken
+        By eight vectors at once, in all calls so far.
+
+    Parameters
+    ----------
+    fluid
+        The effects, of a structure without constants of the law.
+    of_mode, shared
+        Shapes of what is data to it; see `laid_out`.
+    flow
+        Kinematics of one run; None where all are simple shear.
+
+    Raises
+    ------
+    NotTranslatable
+        If a law or an effect does what is not known in lanes.
+    """
+
+    def __init__(
+        self, fluid: AugmentedFluid, of_mode: Mode, shared: Shared, flow: Kinematics | None
+    ):
         self.flags, self.steps_taken = Flags(fluid), 0
         self._times_at = self.flags.names.index("times")
-        theta = jax.ShapeDtypeStruct((fluid.size,), float)
-        found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
+        found = of_mode, shared
         of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
         self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
         law = eqx.combine(found[0].law, found[1].law)

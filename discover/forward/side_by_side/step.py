@@ -43,7 +43,10 @@ class Mode(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """What all modes share: parameters, the law but for what differs, viscosity of the solvent."""
+    """What all modes share: parameters of effects, the law but for what differs, the solvent.
+
+    The former as the vector of a structure without constants of the law.
+    """
 
     theta: Any
     law: Any
@@ -62,9 +65,10 @@ def laid_out(fluid: AugmentedFluid, numbers: Numbers, theta) -> tuple[Mode, Shar
         time = jnp.append(time, extra.relaxation_time)
         factor = jnp.append(factor, jnp.ones(len(extra.modulus)))
     own, common = apart(law)
+    of_effects = jnp.concatenate([theta[:2], theta[fluid.of_effects]])
     return (
         Mode(modulus, time, factor, amplitudes, own),
-        Shared(theta, common, numbers.solvent_viscosity),
+        Shared(of_effects, common, numbers.solvent_viscosity),
     )
 
 

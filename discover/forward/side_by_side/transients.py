@@ -20,7 +20,7 @@ from discover.forward.batches import Records, TransientFlows
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.with_effects import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.step import WEIGHTS, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Flags, laid_out
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
@@ -124,10 +124,10 @@ class SideBySide:
     fluid, kernel
         The fluid with its effects, and its machine code.
     rates
-        Of a vector and a run, the felt rate at ends and middles of steps, without what series
-        elements take, and the tool's rate at ends.
+        Of a vector, the effects that are present, and a run: the felt rate at ends and middles of
+        steps, without what series elements take, and the tool's rate at ends.
     recorded
-        Of a vector, a run, the stress, the felt rate and the tool's, what is recorded at samples.
+        Of these, the stress, the felt rate and the tool's, what is recorded at samples.
     made_from
         What tells these from those of another structure.
     """
@@ -140,28 +140,29 @@ class SideBySide:
         recorded: Callable,
         made_from: tuple,
     ):
-        self._kernel = kernel
+        self._fluid, self._kernel, self._flags = fluid, kernel, Flags(fluid)
         effects, at = fluid.structure.effects, fluid.slices
         still = KinematicEffect.felt_rate
         shaping = [
             e for e in effects if isinstance(e, KinematicEffect) and type(e).felt_rate is not still
         ]
         self._shaping = [at[e.name].start for e in shaping]
-        self._fits_instants = fluid.instants.stop > fluid.instants.start
         self._distorting = [at[e.name].start for e in effects if isinstance(e, SignalEffect)]
 
-        def packed(numbers: Numbers, thetas):
-            def one(theta):
-                of_mode, shared = laid_out(fluid, numbers, theta)
+        def packed(numbers: Numbers, thetas, moduli):
+            def one(theta, modulus, solvent):
+                moved = Numbers(numbers.law, modulus, numbers.relaxation_time, solvent)
+                of_mode, shared = laid_out(fluid, moved, theta)
                 return kernel.packed(of_mode, True), kernel.packed(shared, False)
 
-            return jax.vmap(one, out_axes=-1)(thetas)
+            return jax.vmap(one, out_axes=-1)(thetas, moduli[:, :-1], moduli[:, -1])
 
         self._packed = compiled(packed, made_from=("packed", *made_from))
-        over_runs = jax.vmap(rates, in_axes=(None, 0))
-        self._rates = compiled(jax.vmap(over_runs, in_axes=(0, None)), ("rates", *made_from))
-        of_runs = jax.vmap(recorded, in_axes=(None, 0, 0, 0, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, 0, 0, 0))
+        over_runs = jax.vmap(rates, in_axes=(None, None, 0))
+        of_trials = jax.vmap(over_runs, in_axes=(0, None, None))
+        self._rates = compiled(of_trials, ("rates", *made_from))
+        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0, 0))
         self._recorded = compiled(of_trials, ("recorded", *made_from))
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
@@ -170,26 +171,29 @@ class SideBySide:
         self,
         numbers: Numbers,
         thetas: Float[np.ndarray, "trials p"],
+        moduli: Float[np.ndarray, "trials c"],
+        limits: Float[np.ndarray, " trials"],
         part: TransientFlows,
         judging: Records,
         runs: int,
-        limits: Float[np.ndarray, " trials"],
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return what is recorded of the first runs.
 
         Parameters
         ----------
+        moduli
+            Of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
+        limits
+            Sums of squared residuals from which on a vector is of no use. Infinity follows it to
+            the end.
         part, judging
             Runs, and what was recorded of them.
         runs
             How many are asked for; those behind are padding.
-        limits
-            Sums of squared residuals from which on a vector is of no use. Infinity follows it to
-            the end.
         """
-        flags = self._kernel.flags.of(thetas)
+        flags = self._flags.of(thetas)
         order = np.lexsort([thetas[:, 1], *flags.T])
-        laid_out = self._runs(part, judging, thetas[0])
+        laid_out = self._runs(part, judging)
         times, counts = np.unique(thetas[:, 1], return_counts=True)
         table = self._table(numbers, part, float(times[np.argmax(counts)]), int(np.max(counts)))
         out = np.empty((len(thetas), runs, laid_out.sample.shape[1]))
@@ -198,7 +202,8 @@ class SideBySide:
             lanes = trials[np.minimum(np.arange(LANES), len(trials) - 1)]
             limit = np.where(np.arange(LANES) < len(trials), limits[lanes], -np.inf)
             used = np.any(flags[trials], axis=0)
-            found = self._eight(numbers, thetas[lanes], part, laid_out, runs, used, table, limit)
+            each = thetas[lanes], moduli[lanes], limit
+            found = self._eight(numbers, *each, part, laid_out, runs, used, table)
             out[trials] = np.moveaxis(found, -1, 0)[: len(trials)]
 
         # to compile is behind a lock, so that no first call is needed alone
@@ -209,23 +214,25 @@ class SideBySide:
         self,
         numbers: Numbers,
         thetas: np.ndarray,
+        moduli: np.ndarray,
+        limit: np.ndarray,
         part: TransientFlows,
         laid_out: _Runs,
         runs: int,
         used: np.ndarray,
         table: tuple[float, np.ndarray | None],
-        limit: np.ndarray,
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (runs, n, lanes)."""
-        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas))
+        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas, moduli))
         declared = len(numbers.modulus)
         if len(modes) > declared:
             # what effects add is left out where none of the eight has it
             absent = np.all(modes[:, 0] == 0.0, axis=-1) & (np.arange(len(modes)) >= declared)
             modes = np.ascontiguousarray(modes[~absent])
         rate, tool_rate, in_lanes = laid_out.rate, laid_out.tool_rate, laid_out.in_lanes
-        if self._fits_instants or np.any(thetas[:, self._shaping]):
-            rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, part))
+        present = self._fluid.present(thetas)
+        if part.steps is not None or np.any(thetas[:, self._shaping]):
+            rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, present, part))
             in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
@@ -248,17 +255,17 @@ class SideBySide:
         felt = np.where(beyond, in_lanes[:, ::2], felt)
         stress = np.where(beyond, 0.0, stress)
         first = (np.moveaxis(array, -1, 0) for array in (stress, felt))
-        found = np.asarray(self._recorded(thetas, part, *first, tool_rate))
+        found = np.asarray(self._recorded(thetas, present, part, *first, tool_rate))
         return np.moveaxis(found, 0, -1)[:runs]
 
-    def _runs(self, part: TransientFlows, judging: Records, theta: np.ndarray) -> _Runs:
+    def _runs(self, part: TransientFlows, judging: Records) -> _Runs:
         """Return runs as the kernel takes them, laid out once."""
         for known, by, found in self._known_runs:
             if known is part and by is judging:
                 return found
-        plain = np.tile(theta, (LANES, 1))
-        plain[:, self._shaping] = 0.0
-        rate, tool_rate = (np.asarray(array) for array in self._rates(plain, part))
+        # as commanded, where no instant at which it steps is fitted
+        rate = np.tile(np.asarray(part.commanded_rate), (LANES, 1, 1))
+        tool_rate = np.ascontiguousarray(rate[:, :, ::2])
         times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
         weight, recorded = np.zeros(times.shape), np.zeros(times.shape)
         places = (np.arange(len(times))[:, None], sample)
