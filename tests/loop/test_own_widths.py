@@ -7,7 +7,7 @@ from independent import Giesekus, JohnsonSegalman, PhanThienTanner, Structured, 
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.side_by_side import Kernel
+from discover.forward.side_by_side.kernel import Kernel
 from discover.protocols import after_steady_flow, start_up
 
 BEFORE, AFTER = 5.0, 0.5
