@@ -14,7 +14,7 @@ from discover.closed_loop.results.stages import Fold
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.progress import Progress, by_lines
+from discover.progress import Progress, by_stages
 from discover.study.data import StudyData
 
 
@@ -37,7 +37,7 @@ def run_loop_on(
         Called with a line of text now and then, and about what fraction is done.
     """
     rounds = 1 + len(data.fit) if data.each else 1
-    say = by_lines(progress, rounds * (max_effects + 1))
+    say = by_stages(progress, rounds)
     options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
     if data.each:
         return run_loop_on_each(data.dataset, declared, **options)
