@@ -75,8 +75,8 @@ def by_stages(progress: Progress | None, rounds: int = 1) -> Callable[[str], Non
     """Return what passes on the lines of searches that end by themselves, one after another.
 
     How many stages a search has is not known. The first line comes when the model it starts from is
-    fitted, after a quarter of its time; each further one halves what is left, until the next search
-    begins, which its first line shows by its beginning (the text before a colon).
+    fitted, after a quarter of its time; each further one leaves two fifths of the rest, until the
+    next search begins, which its first line shows by its beginning (the text before a colon).
     """
     begun: list[str] = []
     left = 1.0
@@ -88,7 +88,7 @@ def by_stages(progress: Progress | None, rounds: int = 1) -> Callable[[str], Non
             begun.append(name)
             left = 0.75
         else:
-            left *= 0.5
+            left *= 0.4
         (progress or silent)(line, min((len(begun) - left) / rounds, 0.95))
 
     return say
