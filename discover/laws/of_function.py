@@ -58,6 +58,8 @@ def law_of_function(
         ) from None
 
     def build(*values: ArrayLike) -> LawOfFunction:
-        return LawOfFunction(tuple(map(as_parameter, values)), function, names)
+        return LawOfFunction(
+            values=tuple(map(as_parameter, values)), function=function, names=names
+        )
 
     return build

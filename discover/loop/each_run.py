@@ -12,7 +12,7 @@ from discover.forward import DeclaredModel
 from discover.loop.loop import run_loop
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import ErrorPair, Fold
-from discover.progress import Progress, by_lines
+from discover.progress import Progress, by_stages
 from discover.study.data import StudyData
 
 
@@ -35,7 +35,7 @@ def run_loop_on(
         Called with a line of text now and then, and about what fraction is done.
     """
     rounds = 1 + len(data.fit) if data.each else 1
-    say = by_lines(progress, 3 * rounds)
+    say = by_stages(progress, rounds)
     options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
     if data.each:
         return run_loop_on_each(data.dataset, declared, **options)
