@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from discover._version import __version__ as __version__
 
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
-    from discover.loop.in_memory import close_loop as close_loop
     from discover.comparison.in_memory import compare as compare
     from discover.dataset import Dataset as Dataset
     from discover.dataset import LinearSweep as LinearSweep
@@ -37,6 +36,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_dense import TensorDense as TensorDense
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
+    from discover.loop.in_memory import close_loop as close_loop
     from discover.protocols import after_alternation as after_alternation
     from discover.protocols import after_steady_flow as after_steady_flow
     from discover.protocols import after_step_strain as after_step_strain

@@ -212,7 +212,6 @@ def fit_declared(model, dataset):
     if not model.free:
         return model
     from discover.laws import make_law
-    from discover.laws import make_law
     from discover.loop import run_loop
     from discover.study.declared_model import forward_model
 

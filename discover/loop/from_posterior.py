@@ -437,8 +437,10 @@ class Ended:
     def _in_words(self, probability: float | None) -> str:
         none = percent_of(self.posterior.unexplained)
         if self.without_fluid:
-            return "Records of noise alone, without any fluid, are as likely."
-        text = f"That something is left which has no name has a probability of {none}."
+            return "Records of noise and the bench alone, without any fluid, are as likely."
+        text = f"That something is there which has no name has a probability of {none}."
+        if self.verdict == "unexplained":
+            text = f"Some effect is still missing, or has another form. {text}"
         if probability is not None and probability < SIGNIFICANCE:
             text += f" Were it noise, a residual like this has a probability of {probability:.2g}."
         return text

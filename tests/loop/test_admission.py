@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from discover.loop.candidates import EXTRAPOLATION, admission, candidates_of
 from discover.dataset import Run
 from discover.effects import make_effect
+from discover.loop.candidates import EXTRAPOLATION, admission, candidates_of
 from discover.protocols import start_up
 
 TIMES = np.linspace(0.1, 2.0, 20)

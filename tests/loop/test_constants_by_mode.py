@@ -11,15 +11,12 @@ from independent.homogeneous import GiesekusFluid
 from modes_in_start_up import NOISE, noisy_start_ups
 
 import discover as dc
-from discover.loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
-from discover.forward import AugmentedModel, FreeParameter, make_batch
+from discover.forward import AugmentedModel, make_batch
 from discover.forward.by_mode import DEGREE
-from discover.inference.by_mode.as_fitted import _at_upper_end
-from discover.inference.by_mode.varying_constant import VaryingConstant
-from discover.inference.least_squares import Fit
+from discover.loop import DeclaredModel
 from discover.protocols import in_flow, start_up
 from discover.report.plots.by_mode import by_mode_picture
 
@@ -84,26 +81,6 @@ def test_a_mode_that_no_flow_reaches_is_not_determined():
     slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).declared_parameters["alpha"]
     assert [mode.left_open for mode in slow.modes] == [False, False, True]
     assert slow.modes[2].ci95 is None
-
-
-def test_a_constant_that_was_driven_to_the_end_of_its_range_is_left_open():
-    # a stretch ratio of 1 to 100 whose polynomial drives the fast modes far beyond the upper end:
-    # no run sees them, and their interval was 100 to 100 and "determined"
-    law = FreeParameter("q", 5.0, 1.0, 100.0)
-    places = np.array([0.0, -1.0, -2.0])
-    # link 25 s² at the mean's −3
-    nothing = np.zeros((1, 1, 1))
-    fit = Fit(np.array([5.0, 0.0, 25.0, 0.0, 0.0, 0.0]), (), nothing[0], nothing)
-    constant = VaryingConstant(law, 0, 1, places)
-    values = constant.of_modes(fit)
-    assert values[0] == pytest.approx(5.0)
-    assert list(_at_upper_end(values, law)) == [False, True, True]
-    # what data do not see goes from one end to the other, from wherever it stands
-    low, high = constant.of_modes(fit, -np.inf), constant.of_modes(fit, np.inf)
-    assert low == pytest.approx(np.ones(3), abs=1e-6)
-    assert high == pytest.approx(np.full(3, 100.0))
-    # the lower end is no effect, which data may well tell
-    assert not _at_upper_end(np.array([1.0]), law)
 
 
 @pytest.mark.slow
@@ -210,18 +187,6 @@ class Store(dict):
         self[part] = json.dumps(content)
         if content["active"]:
             raise Interrupted
-
-
-@pytest.mark.slow
-def test_an_interrupted_loop_keeps_the_degrees():
-    declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=("giesekus_mobility",))
-    options = {"effects": ["giesekus_mobility", "stress_gain"], "store": Store()}
-    with pytest.raises(Interrupted):
-        run_loop(data((0.1, 0.3, 0.6)), declared, **options)
-    again = run_loop(data((0.1, 0.3, 0.6)), declared, **options)
-    undisturbed = run_loop(data((0.1, 0.3, 0.6)), declared, effects=options["effects"])
-    assert again.stages == undisturbed.stages
-    assert again.by_mode["giesekus_mobility"].degree == 1
 
 
 @pytest.mark.slow

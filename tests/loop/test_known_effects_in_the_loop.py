@@ -5,11 +5,11 @@ import pytest
 from independent import Giesekus, start_up
 from independent.noise import white
 
-from discover.loop import run_loop
 from discover.dataset import Dataset, Run
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.forward import DeclaredModel
+from discover.loop import run_loop
 from discover.protocols import start_up as commanded
 
 MOBILITY, GAIN = 0.3, -0.1

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import KBKZ, Giesekus, oscillation, start_up
+from independent import Giesekus, oscillation, start_up
 
 import discover as dc
 from discover.dataset import Dataset, Run
@@ -14,8 +14,6 @@ from discover.forward import AugmentedModel, DeclaredModel, make_batch, names_of
 from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
 from discover.report.loop.certainty import how_sure
-from discover.report.loop.next_step import what_to_measure_next
-from discover.statistics.reading.misread import Misread
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {
@@ -121,28 +119,6 @@ def test_without_loadings_such_runs_are_unexplained(exact):
     loop = closed(data_of(exact, FACTORS), effects=EFFECTS[:1], max_effects=1)
     assert loop.verdict == "unexplained"
     assert "loading" not in loop.remaining
-
-
-def test_what_refutes_runs_read_by_factors_names_the_way_out(exact, monkeypatch):
-    factors = Misread("factor", (0.02, -0.02), 0.0, 1e-9, 50.0, np.zeros(1), [], 0.02)
-    monkeypatch.setattr(misread_runs, "clear_misreading", lambda *_: factors)
-    loop = closed(data_of(exact, {}), effects=EFFECTS[:1], max_effects=1)
-    assert loop.verdict == "unexplained"
-    assert "or let each run be a loading of its own ([loop] loading)" in what_to_measure_next(loop)
-
-
-@pytest.mark.slow
-def test_a_law_of_another_kind_is_not_explained_by_factors():
-    loop = closed(data_of(records(KBKZ(modulus=100.0)), FACTORS), loading=0.03, max_effects=1)
-    assert loop.verdict == "unexplained"
-    assert all(one["ci95"] is None for one in loop.remaining["loading"].values())
-
-
-def test_factors_larger_than_loadings_differ_by_refute(exact):
-    far = {name: 1.0 + 6.0 * (factor - 1.0) for name, factor in FACTORS.items()}
-    loop = closed(data_of(exact, far), loading=0.03)
-    assert loop.verdict == "unexplained"
-    assert "loadings would have to differ by more" in loop.remaining["description"]
 
 
 @pytest.mark.slow

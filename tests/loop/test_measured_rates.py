@@ -4,7 +4,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.dataset import Dataset, Run
 from discover.dataset.records.sequence import in_sequence
 from discover.dataset.records.thinning import thin_run
@@ -12,6 +11,7 @@ from discover.effects import Record, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus
+from discover.loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.protocols import measured_rate, start_up
 from discover.report.loop.verdict import loop_verdict
 from discover.simulate import simulate

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import odeint
 
-from discover.loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run
+from discover.loop import DeclaredModel, run_loop
 from discover.protocols import oscillatory_shear, start_up
 from discover.report.loop.verdict import loop_verdict
 

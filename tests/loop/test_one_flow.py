@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from independent import KBKZ, start_up
 from scipy.integrate import solve_ivp
 
 import discover as dc
@@ -60,35 +59,6 @@ def test_a_name_that_two_flows_tell_is_believed():
     assert loop.explanations.inclusion["giesekus_mobility"] > 0.5
     assert not loop.remaining["untested"]
     assert "Fitted, not tested" not in loop_verdict(loop)[0]
-
-
-@pytest.mark.slow
-def test_runs_that_other_searches_leave_out_in_turn_test_a_name():
-    runs = run("slow", 0.7, 0), run("fast", 2.0, 1)
-    alone, left_out = (
-        loop.explanations.inclusion["giesekus_mobility"]
-        for loop in (looped(*runs), looped(*runs, held_out="each"))
-    )
-    # one constant takes one of the two flows: (1 + 1)/(1 + 2)
-    assert alone == pytest.approx(2.0 / 3.0 * left_out, rel=0.01)
-
-
-@pytest.mark.slow
-def test_two_effects_that_two_flows_of_another_fluid_show_are_less_likely_than_not():
-    # an integral law of K-BKZ is neither a structure nor a drift, and two start-ups do not say so
-    runs = []
-    for seed, rate in enumerate((0.5, 2.0)):
-        times = np.linspace(0.1, 8.0, 80)
-        stress = KBKZ(0.25, modulus=100.0).respond(start_up(rate), times).sigma12
-        size = np.sqrt(np.mean(stress**2))
-        noise = size * np.random.default_rng([0, seed]).normal(0, 0.01, len(times))
-        rates = np.full(len(times), rate)
-        runs.append(dc.Run(f"at_{rate:g}", times, dc.start_up(rate), rates, stress + noise))
-    data = dc.Dataset("k_bkz", tuple(runs))
-    loop = dc.close_loop(data, BASE, effects=["thixotropy", "stress_drift"], max_effects=2)
-    assert {stage.effect for stage in loop.stages} == {"thixotropy", "stress_drift"}
-    assert max(loop.explanations.inclusion.values()) < 0.5
-    assert loop_verdict(loop)[0].startswith("Fitted, not tested")
 
 
 def test_a_declared_law_with_nothing_fitted_is_tested_by_any_flow():

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.forward import DeclaredModel
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
-from discover.forward import AugmentedModel, data_scales, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.inference.least_squares import fit_batch
 from discover.protocols import oscillatory_shear, shear_rates, start_up
 

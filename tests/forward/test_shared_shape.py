@@ -4,10 +4,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.forward import DeclaredModel
 from discover.dataset import Run
 from discover.effects import make_effect
-from discover.forward import AugmentedModel, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.inference.step_instants import with_places, with_rate_steps
 from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up

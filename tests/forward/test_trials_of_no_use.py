@@ -5,7 +5,6 @@ import pytest
 from independent.homogeneous import GiesekusFluid
 from independent.sweeps import giesekus_modulus
 
-from discover.closed_loop.search.scoring.attribution import attribute
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
@@ -72,34 +71,6 @@ def test_residuals_below_the_limit_are_those_without_one(problem, monkeypatch):
     # negative control: with no limit in reach all are followed
     np.testing.assert_array_equal(model.residuals(trials(model), batch, 2.0 * costs + 1.0), whole)
     assert counts == [1, 3]
-
-
-def test_ranks_and_fits_are_those_of_trials_followed_to_the_end(problem, monkeypatch):
-    model, batch = problem
-    nearly = model.zero()
-    nearly[model.positions("giesekus_mobility")[0]] = 0.9 * MOBILITY
-    start = fit_batch(model, batch, [nearly], [[]])[0]
-    counts = followed(monkeypatch, model)
-
-    def answers():
-        counts.clear()
-        ranks = attribute(model, batch, start, ("giesekus_mobility",), 3)
-        free = [model.positions(one.effect) for one in ranks.leading]
-        fits = fit_batch(model, batch, [one.start for one in ranks.leading], free)
-        scores = [(one.effect, one.reduction) for one in (*ranks.leading, *ranks.rest)]
-        return scores, [fit.cost for fit in fits], sum(counts)
-
-    pruned = answers()
-    residuals = model.residuals
-    monkeypatch.setattr(
-        model, "residuals", lambda thetas, batch, limits=None: residuals(thetas, batch)
-    )
-    plain = answers()
-    assert [name for name, _ in pruned[0]] == [name for name, _ in plain[0]]
-    # the same sums, added up part by part
-    np.testing.assert_allclose([r for _, r in pruned[0]], [r for _, r in plain[0]], rtol=1e-9)
-    np.testing.assert_allclose(pruned[1], plain[1], rtol=1e-6)
-    assert pruned[2] < plain[2]
 
 
 @pytest.fixture(scope="module")

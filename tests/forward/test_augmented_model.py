@@ -2,13 +2,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.forward import DeclaredModel
-from discover.closed_loop.search.scoring.left_out import left_out_errors
 from discover.dataset import Run
 from discover.effects import make_effect
-from discover.forward import AugmentedModel, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.inference.least_squares import fit_batch
-from discover.inference.problem import FitProblem
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
@@ -76,7 +73,7 @@ def giesekus_runs(mobility=0.3, rates=(0.5, 1.0, 2.0)):
     return runs
 
 
-def test_a_fit_finds_the_parameter_and_predicts_runs_left_out():
+def test_a_fit_finds_the_parameter():
     model = AugmentedModel(DECLARED, [make_effect("giesekus_mobility")])
     batch = make_batch(giesekus_runs())
     at = model.positions("giesekus_mobility")
@@ -84,7 +81,6 @@ def test_a_fit_finds_the_parameter_and_predicts_runs_left_out():
     start[at] = 0.05
     fit = fit_batch(model, batch, [start], [at], tolerance=1e-8)[0]
     assert fit.theta[at[0]] == pytest.approx(0.3, abs=1e-3)
-    assert np.max(left_out_errors(FitProblem(model, batch), fit)) < 1e-3
 
 
 def test_a_trial_that_runs_away_is_a_rejected_step_and_no_crash():

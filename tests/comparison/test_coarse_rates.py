@@ -1,20 +1,16 @@
 """Few samples a cycle: the law comes out right, or it is said that they hide it. Truth by scipy."""
 
 import numpy as np
-import pandas as pd
 import pytest
 from independent import Giesekus, oscillation
 
 import discover as dc
-from discover.loop import run_loop
 from discover.comparison.fitting.sampled_rates import coarse_rates_of, with_sampled_rates
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.forward import DeclaredModel
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols import measured_rate, oscillatory_shear, sampled_rate
-from discover.report.loop.verdict import loop_verdict
 
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion", "stress_gain", "stress_offset"]
@@ -32,57 +28,6 @@ def records(samples, noise=NOISE):
         size = np.sqrt(np.mean(stress**2))
         stress = stress + noise * size * generator.standard_normal(len(times))
         yield amplitude, times, amplitude * np.cos(times), stress
-
-
-def closed(samples):
-    tables = [
-        pd.DataFrame({"run": f"{a:g}", "time_s": t, "shear_rate_1_s": r, "stress_Pa": s})
-        for a, t, r, s in records(samples)
-    ]
-    data = dc.from_dataframe(pd.concat(tables))
-    return dc.close_loop(data, BASE, effects=EFFECTS, explanations=1)
-
-
-@pytest.mark.parametrize("samples", [5, 7, 30])
-@pytest.mark.slow
-def test_a_mobility_comes_back_from_few_samples_a_cycle(samples):
-    loop = closed(samples)
-    assert loop.verdict == "effects_added"
-    assert [stage.effect for stage in loop.stages] == ["giesekus_mobility"]
-    low, high = loop.stages[0].parameters["alpha"].ci95
-    # straight lines gave 0.292 with 0.299 as the upper end at 7 samples a cycle
-    assert low <= MOBILITY <= high
-    assert loop.error_after.fit == pytest.approx(NOISE, rel=0.2)
-    # beside 1 % of noise what the rate did between samples is nothing, and nothing is said of it
-    assert "too coarsely" not in " ".join(loop_verdict(loop))
-
-
-@pytest.mark.slow
-def test_what_a_rate_did_between_its_samples_widens_constants_of_the_declared_model_too():
-    tables = [
-        pd.DataFrame({"run": f"{a:g}", "time_s": t, "shear_rate_1_s": r, "stress_Pa": s})
-        for a, t, r, s in records(4, noise=0.003)
-    ]
-    law = make_law("giesekus", {"alpha": MOBILITY})
-    declared = DeclaredModel(law, np.array([MODULUS]), np.array([TIME]), fit_modulus=True)
-    data = dc.from_dataframe(pd.concat(tables))
-    loop = run_loop(data, declared, effects=["stress_offset"], explanations=1)
-    low, high = loop.declared_parameters["modulus_Pa"].ci95
-    assert low <= MODULUS <= high
-    assert loop.remaining["sampled_rate"]["shifts"]["modulus_Pa"] > 0.0
-
-
-@pytest.mark.slow
-def test_three_samples_a_cycle_hide_the_law_and_that_is_said():
-    loop = closed(3)
-    assert loop.verdict == "unexplained"
-    found, sure, following = loop_verdict(loop)
-    assert "What the rate did between its samples hides" in found
-    assert "sampled too coarsely: 3 samples a cycle" in sure
-    assert "twice as often" in following
-    assert loop.remaining["sampled_rate"]["hides_the_law"]
-    # nor is what the rate did taken for a curve of something else
-    assert loop.free_form == ()
 
 
 def outcome(samples, protocol_of, noise=NOISE):
