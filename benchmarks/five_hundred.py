@@ -21,6 +21,12 @@ PARTS = {
     "Giesekus": {"giesekus_mobility", _SOLVENT},
     "linear PTT": {"ptt_linear", "non_affine_motion", _SOLVENT},
 }  # fmt: skip
+MODEL = {"law": "ucm", "modulus_Pa": "fit", "relaxation_time_s": "fit"}
+LOOP = {
+    "effects": [_SOLVENT, "giesekus_mobility", "ptt_linear", "non_affine_motion"],
+    "max_effects": 3,
+}
+"""What the paper's laws differ by; a fluid without elasticity has no name in the product yet."""
 OF_LAW = {
     "ucm": set(), "johnson_segalman": {"non_affine_motion"}, "giesekus": {"giesekus_mobility"},
     "ptt_linear_non_affine": {"ptt_linear", "non_affine_motion"},
@@ -50,11 +56,9 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
         noisy = exact + size * lot.standard_normal(len(exact))
         write_table(data / file, {**columns, "stress_Pa": noisy}, 12)
     (data / "runs.csv").write_text("\n".join(["file", *runs]) + "\n", encoding="utf-8")
-    said = product.answer(folder, "close-loop", {
-        "data": {"folder": str(data.resolve())},
-        "model": {"law": "any", "modulus_Pa": "fit", "relaxation_time_s": "fit"},
-    })  # fmt: skip
-    laws = said.get("laws") or [{"law": said["declared"]["law"]}]
+    sections = {"data": {"folder": str(data.resolve())}, "model": MODEL, "loop": LOOP}
+    said = product.answer(folder, "close-loop", sections)
+    laws = said.get("laws") or [{"law": "ucm"}]
     alike = [laws[0]["law"], *(o["law"] for o in laws[1:] if not o.get("is_told_apart", True))]
     named = [[stage["effect"], *stage["aliases"]] for stage in said["stages"]]
     found = {"verdict": said["verdict"], "law": alike[0], "as_well": alike[1:], "named": named}
