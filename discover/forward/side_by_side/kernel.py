@@ -202,10 +202,12 @@ class Kernel:
         with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
             w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
-            # what series elements take at the beginning is looked at from the interval before
-            is_first = self._arithmetic.compare("==", begin, 0.0)
-            taken = self._arithmetic.chosen(is_first, self._kept(_EARLIER), w.load("felt", first))
-            w.store(self._arithmetic.lanes(taken), "felt", first)
+            if self._series:
+                with w.builder.if_then(self._on["series"]), self._arithmetic.apart():
+                    # the interval before asks what series elements take at the beginning
+                    is_first = self._arithmetic.compare("==", begin, 0.0)
+                    earlier, now = w.load("felt", first), self._kept(_EARLIER)
+                    w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
         number = w.at((number, 1), (count, 1), (-1, 1))
         self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), last)
 
