@@ -1,6 +1,6 @@
 """Predictions of many vectors of parameters at once, in machine code made from laws and effects."""
 
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.transients import SideBySide
+from discover.forward.side_by_side.transients import SideBySide, intervals
 
-__all__ = ["Kernel", "SideBySide"]
+__all__ = ["Kernel", "SideBySide", "intervals"]
