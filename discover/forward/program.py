@@ -26,7 +26,7 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
-from discover.forward.side_by_side import SideBySide, kernel_of
+from discover.forward.side_by_side import SideBySide, intervals, kernel_of
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -46,6 +46,9 @@ _FEW_MODES = 6
 
 # Modes from which on weights of steps are worth a program of their own
 _MANY_MODES = 4
+
+# Runs of which it is known whether vectors choose their steps in them
+_KEPT = 8
 
 
 class Program:
@@ -68,6 +71,7 @@ class Program:
         self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
         self._kernels: dict[Any, SideBySide | None] = {}
+        self._known_parts: list[tuple[TransientFlows, bool]] = []
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
@@ -97,10 +101,11 @@ class Program:
         flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
+        chooses = self._chooses_steps(part)
+        kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None, chooses)
         if kind not in self._kernels:
             try:
-                kernel = kernel_of(self.fluid, numbers, flow)
+                kernel = kernel_of(self.fluid, numbers, flow, chooses)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
@@ -109,6 +114,15 @@ class Program:
                     self.fluid, kernel, self._rates, self._at_samples, self._made_from
                 )
         return self._kernels[kind]
+
+    def _chooses_steps(self, part: TransientFlows) -> bool:
+        """Return whether runs have intervals in which vectors choose their steps."""
+        for known, chooses in self._known_parts:
+            if known is part:
+                return chooses
+        found = bool(np.any(intervals(part)[0] > 1))
+        self._known_parts = [*self._known_parts[1 - _KEPT :], (part, found)]
+        return found
 
     def is_judged_by_modes(self, theta: np.ndarray) -> bool:
         """Return whether nothing alters the record after the modes, or gives way in series."""

@@ -43,7 +43,9 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize(("law", "before"), [*((name, BEFORE) for name in LAWS), ("giesekus", 50)])
+@pytest.mark.parametrize(
+    ("law", "before"), [*((name, BEFORE) for name in LAWS), ("giesekus", 50.0)]
+)
 def test_a_run_from_a_steady_flow_is_exact_in_a_third_of_the_steps(law, before, monkeypatch):
     parameters, independent = LAWS[law]
     one, held = run(before, AFTER)

@@ -18,7 +18,7 @@ from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
-from discover.programs.lanes.arithmetic import INTEGER
+from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("runs", "steps", "modes", "tabled")
@@ -44,7 +44,9 @@ _MADE: dict[tuple, "Kernel"] = {}
 _KEPT = 16
 
 
-def kernel_of(fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None) -> "Kernel":
+def kernel_of(
+    fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None, chooses: bool
+) -> "Kernel":
     """Return the machine code for a fluid, made once for all whose constants alone differ.
 
     Parameters
@@ -55,6 +57,8 @@ def kernel_of(fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None) 
         One of those that it is called with; their values are data.
     flow
         Kinematics of one run; None where all are simple shear.
+    chooses
+        Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
 
     Raises
     ------
@@ -69,9 +73,9 @@ def kernel_of(fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None) 
         for tree, axes in zip(found, (1, 0), strict=True)
         for leaf in jax.tree.leaves(tree)
     ]
-    key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow))
+    key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow), chooses)
     if key not in _MADE:
-        _MADE[key] = Kernel(AugmentedFluid(structure), *found, flow)
+        _MADE[key] = Kernel(AugmentedFluid(structure), *found, flow, chooses)
         for earliest in list(_MADE)[:-_KEPT]:
             del _MADE[earliest]
     return _MADE[key]
@@ -95,6 +99,8 @@ class Kernel:
         Shapes of what is data to it; see `laid_out`.
     flow
         Kinematics of one run; None where all are simple shear.
+    chooses
+        Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
 
     Raises
     ------
@@ -103,8 +109,14 @@ class Kernel:
     """
 
     def __init__(
-        self, fluid: AugmentedFluid, of_mode: Mode, shared: Shared, flow: Kinematics | None
+        self,
+        fluid: AugmentedFluid,
+        of_mode: Mode,
+        shared: Shared,
+        flow: Kinematics | None,
+        chooses: bool,
     ):
+        self._chooses = chooses
         self.flags, self.steps_taken = Flags(fluid), 0
         self._times_at = self.flags.names.index("times")
         found = of_mode, shared
@@ -219,13 +231,25 @@ class Kernel:
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
         with w.loop(w.load("last", run), self._goes_on) as number, self._arithmetic.apart():
-            is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
-            with w.builder.if_then(is_next), self._arithmetic.apart():
-                self._of_interval(run, number, flow)
+            if self._chooses:
+                is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
+                with w.builder.if_then(is_next), self._arithmetic.apart():
+                    self._of_interval(run, number, flow)
+            else:
+                self._of_grid(run, number, flow)
         with w.builder.if_then(self._goes_on()), self._arithmetic.apart():
             self._at_start(run, flow)
             with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
                 self._beside(run, number, flow)
+
+    def _of_grid(self, run, number, flow) -> None:
+        """Write a step of the grid."""
+        w, steps = self._w, self._w.counts["steps"]
+        half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
+        rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
+        width = self._splat("width", w.at((run, steps), (number, 1)))
+        self._of_step(run, number, flow, rates, width, TRUTH(0))
+        self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), rates[2])
 
     def _of_interval(self, run, number, flow) -> None:
         """Write a step of the grid, or several in which the rate is a straight line."""
@@ -238,17 +262,19 @@ class Kernel:
         first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
             self._of_step(run, number, flow, felt, width, is_held)
-            w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
-            # what series elements take at the beginning is looked at from the interval before
-            is_first = self._arithmetic.compare("==", begin, 0.0)
-            taken = self._arithmetic.chosen(is_first, self._kept(_EARLIER), w.load("felt", first))
-            w.store(self._arithmetic.lanes(taken), "felt", first)
+            if self._series:
+                with w.builder.if_then(self._on["series"]), self._arithmetic.apart():
+                    # the interval before asks what series elements take at the beginning
+                    is_first = self._arithmetic.compare("==", begin, 0.0)
+                    earlier, now = w.load("felt", first), self._kept(_EARLIER)
+                    w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
         number = w.at((number, 1), (count, 1), (-1, 1))
         self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), last)
 
     def _of_step(self, run, number, flow, rates, width, is_held) -> None:
         w, counts, write, step = self._w, self._w.counts, self._write, self._step
         shared, on, add = self._parameters, self._on, self._arithmetic.add
+        w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
         levels, earlier = self._states(), self._kept(_EARLIER)
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -77,16 +77,15 @@ class _Runs(NamedTuple):
     in_lanes: np.ndarray
 
 
-def intervals(
-    times: Float[np.ndarray, "runs s"],
-    sample: Int[np.ndarray, "runs n"],
-    last: Int[np.ndarray, " runs"],
-    jump: Float[np.ndarray, " runs"],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return of each step how many from it on are one interval, its length, and the least step.
 
-    An interval ends at a sample and where a rate jumps. One of few steps is left as it is.
+    An interval ends at a sample and where a rate jumps. One of few steps is left as it is, and so
+    is one in which the commanded rate is no straight line.
     """
+    half, rates = np.asarray(part.times), np.asarray(part.commanded_rate)
+    times, sample, last = half[:, ::2], np.asarray(part.sample_index), np.asarray(part.last_step)
+    jump = JUMP * times[:, -1]
     width = np.diff(times)
     held = np.ones(width.shape, np.int64)
     whole, least = width.copy(), width.copy()
@@ -96,7 +95,10 @@ def intervals(
         ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
         ends = ends[ends <= last[row]]
         for first, end in pairwise(ends):
-            if end - first >= _FEWEST:
+            own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
+            line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
+            is_straight = np.allclose(own_rates, line, rtol=1e-10, atol=0.0)
+            if end - first >= _FEWEST and is_straight:
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
                 least[row, first] = _ALWAYS * length / (end - first)
@@ -272,8 +274,7 @@ class SideBySide:
         np.add.at(weight, places, np.asarray(judging.weight))
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
-        jump = JUMP * times[:, -1]
-        held, whole, least = intervals(times, sample, last, jump)
+        held, whole, least = intervals(part)
         found = _Runs(
             # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
@@ -281,7 +282,7 @@ class SideBySide:
             np.diff(times),
             whole,
             least,
-            jump,
+            JUMP * times[:, -1],
             self._kernel.flows(part.kinematics),
             sample,
             weight,
