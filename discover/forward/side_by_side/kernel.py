@@ -17,7 +17,14 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
 from discover.forward.structure import Numbers
-from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
+from discover.programs.lanes import (
+    LANES,
+    Arithmetic,
+    Translation,
+    Writing,
+    callable_of,
+    kept,
+)
 from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
@@ -129,13 +136,15 @@ class Kernel:
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
-        self._arithmetic = Arithmetic(self._w.builder)
-        self._write = Translation(self._arithmetic)
-        self._runs()
-        self._call = self._w.compiled()
-        # what was written is large, and the code is made
-        del self._w, self._arithmetic, self._write, self._parameters, self._on, self._held
+        empty = [
+            jax.tree.map(
+                lambda leaf, axes=axes: np.empty(leaf.shape[axes:]) if is_array(leaf) else leaf,
+                tree,
+            )
+            for tree, axes in zip(found, (1, 0), strict=True)
+        ]
+        code = kept((fluid.structure, empty, flow, chooses), self._written)
+        self._call = callable_of(code, len(_COUNTS), len(_ARRAYS))
 
     def __call__(
         self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
@@ -182,6 +191,16 @@ class Kernel:
         if not leaves:
             return np.zeros((1, 1))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
+
+    def _written(self) -> bytes:
+        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
+        self._arithmetic = Arithmetic(self._w.builder)
+        self._write = Translation(self._arithmetic)
+        self._runs()
+        code = self._w.compiled()
+        # what was written is large, and the code is made
+        del self._w, self._arithmetic, self._write, self._parameters, self._on, self._held
+        return code
 
     def _runs(self) -> None:
         w = self._w
