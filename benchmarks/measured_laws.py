@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from independent.folders import write_study
-
 from discover.closed_loop.law_choice import choose_law, with_law
 from discover.closed_loop.runs import MOST_SAMPLES, split_runs
+from independent.folders import write_study
+
 from discover.compilation_cache import enable_compilation_cache
 from discover.dataset import Run
 from discover.errors import InputError

@@ -3,10 +3,10 @@
 import numpy as np
 import pandas as pd
 import pytest
+from discover.closed_loop.results.loop_result import LoopResult
 from scipy.stats import norm
 
 import discover as dc
-from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.fitting import NamedLawFit
 from discover.learners.results.recovered_term import RecoveredTerm

@@ -3,10 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import WhiteMetzner
+from independent import Giesekus, Thixotropic, WhiteMetzner
 from independent.flow import start_up
-from independent.giesekus import Giesekus
-from independent.thixotropic import Thixotropic
 
 import discover as dc
 from discover.effects import make_effect

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
+from discover.statistics.mixed_normals import quantile
 from scipy.optimize import brentq
 from scipy.stats import norm
-
-from discover.statistics.mixed_normals import quantile
 
 
 def test_a_quantile_of_mixed_distributions_is_that_of_scipy():
