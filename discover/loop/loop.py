@@ -256,7 +256,7 @@ def without_fluid(posterior: Posterior) -> bool:
     if not alive:
         return False
     off = copy(problem)
-    off.model = problem.model.at_moduli(_OFF * problem.declared.modulus, 0.0)
+    off.moduli = np.append(_OFF * problem.declared.modulus, 0.0)
     off.modulus_root = None
     fluid = {e.name for e in problem.effects.values() if isinstance(e, ConstitutiveEffect)}
     off.candidates = tuple(e for e in problem.candidates if e.name not in fluid)

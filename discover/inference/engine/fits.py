@@ -14,6 +14,9 @@ from discover.inference.engine.rows import Rows
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""
 
+_MOVED = 0.1
+"""Standard deviations by which moduli are moved; records at a given rate are linear in them."""
+
 _DAMPINGS = (0.1, 3.0, 100.0)
 """Multiples of the last damping that are tried side by side."""
 
@@ -112,20 +115,13 @@ class Fitter:
         root, model, rows = self.problem.modulus_root, self.problem.model, self.rows
         if root is None:
             return np.zeros((len(rows), 0))
-        modulus, solvent = model.declared.modulus, float(model.declared.solvent_viscosity)
-        k, columns = len(modulus), []
-        for step in 0.1 * root.T:
-            ends = [
-                rows.flat(
-                    model.at_moduli(
-                        modulus + sign * step[:k],
-                        solvent + sign * step[k] if len(step) > k else None,
-                    ).predictions([self.problem.zero], rows.batch)
-                )[0]
-                for sign in (1.0, -1.0)
-            ]
-            columns.append((ends[0] - ends[1]) / 0.2)
-        return np.nan_to_num(np.stack(columns, axis=1))
+        moves = np.zeros((root.shape[1], len(self.problem.moduli)))
+        moves[:, : len(root)] = _MOVED * root.T
+        moduli = self.problem.moduli + np.concatenate([moves, -moves])
+        zero = np.tile(self.problem.zero, (len(moduli), 1))
+        found = rows.flat(model.predictions(zero, rows.batch, moduli))
+        columns = (found[: len(moves)] - found[len(moves) :]) / (2.0 * _MOVED)
+        return np.nan_to_num(columns.T)
 
     def _widths(self) -> Float[np.ndarray, " q"]:
         """Return the prior deviations of what is linear, all about zero."""
@@ -151,7 +147,9 @@ class Fitter:
         if not len(thetas):
             return np.zeros((0, len(self.rows)))
         with np.errstate(all="ignore"):
-            return self.rows.flat(self.problem.model.predictions(np.array(thetas), self.rows.batch))
+            moduli = np.broadcast_to(self.problem.moduli, (len(thetas), len(self.problem.moduli)))
+            model, batch = self.problem.model, self.rows.batch
+            return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
 
     def start(
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None

@@ -111,7 +111,7 @@ class Problem:
         effects = [*candidates, *beside]
         self.model = AugmentedModel(declared, effects, self.scales, self.fitted.batch)
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
-        self.zero = self.model.zero()
+        self.zero, self.moduli = self.model.zero(), self.model.moduli
         self._priors = self._known()
         self.always = tuple(sorted(self._priors))
         self._widths = self._signatures()
