@@ -83,7 +83,7 @@ def up_to_the_first_computation() -> Iterator[None]:
     client = distributed.Client
     seams = [
         ("discover.simulate.synthetic.simulate", _reach),
-        ("discover.closed_loop.searching.make_batch", _reach),
+        ("discover.loop.loop.unfelt_scatter", _reach),
         ("discover.comparison.instrument.known.comparison_flows", _reach),
         ("discover.learners.distillation.simulate", _reach),
         ("discover.batch.run.run_in_workers", _reach),

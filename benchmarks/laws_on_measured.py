@@ -22,13 +22,13 @@ from pathlib import Path
 import numpy as np
 from independent.folders import write_study
 
-from discover.closed_loop.law_choice import choose_law, with_law
-from discover.closed_loop.runs import MOST_SAMPLES, split_runs
 from discover.compilation_cache import enable_compilation_cache
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.laws import LAWS
+from discover.loop.loop import Task, with_law
+from discover.loop.runs import MOST_SAMPLES, split_runs
 from discover.precision import enable_x64
 from discover.study.atomic import write_text
 from discover.study.data import load_study_data
@@ -72,8 +72,8 @@ def fit_law(made: Path, law: str) -> dict:
         fitted = [name for name in names if name not in left_out]
         parts = split_runs(data.dataset, fitted, left_out, study.loop.strain, MOST_SAMPLES)[:2]
         try:
-            # so that no law ends above one that it contains
-            tried = choose_law(declared, [*LAWS[law].contains, law], *parts, lambda line: None)[1]
+            task = Task((), *parts, None, 0.0, 0, lambda line: None)
+            tried = task.lines(task.choose(declared, [law])[1])
         except InputError:
             return {"error": None, "seconds": time.process_time() - started}
         found = next(one for one in tried if one.law == law)

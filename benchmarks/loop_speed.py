@@ -61,10 +61,10 @@ def synthetic():
 
 def with_all_candidates():
     """Return a model with every candidate, and the melt's fitted runs as a batch."""
-    from discover.closed_loop.candidates import candidates_of
-    from discover.closed_loop.judging.before_after import cut_to_strain
     from discover.forward import AugmentedModel, make_batch
     from discover.forward.batches import data_scales
+    from discover.loop.candidates import candidates_of
+    from discover.loop.runs import cut_to_strain
 
     data, declared, held = measured() or synthetic()
     runs = cut_to_strain([run for run in data.runs if run.name not in held], STRAIN)
@@ -79,13 +79,13 @@ def main() -> None:
 
     enable_x64()
     enable_compilation_cache()
-    from discover.closed_loop import run_loop
-    from discover.closed_loop.judging.before_after import cut_to_strain
     from discover.effects import make_effect
     from discover.forward.augmented_model import AugmentedModel
     from discover.forward.batches import data_scales, make_batch
     from discover.inference.least_squares import fit_batch
     from discover.laws import Fluid, make_law
+    from discover.loop import run_loop
+    from discover.loop.runs import cut_to_strain
     from discover.simulate import simulate
 
     data, declared, held = measured() or synthetic()

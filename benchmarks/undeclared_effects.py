@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from planting import OUTSIDE, Noise, PlantedCase, Planter
 
-from discover.closed_loop import LoopResult, run_loop
 from discover.compilation_cache import enable_compilation_cache
 from discover.effects import named_effects
 from discover.errors import InputError
+from discover.loop import LoopResult, run_loop
 from discover.precision import enable_x64
 
 # one round of kinds; with ten cases each kind has been met

@@ -50,7 +50,7 @@ RESULTS = {
     ),
     "loops": (
         "discover.comparison.comparison.Comparison",
-        "discover.closed_loop.results.loop_result.LoopResult",
+        "discover.loop.loop_result.LoopResult",
     ),
 }
 
