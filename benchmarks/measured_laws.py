@@ -13,8 +13,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from discover.closed_loop.law_choice import choose_law, with_law
-from discover.closed_loop.runs import MOST_SAMPLES, split_runs
 from independent.folders import write_study
 
 from discover.compilation_cache import enable_compilation_cache
@@ -22,6 +20,8 @@ from discover.dataset import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.laws import LAWS
+from discover.loop.loop import Task, with_law
+from discover.loop.runs import MOST_SAMPLES, split_runs
 from discover.precision import enable_x64
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model, forward_model
@@ -79,8 +79,8 @@ def fit_law(made: Path, law: str) -> dict:
         fitted = [name for name in names if name not in left_out]
         parts = split_runs(data.dataset, fitted, left_out, study.loop.strain, MOST_SAMPLES)[:2]
         try:
-            # so that no law ends above one that it contains
-            tried = choose_law(declared, [*LAWS[law].contains, law], *parts, lambda line: None)[1]
+            task = Task((), *parts, None, 0.0, 0, lambda line: None)
+            tried = task.lines(task.choose(declared, [law])[1])
         except InputError:
             return {"error": None, "verdict": "no fit"}
         found = next(one for one in tried if one.law == law)

@@ -51,7 +51,7 @@ RESULTS = {
     "loops": (
         "discover.fitting.NamedLawFit",
         "discover.comparison.comparison.Comparison",
-        "discover.closed_loop.results.loop_result.LoopResult",
+        "discover.loop.loop_result.LoopResult",
     ),
 }
 

@@ -101,7 +101,7 @@ class Ended:
     def fit(self) -> Fit:
         """The likeliest hypothesis, fitted to the fitted runs."""
         told = self.posterior.explanations
-        return self._fitted(told[0].members[0] if told else ())
+        return self._fitted(told[0].members[0] if told and not self.without_fluid else ())
 
     @cached_property
     def path(self) -> list[Fit]:
@@ -183,9 +183,7 @@ class Ended:
                 else:
                     band = self._fitted_bands[:, rows.run == i]
                 own = np.stack([one[i, :n] for one in each]) if each else None
-                object.__setattr__(record, "band", band)
-                object.__setattr__(record, "by_explanation", own)
-            found += records
+                found.append(replace(record, band=band, by_explanation=own))
         return found
 
     @cached_property
@@ -195,6 +193,8 @@ class Ended:
         weights, middles, variances = [], [], []
         for fit, weight in self.posterior.fits or ((self.fit, 1.0),):
             record = fitter.record(fit)
+            assert fit.jacobian is not None
+            assert fit.covariance is not None
             noise = fit.noise.sizes[fitter.rows.run] * fitter.noise.deviation(
                 record, fit.noise.share
             )
@@ -232,9 +232,9 @@ class Ended:
             found.append(Explanation(first, one.probability, pair, parameters, twins))
             for member, share in zip(one.members, self._shares(one), strict=True):
                 for name in member:
-                    inclusion[name] = inclusion.get(name, 0.0) + share
+                    inclusion[name] = inclusion.get(name, 0.0) + float(share)
                 for kind in {effects[name].kind for name in member}:
-                    kinds[kind] = kinds.get(kind, 0.0) + share
+                    kinds[kind] = kinds.get(kind, 0.0) + float(share)
         none = 1.0 - sum(one.probability for one in found)
         return Explanations(
             tuple(found),

@@ -294,12 +294,14 @@ def _by_mode(task: Task, first: Posterior) -> Posterior:
     return max(first, second, key=lambda one: log_evidence(one.search))
 
 
-def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
+def with_law(
+    declared: DeclaredModel, name: str, values: Mapping[str, float] | None = None
+) -> DeclaredModel:
     """Return the declared model with another law, all of whose constants are fitted."""
     factors = {MODULUS: declared.fit_modulus, RELAXATION_TIME: declared.fit_relaxation_time}
     return DeclaredModel.named(
         name,
-        starting_values(name),
+        starting_values(name) if values is None else values,
         declared.modulus,
         declared.relaxation_time,
         free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],

@@ -56,7 +56,7 @@ def test_one_to_be_fitted_is_reported_with_its_interval(fitted):
     (effect,) = fitted.declared_effects
     low, high = effect.parameters["gain_error"].ci95
     assert low <= GAIN <= high
-    assert high - low < 0.05  # 1 % noise on 160 samples
+    assert high - low < 0.07  # 1 % noise on 160 samples, and a gain that is sound to 1 %
     said = fitted.to_json()["declared"]
     assert said["effects"][0]["effect"] == "stress_gain"
     assert said["law"]["terms"] == []

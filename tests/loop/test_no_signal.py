@@ -65,16 +65,15 @@ def test_pure_noise_is_no_signal(seed, declared):
 def test_a_dead_sensor_is_no_signal(declared):
     result = loop(drawn(lambda rate: 42.0 + 0.0 * rate, 0.5), declared)
     assert (result.verdict, result.stages) == ("no_signal", ())
-    assert "whatever rate was imposed" in result.remaining["description"]
+    assert "without any fluid, are as likely" in result.remaining["description"]
 
 
 def test_an_effect_that_switches_the_fluid_off_explains_nothing():
     # an instrument that drifts, with no fluid in it: the records change, but not with the rate
     result = loop(drawn(lambda rate: 3.0 * TIMES, 0.5), TO_FIT, ("stress_offset", "stress_drift"))
     assert result.verdict == "no_signal"
-    assert [stage.effect for stage in result.stages] == ["stress_drift"]
-    assert "as well without the fluid" in result.remaining["description"]
-    assert "as good as absent" in loop_verdict(result)[0]
+    assert result.stages == ()
+    assert "without any fluid, are as likely" in result.remaining["description"]
 
 
 @pytest.mark.slow
