@@ -70,7 +70,7 @@ def kernel_of(fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None) 
     ]
     key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow))
     if key not in _MADE:
-        _MADE[key] = Kernel(AugmentedFluid(structure), *found, flow)
+        _MADE[key] = Kernel(AugmentedFluid(structure), found, flow)
         for earliest in list(_MADE)[:-_KEPT]:
             del _MADE[earliest]
     return _MADE[key]
@@ -83,7 +83,7 @@ class Kernel:
     ----------
     fluid
         The effects, of a structure without constants of the law.
-    of_mode, shared
+    found
         Shapes of what is data to it; see `laid_out`.
     flow
         Kinematics of one run; None where all are simple shear.
@@ -94,12 +94,9 @@ class Kernel:
         If a law or an effect does what is not known in lanes.
     """
 
-    def __init__(
-        self, fluid: AugmentedFluid, of_mode: Mode, shared: Shared, flow: Kinematics | None
-    ):
+    def __init__(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None):
         self.flags = Flags(fluid)
         self._times_at = self.flags.names.index("times")
-        found = of_mode, shared
         of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
         self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
         law = eqx.combine(found[0].law, found[1].law)
