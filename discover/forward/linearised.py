@@ -93,7 +93,7 @@ def linearised(model: "AugmentedModel", points: Sequence[Point], batch: Batch) -
         if point.residual is None:
             limits[-point.size] = point.limit
     if not vectors:
-        none = (np.zeros((0, *np.shape(point.residual))) for point in points)
+        none = (np.zeros((0, *np.asarray(point.residual).shape)) for point in points)
         return [_of(*one) for one in zip(points, none, widths, strict=True)]
     known = np.array(limits)
     ended = () if np.all(np.isinf(known)) else (known,)

@@ -82,7 +82,7 @@ def kernel_of(
     ]
     key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow), chooses)
     if key not in _MADE:
-        _MADE[key] = Kernel(AugmentedFluid(structure), *found, flow, chooses)
+        _MADE[key] = Kernel(AugmentedFluid(structure), found, flow, chooses)
         for earliest in list(_MADE)[:-_KEPT]:
             del _MADE[earliest]
     return _MADE[key]
@@ -102,7 +102,7 @@ class Kernel:
     ----------
     fluid
         The effects, of a structure without constants of the law.
-    of_mode, shared
+    found
         Shapes of what is data to it; see `laid_out`.
     flow
         Kinematics of one run; None where all are simple shear.
@@ -118,15 +118,13 @@ class Kernel:
     def __init__(
         self,
         fluid: AugmentedFluid,
-        of_mode: Mode,
-        shared: Shared,
+        found: tuple[Mode, Shared],
         flow: Kinematics | None,
         chooses: bool,
     ):
         self._chooses = chooses
         self.flags, self.steps_taken = Flags(fluid), 0
         self._times_at = self.flags.names.index("times")
-        found = of_mode, shared
         of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
         self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
         law = eqx.combine(found[0].law, found[1].law)
