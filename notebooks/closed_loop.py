@@ -27,7 +27,8 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.closed_loop import DeclaredModel, run_loop
+from discover.forward import DeclaredModel
+from discover.loop import run_loop
 from discover.simulate import synthetic_dataset
 
 data = synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01)

@@ -10,8 +10,7 @@ class ModeDependence(ConstitutiveEffect):
     """The extra term of mode k carries the factor (λ_k/λ̄)^p, with λ̄ the mean time by viscosity.
 
     The simplest smooth function of the relaxation time that is never negative. It has no name in
-    the dictionary, because it is no mechanism; see
-    `discover.closed_loop.search.scoring.mode_dependence`.
+    the dictionary, because it is no mechanism.
     """
 
     def factors(

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.errors import InputError
 from discover.fitting import NamedLawFit
 from discover.learners.run_prediction import RunPrediction
+from discover.loop.loop_result import LoopResult
+from discover.loop.run_record import RunRecord
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.report.plots.loop.runs import FIT_COLOUR, HELD_COLOUR, shortened

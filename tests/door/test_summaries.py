@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from discover.closed_loop.results.loop_result import LoopResult
 from scipy.stats import norm
 
 import discover as dc
@@ -13,6 +12,7 @@ from discover.learners.results.recovered_term import RecoveredTerm
 from discover.learners.results.term_tables import estimates_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import default_library
+from discover.loop.loop_result import LoopResult
 from discover.statistics import LackOfFit
 from discover.study import parse_study
 from discover.summary_view import Estimate, SummaryView
