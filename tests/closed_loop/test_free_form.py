@@ -139,12 +139,14 @@ def test_the_law_beside_a_curve_is_found_among_all_candidates(tmp_path):
 
 
 @pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
-def test_of_a_few_rates_no_curve_is_drawn_and_of_a_wave_one_is(monkeypatch):
-    times, left = np.linspace(0.05, 5.0, 80), np.zeros((1, 3, 80))
-    model = SimpleNamespace(residuals=lambda *_: left)
+def test_of_a_few_rates_no_curve_is_drawn_and_of_a_wave_one_is():
+    times, left = (
+        np.linspace(0.05, 5.0, 80),
+        Linearised(np.zeros((3, 80)), np.zeros((0, 3, 80)), ()),
+    )
+    model = SimpleNamespace(linearise=lambda *_: left)
     batch = SimpleNamespace(weight=np.ones((3, 80)), recorded=np.ones((3, 80)))
     search: Any = SimpleNamespace(model=model, batch=batch, positions=lambda effects: [])
-    monkeypatch.setattr(free_form, "jacobians", lambda *_: np.zeros((1, 0, 3, 80)))
 
     def drawn(slot, course):
         runs = [
