@@ -19,6 +19,7 @@ from discover.closed_loop.beyond.beyond_the_search import predicts_worse
 from discover.closed_loop.beyond.free_variables import Variables
 from discover.closed_loop.results.error_pair import ErrorPair
 from discover.closed_loop.results.free_curve import nearest_form
+from discover.forward import Linearised
 from discover.report.loop.verdict import loop_verdict
 
 MODULUS, TIME, LIMIT = 100.0, 1.0, 60.0
@@ -140,10 +141,8 @@ def test_the_law_beside_a_curve_is_found_among_all_candidates(tmp_path):
 
 @pytest.mark.usefixtures("as_users_run_it")  # what stands for a search is none
 def test_of_a_few_rates_no_curve_is_drawn_and_of_a_wave_one_is():
-    times, left = (
-        np.linspace(0.05, 5.0, 80),
-        Linearised(np.zeros((3, 80)), np.zeros((0, 3, 80)), ()),
-    )
+    times = np.linspace(0.05, 5.0, 80)
+    left = Linearised(np.zeros((3, 80)), np.zeros((0, 3, 80)), ())
     model = SimpleNamespace(linearise=lambda *_: left)
     batch = SimpleNamespace(weight=np.ones((3, 80)), recorded=np.ones((3, 80)))
     search: Any = SimpleNamespace(model=model, batch=batch, positions=lambda effects: [])
