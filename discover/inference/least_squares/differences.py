@@ -19,9 +19,6 @@ _GROWTH = 5.0  # of the damping where a step is rejected, twice that at the next
 _FORETOLD = 0.25
 """Of the gain that derivatives foretell, below which they are taken anew."""
 
-_OTHERS = (_GROWTH, 1.0 / _GROWTH, 2.0 * _GROWTH**2)
-"""Other dampings of a step, over its own, that are tried where they cost nothing."""
-
 
 def fit_batch(
     model: AugmentedModel,
@@ -39,16 +36,16 @@ def fit_batch(
     All problems advance together, in one call for each step of all of them. Derivatives are
     differences: a residual costs so little beside a compilation of its derivative that this is
     several times faster here. As many vectors stand side by side in a call, what is left of them is
-    filled with the vectors by which the steps that are tried are differentiated, and with other
-    dampings of these steps, of which the best counts. Where that has no room, a step taken corrects
-    derivatives as far as it tells about them   [Broyden 1965, Math. Comput. 19, 577], and they are
-    taken anew when a step so found is rejected, gains far less than they foretold, or is so short
-    that the problem would count as finished. Damping falls as far as what was foretold is gained,
-    and rises ever faster while it is not   [Madsen, Nielsen & Tingleff 2004, Methods for Non-Linear
-    Least Squares Problems, section 3.2]. A trial that cannot be integrated has no finite residual
-    and is a rejected step. A step is the best that the admissible range of the parameters holds, so
-    the others go on where one is at its bound   [Kanzow, Yamashita & Fukushima 2004, J. Comput.
-    Appl. Math. 172, 375].
+    filled with those by which the steps that are tried are differentiated. (Filled with other
+    dampings of these steps, a fit ends in other minima, and no sooner.) Where there is no room, a
+    step taken corrects derivatives as far as it tells about them   [Broyden 1965, Math. Comput. 19,
+    577], and they are taken anew when a step so found is rejected, gains far less than they
+    foretold, or is so short that the problem would count as finished. Damping falls as far as what
+    was foretold is gained, and rises ever faster while it is not [Madsen, Nielsen & Tingleff 2004,
+    Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot be integrated
+    has no finite residual and is a rejected step. A step is the best that the admissible range of
+    the parameters holds, so the others go on where one is at its bound [Kanzow, Yamashita &
+    Fukushima 2004, J. Comput. Appl. Math. 172, 375].
 
     Parameters
     ----------
@@ -82,29 +79,21 @@ def fit_batch(
         if not going:
             break
         asked = _asked(going, lanes)
-        found = iter(linearised(model, [point for points in asked for point in points], batch))
-        for one, points in zip(going, asked, strict=True):
-            answers = [next(found) for _ in points]
+        for one, point, found in zip(going, asked, linearised(model, asked, batch), strict=True):
             best = min(known, *(other.cost for other in descents)) if rivals else np.inf
-            one.take(points, answers, tolerance, best)
+            one.take(point, found, tolerance, best)
     return [one.ended(batch) for one in descents]
 
 
-def _asked(going: Sequence["_Descent"], lanes: int) -> list[list[Point]]:
+def _asked(going: Sequence["_Descent"], lanes: int) -> list[Point]:
     """Return what each problem asks about next, as many vectors as stand side by side."""
-    asked = [[one.next_point(1.0)] for one in going]
-    room = -sum(points[0].size for points in asked) % lanes
-    pairs = sorted(zip(going, asked, strict=True), key=lambda pair: len(pair[0].free))
-    trying = [(one, points) for one, points in pairs if not points[0].positions]
-    for one, points in trying:
-        if len(one.free) <= room:
-            points[0] = points[0]._replace(positions=one.free)
-            room -= len(one.free)
-    for factor in _OTHERS:
-        for one, points in trying:
-            if points[0].size <= room:
-                points.append(one.next_point(factor)._replace(positions=points[0].positions))
-                room -= points[0].size
+    asked = [one.next_point() for one in going]
+    room = -sum(point.size for point in asked) % lanes
+    for i in sorted(range(len(going)), key=lambda i: len(going[i].free)):
+        free = going[i].free
+        if not asked[i].positions and len(free) <= room:
+            asked[i] = asked[i]._replace(positions=free)
+            room -= len(free)
     return asked
 
 
@@ -158,19 +147,12 @@ class _Descent:
             cost = np.sum(residual**2) + np.sum(self.prior.rows(theta, self.free)[0] ** 2)
         return float(cost) if np.isfinite(cost) else np.inf
 
-    def next_point(self, factor: float) -> Point:
-        """Return the parameters after one more step, or where derivatives are to be taken.
-
-        Parameters
-        ----------
-        factor
-            On the damping of the step.
-        """
+    def next_point(self) -> Point:
+        """Return the parameters after one more step, or where derivatives are to be taken."""
         if self.derivatives is None:
             return Point(self.theta, self.free, self.residual)
-        damping = max(factor * self.damping, _LEAST_DAMPING)
         at, derivatives = (self.theta, self.free, self.residual), self.derivatives
-        theta = stepped(self.model, *at, derivatives, damping, self.prior)
+        theta = stepped(self.model, *at, derivatives, self.damping, self.prior)
         return Point(theta, limit=self.cost)
 
     def _foretold(self, step: np.ndarray) -> float:
@@ -181,35 +163,30 @@ class _Descent:
         gain = np.sum(change * (2.0 * self.residual + change))
         return -float(gain + np.sum(of_known * (2.0 * known + of_known)))
 
-    def take(
-        self, points: list[Point], found: list[Linearised], tolerance: float, best: float
-    ) -> None:
-        """Take the best step that was tried, or try shorter ones or other derivatives next time.
+    def take(self, point: Point, found: Linearised, tolerance: float, best: float) -> None:
+        """Take the step that was tried, or try a shorter one or other derivatives next time.
 
         Parameters
         ----------
-        points, found
-            What was asked about, and the answers.
+        point, found
+            What was asked about, and the answer.
         tolerance
             Share of the cost below which a step gains hardly anything.
         best
             Least cost of all problems; infinite where being behind it is no reason to end.
         """
         if self.derivatives is None:
-            self.derivatives, self.fresh = found[0].jacobian, True
+            self.derivatives, self.fresh = found.jacobian, True
             return
-        costs = [self._cost(p.theta, f.residual) for p, f in zip(points, found, strict=True)]
-        chosen = int(np.argmin(costs))
-        cost, theta, residual = costs[chosen], points[chosen].theta, found[chosen].residual
+        theta, residual = point.theta, found.residual
+        cost = self._cost(theta, residual)
         if not cost < self.cost:
             if self.fresh:
-                self.damping *= max((1.0, *_OTHERS)[: len(points)]) * self.growth
-                self.growth *= 2.0
+                self.damping, self.growth = self.damping * self.growth, 2.0 * self.growth
                 self.done = self.damping > _LARGEST_DAMPING
             else:
                 self.derivatives = None
             return
-        self.damping *= (1.0, *_OTHERS)[chosen]
         gain = 1.0 - cost / self.cost
         short = gain < tolerance
         behind = self.cost > _FAR_BEHIND * best and gain < _HARDLY
@@ -221,8 +198,8 @@ class _Descent:
         less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
         self.damping, self.growth = max(self.damping * less, _LEAST_DAMPING), _GROWTH
         self.theta, self.residual, self.cost = theta, residual, cost
-        if points[chosen].positions and np.all(np.isfinite(found[chosen].jacobian)):
-            self.derivatives, self.fresh = found[chosen].jacobian, True
+        if point.positions and np.all(np.isfinite(found.jacobian)):
+            self.derivatives, self.fresh = found.jacobian, True
         else:
             anew = self.done or short or share < _FORETOLD
             self.derivatives = None if anew else _corrected(self.derivatives, step, change)
