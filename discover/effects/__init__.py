@@ -20,19 +20,16 @@ from discover.effects.library_term import (
     library_term,
     simplest_terms,
 )
-from discover.effects.mode_dependence import BY_MODE, ModeDependence
 from discover.effects.registry import effects_table, make_effect, named_effects
 from discover.effects.written_state import WrittenState
 
 __all__ = [
-    "BY_MODE",
     "AbstractEffect",
     "ConstitutiveEffect",
     "EffectParameter",
     "KinematicEffect",
     "KnownEffect",
     "LibraryTerm",
-    "ModeDependence",
     "ModeEffect",
     "Record",
     "SeriesElement",

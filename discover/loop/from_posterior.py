@@ -36,6 +36,9 @@ from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
 from discover.words import percent_of
 
 _DRAWS = 2000
+_FREE = 3
+"""Degree of constants that are free in each mode."""
+
 _FEWEST_TOLD = 0.5
 """Half width of an interval over the prior's, from which on the runs tell nothing of a mode."""
 
@@ -102,7 +105,8 @@ class Ended(Path):
         )
         ends = self.bounds[at]
         mean_time = float(times[0] / 10.0 ** places[0])
-        return ConstantByMode(float(fit.theta[at]), ends, "", mean_time, DEGREE, (), modes)
+        evidence = 0.0, float(self.posterior.memory.get("by_mode", 0.0))
+        return ConstantByMode(float(fit.theta[at]), ends, "", mean_time, _FREE, evidence, modes)
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""

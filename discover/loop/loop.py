@@ -292,7 +292,9 @@ def _by_mode(task: Task, first: Posterior) -> Posterior:
         other = replace(declared, by_mode=names)
     task.say("constants that may differ from mode to mode")
     second = task.explained(other)
-    return max(first, second, key=lambda one: log_evidence(one.search))
+    gain = 2.0 * (log_evidence(second.search) - log_evidence(first.search))
+    first.memory["by_mode"] = second.memory["by_mode"] = abs(gain)
+    return second if gain > 0.0 else first
 
 
 def with_law(
