@@ -179,7 +179,7 @@ class Discrepancy:
     def _products(self, correlation: float) -> "_Products":
         """Return products of what was left, columns and curves of each run, whitened."""
         if correlation not in self._kept:
-            noise = Noise(self._sizes(), 1.0, correlation, self.fit.noise.share)
+            noise = Noise(self.sizes_of_noise, 1.0, correlation, self.fit.noise.share)
             both = np.column_stack([self.left, self.columns, self._curves])
             white = self.fitter.noise.whitened(both, self.record, noise)
             run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
@@ -203,8 +203,9 @@ class Discrepancy:
             )
         return self._kept[correlation]
 
-    def _sizes(self) -> Float[np.ndarray, " runs"]:
-        """Return the noise of each run over that of all, as samples scatter about a smooth curve."""
+    @property
+    def sizes_of_noise(self) -> Float[np.ndarray, " runs"]:
+        """Noise of each run over that of all, as samples scatter about a smooth curve."""
         rows = self.fitter.rows
         left = (rows.recorded - self.record) / rows.size
         own = [left[rows.run == i] for i in range(len(rows.runs))]

@@ -80,6 +80,13 @@ class Fit:
         """Coordinates of the free constants."""
         return np.array([p.to_coordinate(self.theta[at]) for at, p in self.priors.items()])
 
+    def at(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, " p"]:
+        """Return the constants at other coordinates of what is free, inside their ranges."""
+        theta = self.theta.copy()
+        for (at, prior), value in zip(self.priors.items(), coordinates, strict=True):
+            theta[at] = prior.to_value(np.clip(value, *prior.ends))
+        return theta
+
 
 class Fitter:
     """Fits of hypotheses of a problem to some of its rows.

@@ -137,7 +137,7 @@ class NoiseModel:
         predicted: Float[np.ndarray, " rows"],
         noise: Noise,
     ) -> Float[np.ndarray, "rows k"]:
-        """Return columns, of the rows that are kept, in units of independent noise of variance one."""
+        """Return columns of the rows that are kept, over independent noise of variance one."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         scaled = values[self.kept] / deviation[:, None]
         decay = self._decay(noise.correlation)[:, None]

@@ -186,8 +186,8 @@ class Posterior:
     def bands(self) -> list[Band]:
         """Return the bands of the predicted runs, by the fitted runs alone.
 
-        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as it
-        misses fitted ones that are left out in turn.
+        Hypotheses are weighed by their evidence. Where none is all there is, each misses a run as
+        it misses fitted ones that are left out in turn.
         """
         rows = self.problem.predicted
         if rows is None:
@@ -271,8 +271,18 @@ def _classes(
         if all(_has_term(problem, names) for names in one["members"]):
             lost += (1.0 - _NAMELESS) * share
             share *= _NAMELESS
-        found.append(Explanation(tuple(one["members"]), share))
+        found.append(Explanation(_smallest_sets(one["members"]), share))
     return tuple(sorted(found, key=lambda one: -one.probability)), lost
+
+
+def _smallest_sets(members: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
+    """Return sets of which no part predicts the same: what is added to these changes nothing."""
+    sets = [set(names) for names in members]
+    return tuple(
+        names
+        for names, own in zip(members, sets, strict=True)
+        if not any(other < own for other in sets)
+    )
 
 
 def _has_term(problem: Problem, names: Sequence[str]) -> bool:
@@ -289,10 +299,13 @@ class Predictions:
         self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
 
     def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return weight, mean and variance of the rows, of each hypothesis alone and beside more."""
+        """Return weight, mean and variance of the rows, of each hypothesis."""
         found: list[tuple[float, np.ndarray, np.ndarray]] = []
         explained = 1.0 - self.posterior.unexplained
         sound = [(f, p) for f, p in self.posterior.fits if self._ahead(f) is not None]
+        if not sound:  # where all that are likely run away, the likeliest that does not
+            others = self.posterior.search.alive()
+            sound = [(f, 1.0) for f in others if self._ahead(f) is not None][:1]
         total = sum(p for _, p in sound)
         for fit, probability in sound:
             share = probability / total
@@ -347,11 +360,12 @@ class Predictions:
         faster. Constants are drawn, for to first order what is far would grow without bound.
         """
         predicted = self._ahead(fit)
-        assert predicted is not None and fit.covariance is not None
+        assert predicted is not None
+        assert fit.covariance is not None
         root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
         lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
         drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
-        found = self.fitter.predict([_at(fit, one) for one in drawn])
+        found = self.fitter.predict([fit.at(one) for one in drawn])
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
         spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)
@@ -371,14 +385,6 @@ class Predictions:
             for fast in self.rows.fastest
         ]
         return np.minimum(wider * np.array(size), _MOST_MISSED)[self.rows.run]
-
-
-def _at(fit: Fit, coordinates: np.ndarray) -> Float[np.ndarray, " p"]:
-    """Return the vector of a fit at other coordinates of what is free."""
-    theta = fit.theta.copy()
-    for (at, prior), value in zip(fit.priors.items(), coordinates, strict=True):
-        theta[at] = prior.to_value(np.clip(value, *prior.ends))
-    return theta
 
 
 def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:

@@ -146,7 +146,7 @@ class Search:
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
     def exchange(self) -> None:
-        """Put something else in the place of each effect of the best set, until nothing is better."""
+        """Put another effect in the place of each of the best set, until nothing is better."""
         seen: set[Key] = set()
         while self.alive():
             best = self.alive()[0]
