@@ -20,7 +20,6 @@ from discover.effects.library_term import (
     library_term,
     simplest_terms,
 )
-from discover.effects.mode_dependence import BY_MODE, ModeDependence
 from discover.effects.registry import (
     built_in_effects,
     effects_table,
@@ -30,14 +29,12 @@ from discover.effects.registry import (
 from discover.effects.written_state import WrittenState
 
 __all__ = [
-    "BY_MODE",
     "AbstractEffect",
     "ConstitutiveEffect",
     "EffectParameter",
     "KinematicEffect",
     "KnownEffect",
     "LibraryTerm",
-    "ModeDependence",
     "ModeEffect",
     "Record",
     "SeriesElement",

@@ -10,7 +10,6 @@ from jaxtyping import Array, Float
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
-    ModeDependence,
     ModeEffect,
     SeriesElement,
     StateEffect,
@@ -22,7 +21,6 @@ from discover.forward.structure import Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.protocols.kinematics import Kinematics
-from tensor_library.kinematics import rate_of_deformation
 
 
 class OfModes(NamedTuple):
@@ -86,7 +84,6 @@ class AugmentedFluid:
         }
         of_effects = {e.name: at for e, at in self.varying_effects.items()}
         self.added = AddedTerms(self.constitutive, self.slices, of_effects)
-        self.by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self.states = [e for e in effects if isinstance(e, StateEffect)]
         self.series = [e for e in effects if isinstance(e, SeriesElement)]
@@ -103,14 +100,10 @@ class AugmentedFluid:
         """Return the branches that a parameter vector takes."""
         states = [i for i, e in enumerate(self.states) if theta[self.slices[e.name].start] != 0.0]
         several = len(self.states) + 1
-        used = self.added.in_use(theta)._replace(
+        return self.added.in_use(theta)._replace(
             states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
             times=np.int32(any(self.states[i].changes_times for i in states)),
         )
-        if self.by_mode is None:
-            return used
-        differ = theta[self.slices[self.by_mode.name].start] != 0.0
-        return used._replace(by_mode=np.int32(differ))
 
     def beside(self, numbers, theta, rate, flow: Kinematics | None):
         """Return the recorded stress of the solvent and of what effects add beside the modes.
@@ -153,23 +146,6 @@ class AugmentedFluid:
         built = jax.vmap(named.build)(*columns)
         return LawOfEachMode(law=built, linear_relaxation=built.linear_relaxation)
 
-    def _terms_by_mode(self, law, added, theta, modes: Modes):
-        """Return the function by how much h of each mode differs from that of equal constants."""
-        factors = self.by_mode_factors(theta, modes)
-
-        def of_mode(law, stress, gradient):
-            return law.extra_term(stress, rate_of_deformation(gradient))
-
-        of_law = over_modes(of_mode, law, -1)
-
-        def differing(stress, gradient):
-            # a mode that an effect adds stands after the declared ones, and is as they are in mean
-            declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
-            extra = of_law(stress, gradient) + added(stress, gradient)
-            return (declared - 1.0) * extra.at[4:].set(0.0)
-
-        return differing
-
     def of_modes(self, numbers, theta) -> OfModes:
         """Return what a vector of parameters says of each mode."""
         extra = None
@@ -206,11 +182,6 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def by_mode_factors(self, theta, modes: Modes) -> Float[Array, " k"]:
-        """Return the factor on h of each declared mode."""
-        assert self.by_mode is not None
-        return self.by_mode.factors(self.values(theta, self.by_mode), *modes)
-
     def dynamics(
         self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
     ) -> Dynamics:
@@ -228,13 +199,7 @@ class AugmentedFluid:
         added = self.added.rate(theta, used, amplitudes, in_one_piece)
 
         def modes_rate(stress, gradient):
-            same = of_law(stress, gradient) - added(stress, gradient)
-            if self.by_mode is None:
-                return same
-            differing = self._terms_by_mode(law, added, theta, declared)
-            return same - jax.lax.switch(
-                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, gradient
-            )
+            return of_law(stress, gradient) - added(stress, gradient)
 
         series = None
         if self.series:

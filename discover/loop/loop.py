@@ -24,9 +24,10 @@ from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.candidates import admission, candidates_beside
-from discover.loop.from_posterior import Ended, predicted, result_of
+from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
+from discover.loop.path import predicted
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 
@@ -207,7 +208,7 @@ class Task:
     def lines(self, found: Mapping[str, Search]) -> tuple[LawFit, ...]:
         """Return the laws that were tried, the likeliest first."""
         logs = {name: log_evidence(search) for name, search in found.items()}
-        total, lines = logsumexp(list(logs.values())), []
+        total, lines = float(logsumexp(list(logs.values()))), []
         for name in sorted(found, key=lambda name: -logs[name]):
             search = found[name]
             alive = search.alive()
@@ -291,7 +292,9 @@ def _by_mode(task: Task, first: Posterior) -> Posterior:
         other = replace(declared, by_mode=names)
     task.say("constants that may differ from mode to mode")
     second = task.explained(other)
-    return max(first, second, key=lambda one: log_evidence(one.search))
+    gain = 2.0 * (log_evidence(second.search) - log_evidence(first.search))
+    first.memory["by_mode"] = second.memory["by_mode"] = abs(gain)
+    return second if gain > 0.0 else first
 
 
 def with_law(

@@ -65,7 +65,6 @@ def test_only_what_is_in_use_is_summed_and_all_of_it(sizes, branches):
     theta = vector(sizes)
     used = ADDED.in_use(theta)
     assert used[:3] == branches
-    assert used.by_mode == 0  # told by the model, which alone knows whether constants may differ
     zero = np.zeros(5)
     deformation = np.stack([zero, zero, zero, RATE])
     expected = np.zeros((4, 5))

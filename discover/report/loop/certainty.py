@@ -51,23 +51,10 @@ def _errors(result: LoopResult) -> str:
         if result.held_in_band is not None:
             share = percent(result.held_in_band)
             parts.append(f"the 95 % band of all explanations holds {share} of their samples")
-        parts += _without_band(result)
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
     return sentence([*parts, f"on the fitted runs {told}, {_share_of_noise(result)}"])
-
-
-def _without_band(result: LoopResult) -> Iterator[str]:
-    """Tell of the runs held out that have no band, since nothing that was fitted bears on them."""
-    drawn = {record.flow for record in result.records if record.band is not None}
-    others = dict.fromkeys(record.flow for record in result.records if record.flow not in drawn)
-    if others and drawn:
-        flows = listed([flow if flow == "shear" else f"{flow} extension" for flow in others])
-        yield (
-            f"no band is drawn in {flows}: none of it was fitted, and laws that do not explain the "
-            "fitted runs say nothing about it"
-        )
 
 
 def _share_of_noise(result: LoopResult) -> str:
