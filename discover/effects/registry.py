@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from discover.effects import constitutive, kinematic, signal
 from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
 from discover.effects.library_term import library_effects, library_term
-from discover.effects.mode_dependence import BY_MODE
 from discover.errors import InputError
 from discover.new_names import require_new_name
 from discover.words import unknown_name
@@ -45,7 +44,7 @@ def named_effects() -> Mapping[str, AbstractEffect]:
 @cache
 def built_in_effects() -> Mapping[str, AbstractEffect]:
     """Return the effects that a model may have without a user's own, those of the library last."""
-    nameless = (*library_effects(), BY_MODE)
+    nameless = library_effects()
     return EFFECTS.built_in | {effect.name: effect for effect in nameless}
 
 
