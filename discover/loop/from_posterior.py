@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from discover.forward.by_mode import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
@@ -302,6 +303,7 @@ def result_of(
         declared_effects=declared_effects(model, theta, free, by_mode),
         declared_law=declared_law(declared, theta, of_law),
         explanations=ended.explanations,
+        next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
         laws=laws,
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
