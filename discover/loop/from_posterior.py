@@ -77,7 +77,7 @@ class Ended(Path):
     def _by_mode(self, name: str) -> ConstantByMode:
         fit, model = self.fit, self.posterior.problem.model
         constant, at = model.constant(name)
-        places = model.mode_places(fit.theta)
+        places = model.mode_places(self.theta)
         every = [at, *model.varying(name)]
         lot = np.random.default_rng(0).standard_normal((_DRAWS, len(every)))
         chosen = [fit.free.index(one) for one in every]
@@ -99,7 +99,7 @@ class Ended(Path):
         values = np.asarray(of_modes(own[:, 0], own[:, 1:]))[0]
         width = constant.high - constant.low
         told = high - low < (_FEWEST_TOLD * width if np.isfinite(width) else 4.0 * np.abs(values))
-        times = model.mode_times(fit.theta)
+        times = model.mode_times(self.theta)
         modes = tuple(
             ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
             for t, v, a, b, k in zip(times, values, low, high, told, strict=True)
@@ -179,8 +179,9 @@ class Ended(Path):
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
-        at = problem.model.instants
-        instants = {i: bounds.get(i, (0.0, 1.0)) for i in range(at.start, at.stop)}
+        first = problem.model.instants.start
+        told = {first + s.place for run in rows.runs for s in run.rate_steps if s.place is not None}
+        instants = {at: ends for at, ends in bounds.items() if at in told}
         structured = self.verdict == "unexplained"
         said = f"{of_rates}. " * bool(of_rates)
         return {
