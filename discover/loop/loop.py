@@ -122,6 +122,7 @@ def run_loop(
     task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say)
     declared, tried = task.choose(declared, laws)
     posterior = _by_mode(task, task.explained(declared))
+    say("bands, intervals and the next test")
     ended = Ended(posterior, without_fluid(posterior), dataset.names, explanations)
     lines = task.lines(tried) if tried else ()
     return result_of(ended, lines, spikes, of_rates, time.perf_counter() - started)
