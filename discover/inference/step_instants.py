@@ -136,7 +136,8 @@ def instants_found(
             share, ci95 = step.share, None
             if step.place is not None:
                 at = model.instants.start + step.place
-                share, ci95 = float(theta[at]), [step.at(end) for end in bounds[at]]
+                share = float(theta[at])
+                ci95 = [step.at(end) for end in bounds[at]] if at in bounds else None
             line = {"between_s": [step.start, step.end], "instant_s": step.at(share), "ci95": ci95}
             found.setdefault(run.source, []).append(line)
     return found

@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from discover.forward.by_mode import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
@@ -76,7 +77,7 @@ class Ended(Path):
     def _by_mode(self, name: str) -> ConstantByMode:
         fit, model = self.fit, self.posterior.problem.model
         constant, at = model.constant(name)
-        places = model.mode_places(fit.theta)
+        places = model.mode_places(self.theta)
         every = [at, *model.varying(name)]
         lot = np.random.default_rng(0).standard_normal((_DRAWS, len(every)))
         chosen = [fit.free.index(one) for one in every]
@@ -98,7 +99,7 @@ class Ended(Path):
         values = np.asarray(of_modes(own[:, 0], own[:, 1:]))[0]
         width = constant.high - constant.low
         told = high - low < (_FEWEST_TOLD * width if np.isfinite(width) else 4.0 * np.abs(values))
-        times = model.mode_times(fit.theta)
+        times = model.mode_times(self.theta)
         modes = tuple(
             ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
             for t, v, a, b, k in zip(times, values, low, high, told, strict=True)
@@ -178,8 +179,9 @@ class Ended(Path):
         worst = max(self.records, key=lambda record: float(record.errors[-1]))
         bounds = self.bounds
         held = () if problem.predicted is None else problem.predicted.runs
-        at = problem.model.instants
-        instants = {i: bounds.get(i, (0.0, 1.0)) for i in range(at.start, at.stop)}
+        first = problem.model.instants.start
+        told = {first + s.place for run in rows.runs for s in run.rate_steps if s.place is not None}
+        instants = {at: ends for at, ends in bounds.items() if at in told}
         structured = self.verdict == "unexplained"
         said = f"{of_rates}. " * bool(of_rates)
         return {
@@ -302,6 +304,7 @@ def result_of(
         declared_effects=declared_effects(model, theta, free, by_mode),
         declared_law=declared_law(declared, theta, of_law),
         explanations=ended.explanations,
+        next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
         laws=laws,
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,

@@ -6,7 +6,6 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from discover.dataset import Dataset, Run
 from discover.dataset.records.own_loadings import with_loadings
@@ -123,6 +122,7 @@ def run_loop(
     task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say)
     declared, tried = task.choose(declared, laws)
     posterior = _by_mode(task, task.explained(declared))
+    say("bands, intervals and the next test")
     ended = Ended(posterior, without_fluid(posterior), dataset.names, explanations)
     lines = task.lines(tried) if tried else ()
     return result_of(ended, lines, spikes, of_rates, time.perf_counter() - started)
@@ -208,7 +208,7 @@ class Task:
     def lines(self, found: Mapping[str, Search]) -> tuple[LawFit, ...]:
         """Return the laws that were tried, the likeliest first."""
         logs = {name: log_evidence(search) for name, search in found.items()}
-        total, lines = float(logsumexp(list(logs.values()))), []
+        total, lines = float(np.logaddexp.reduce(list(logs.values()))), []
         for name in sorted(found, key=lambda name: -logs[name]):
             search = found[name]
             alive = search.alive()
@@ -237,7 +237,7 @@ class Task:
 def log_evidence(search: Search) -> float:
     """Return the log of evidence times prior of all hypotheses of a search together."""
     alive = search.alive()
-    return float(logsumexp([search.rank(fit) for fit in alive])) if alive else -np.inf
+    return float(np.logaddexp.reduce([search.rank(fit) for fit in alive])) if alive else -np.inf
 
 
 def is_sound(problem: Problem) -> bool:

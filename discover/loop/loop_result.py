@@ -23,9 +23,9 @@ from discover.equations.box import box_of, flow_numbers
 from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
+from discover.inference.engine.design import NextTests
 from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
-from discover.loop.next_test import NextTests
 from discover.loop.parts import (
     CandidateScore,
     DeclaredEffect,

@@ -73,7 +73,7 @@ def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
     base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
     asked = {"effects": ["giesekus_mobility", "stress_gain"], "by_mode": ["giesekus_mobility"]}
     result = dc.close_loop(data((0.1, 0.3, 0.6)), base, **asked)
-    (stage,) = result.stages
+    stage = next(one for one in result.stages if one.effect == "giesekus_mobility")
     found = stage.parameters["alpha"]
     of_law = loop((0.1, 0.3, 0.6)).declared_parameters["alpha"]
     assert (result.verdict, result.differing_by_mode) == ("effects_added", ("giesekus_mobility",))

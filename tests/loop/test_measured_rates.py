@@ -143,7 +143,7 @@ def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     result = run_loop(Dataset("noise", tuple(runs)), declared, effects=EFFECTS)
     assert result.verdict == "no_signal"
     assert result.stages == ()
-    assert "noise about a constant" in result.remaining["description"]
+    assert "without any fluid, are as likely" in result.remaining["description"]
     assert "hardly anything but noise" in loop_verdict(result)[0]
 
 
