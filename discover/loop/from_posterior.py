@@ -306,6 +306,7 @@ def result_of(
         explanations=ended.explanations,
         next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
         laws=laws,
+        discrepancy=ended.discrepancy,
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
         states=states or (),

@@ -103,7 +103,8 @@ def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[Possible
             np.arange(1.0, _STATES + 1.0),
         )
     )
-    found += _creep(at_rate, relaxation_time)
+    if any(run.protocol.control == "stress" for run in runs):
+        found += _creep(at_rate, relaxation_time)
     fast = _start_up(fastest, whole).run
     normal = replace(fast, first_normal_stress_difference=np.zeros(len(fast)))
     found.append(

@@ -19,6 +19,9 @@ from discover.statistics import root_of
 _TYPICAL = 0.2
 """Of a record, what an effect that is there changes it by: half are smaller, half larger."""
 
+_FIRST = 3.0
+"""First trials of an amplitude, which is the least width of its prior."""
+
 _SPREAD = 1.5
 """Standard deviation of the logarithm of a time or a rate whose size alone is known."""
 
@@ -173,8 +176,10 @@ class Problem:
         found = rows.flat(model.predictions(thetas, rows.batch))
         change = (found[:-1] - found[-1]) / rows.size / steps[:, None]
         size = np.sqrt(np.mean(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0) ** 2, axis=1))
-        first = np.abs(model.first_trial[at])
-        widths = np.where(size > 0, _TYPICAL / np.maximum(size, 1e-300), 10.0 * first)
+        # where the declared model is far off, little of an effect changes much
+        first = _FIRST * np.abs(model.first_trial[at])
+        widths = np.where(size > 0, _TYPICAL / np.maximum(size, 1e-300), first)
+        widths = np.maximum(widths, first)
         ends = np.maximum(np.abs(model.low[at]), np.abs(model.high[at]))
         return dict(zip(names, np.minimum(widths, ends), strict=True))
 

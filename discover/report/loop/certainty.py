@@ -20,7 +20,7 @@ _SLOW = 0.5  # correlation from which noise and a slow effect look alike for som
 
 def how_sure(result: LoopResult) -> str:
     """Return by how much the error fell, and after it what these data do not decide."""
-    sentences = [_errors(result)]
+    sentences = [_errors(result), *_what_is_missing(result)]
     if untested_by(result) == "states":
         sentences.append(ONLY_STATES)
     if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
@@ -36,6 +36,19 @@ def how_sure(result: LoopResult) -> str:
         )
     doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
+
+
+def _what_is_missing(result: LoopResult) -> Iterator[str]:
+    """Tell how large what no effect explains is, and where it is largest."""
+    left = result.discrepancy
+    if left is None or left["size"] == 0.0:
+        return
+    low, high = (percent(end) for end in left["ci95"])
+    worst = max(left["by_run"], key=left["by_run"].get)
+    yield (
+        f"What no effect explains is {percent(left['size'])} of the stress (95 %: {low} to {high}), "
+        f"most in {worst} ({percent(left['by_run'][worst])})."
+    )
 
 
 def _errors(result: LoopResult) -> str:
