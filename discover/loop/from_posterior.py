@@ -1,7 +1,7 @@
 """A posterior as the result of a closed loop: everything that is reported, in one object."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
 
@@ -108,6 +108,12 @@ class Ended(Path):
         mean_time = float(times[0] / 10.0 ** places[0])
         evidence = 0.0, float(self.posterior.memory.get("by_mode", 0.0))
         return ConstantByMode(float(fit.theta[at]), ends, "", mean_time, _FREE, evidence, modes)
+
+    @cached_property
+    def discrepancy(self) -> dict[str, Any] | None:
+        """Size of what no hypothesis holds; None where no hypothesis can be followed."""
+        size = None if self.without_fluid else self.posterior.discrepancy()
+        return None if size is None else asdict(size)
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""

@@ -46,8 +46,8 @@ def _what_is_missing(result: LoopResult) -> Iterator[str]:
     low, high = (percent(end) for end in left["ci95"])
     worst = max(left["by_run"], key=left["by_run"].get)
     yield (
-        f"What no effect explains is {percent(left['size'])} of the stress (95 %: {low} to {high}), "
-        f"most in {worst} ({percent(left['by_run'][worst])})."
+        f"What no effect explains is {percent(left['size'])} of the stress (95 %: {low} to "
+        f"{high}), most in {worst} ({percent(left['by_run'][worst])})."
     )
 
 
