@@ -194,12 +194,9 @@ class Run(NotebookView):
         return f"<Run {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
 
     def _shown(self) -> Iterator[Any]:
-        # what lays out runs in tables rests on this file
-        from discover.dataset.run_table import run_line
-
         yield repr(self).strip("<>")
-        line = {key: value for key, value in run_line(self).items() if value not in (None, False)}
-        yield pd.DataFrame([{**line, **self.metadata}])
+        if self.metadata:
+            yield pd.DataFrame([self.metadata])
         yield self.to_dataframe().describe().loc[["min", "mean", "max"]].rename_axis("column")
 
     def _recorded(self) -> dict[str, np.ndarray | None]:

@@ -1,21 +1,29 @@
 """Residuals and their derivatives by differences, of vectors side by side."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.forward.batches import Batch
 
-if TYPE_CHECKING:
-    from discover.forward.augmented_model import AugmentedModel
-
 _WIDTH = 1e-5
 """Of a parameter, or of its first trial, by which it is moved."""
 
 _BEYOND = 1e-3
 """By how much a move may lengthen the residuals, whose length is an error over the record."""
+
+
+class HasResiduals(Protocol):
+    """A model with residuals of many vectors at once, as `AugmentedModel` has."""
+
+    high: Float[np.ndarray, " p"]
+    first_trial: Float[np.ndarray, " p"]
+
+    def residuals(self, thetas: Any, batch: Batch, limits: Any = None, /) -> np.ndarray:
+        """Return the weighted residuals of parameter vectors."""
+        ...
 
 
 class Linearised(NamedTuple):
@@ -62,7 +70,7 @@ class Point(NamedTuple):
 
 
 def widths_of(
-    model: "AugmentedModel", theta: Float[np.ndarray, " p"], positions: Sequence[int]
+    model: HasResiduals, theta: Float[np.ndarray, " p"], positions: Sequence[int]
 ) -> Float[np.ndarray, " positions"]:
     """Return by how much parameters are moved for a derivative, away from an upper bound."""
     at = list(positions)
@@ -70,7 +78,7 @@ def widths_of(
     return np.where(theta[at] + width > model.high[at], -width, width)
 
 
-def linearised(model: "AugmentedModel", points: Sequence[Point], batch: Batch) -> list[Linearised]:
+def linearised(model: HasResiduals, points: Sequence[Point], batch: Batch) -> list[Linearised]:
     """Return what is asked about several vectors, from one call for all of them.
 
     Parameters

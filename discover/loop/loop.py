@@ -175,7 +175,7 @@ class Task:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _RUNS_AWAY
             )
-        return explain(problem, self.most)
+        return explain(problem, self.most, self.say)
 
     def choose(
         self, declared: DeclaredModel, laws: Sequence[str]

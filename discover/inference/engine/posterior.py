@@ -1,6 +1,6 @@
 """Posterior over hypotheses: probabilities, constants, and bands of what was not fitted."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -206,9 +206,19 @@ class Posterior:
 
 
 @in_one_thread
-def explain(problem: Problem, most: int = 3) -> Posterior:
-    """Return the posterior of a problem, hypotheses being sets of up to so many effects."""
-    search = Search(Fitter(problem, problem.fitted), most).run()
+def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None = None) -> Posterior:
+    """Return the posterior of a problem, hypotheses being sets of up to so many effects.
+
+    Parameters
+    ----------
+    problem
+        Records, model and candidates.
+    most
+        Effects in one set.
+    say
+        Called with a line of text now and then.
+    """
+    search = Search(Fitter(problem, problem.fitted), most, say).run()
     alive = search.alive()
     best = search.rank(alive[0]) if alive else 0.0
     near = [fit for fit in alive if search.rank(fit) > best - WINDOW][:_MOST]

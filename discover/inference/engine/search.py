@@ -1,6 +1,6 @@
 """Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -27,10 +27,21 @@ Key = frozenset[str]
 
 
 class Search:
-    """Hypotheses that were fitted, by the set of their effects."""
+    """Hypotheses that were fitted, by the set of their effects.
 
-    def __init__(self, fitter: Fitter, most: int = 3):
+    Parameters
+    ----------
+    fitter
+        What fits them.
+    most
+        Effects in one set.
+    say
+        Called with a line of text now and then.
+    """
+
+    def __init__(self, fitter: Fitter, most: int = 3, say: Callable[[str], None] | None = None):
         self.fitter, self.problem, self.most = fitter, fitter.problem, most
+        self.say = say or (lambda line: None)
         self.found: dict[Key, Fit] = {}
 
     def rank(self, fit: Fit) -> float:
@@ -69,13 +80,16 @@ class Search:
                 break
             best = max(map(self.rank, self.found.values()))
             fresh = self.add(starts)
+            self.say(f"sets of {depth + 1}: {len(fresh)} fitted")
             level = sorted(fresh, key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
                 break
         self.backwards()
         self.exchange()
-        return self.backwards()
+        self.backwards()
+        self.say(f"exchanged: {len(self.found)} sets")
+        return self
 
     def scored(self, fit: Fit) -> list[Fit]:
         """Return hypotheses with one effect more, ready to be fitted, the likeliest first.
