@@ -251,7 +251,7 @@ class AugmentedModel:
         """Moduli of the declared modes in Pa, and behind them the viscosity of the solvent."""
         return np.append(self.declared.modulus, float(self.declared.solvent_viscosity))
 
-    def _trials(self, thetas, limits=np.inf, moduli=None) -> "_Trials":
+    def _trials(self, thetas, limits: Any = np.inf, moduli=None) -> "_Trials":
         if moduli is None:
             moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
         limits = np.broadcast_to(limits, len(thetas))

@@ -74,7 +74,10 @@ class Path:
     def fit(self) -> Fit:
         """The likeliest hypothesis, fitted to the fitted runs."""
         told = self.posterior.explanations
-        return self.fitted(told[0].members[0] if told and not self.without_fluid else ())
+        found = self.fitted(told[0].members[0] if told and not self.without_fluid else ())
+        while found.at_an_end:  # what the runs held out asked for may be nothing in the fitted
+            found = self.fitted(set(found.names) - set(found.at_an_end))
+        return found
 
     @cached_property
     def path(self) -> list[Fit]:

@@ -39,6 +39,6 @@ def test_the_page_says_why_it_is_not_the_degree_that_evidence_asked_for():
         return by_mode_sentence("alpha", one)
 
     assert "free in each mode that the runs tell" in said(True)
-    assert "evidence over one constant: 9, 10 and 10" in said(True)
+    assert "linear, quadratic and free: 9, 10 and 10" in said(True)
     assert "runs held out refute less" in said(True)
     assert "refute" not in said(False)

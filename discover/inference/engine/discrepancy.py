@@ -246,9 +246,12 @@ class Discrepancy:
             if weight - total < -_LIKELY:
                 break
             mean, root = _posterior(self._products(correlation).gram[which], self._scale(terms))
-            kind = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+            size, stiff, growth = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+            log = float(weight - total)
             members.append(
-                Member(*kind, terms, which, correlation, weight - total, noise, mean, root)
+                Member(
+                    size, stiff, growth, terms, which, correlation, log, float(noise), mean, root
+                )
             )
         return members, float(total - none)
 

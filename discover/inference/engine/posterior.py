@@ -358,6 +358,7 @@ class Predictions:
     def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
         predicted = self._ahead(fit)
         assert predicted is not None
+        assert fit.covariance is not None
         jacobian, apart = self._jacobian(fit, predicted)
         middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
         variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
