@@ -82,11 +82,10 @@ class Program:
     def side_by_side(self, numbers: Numbers, part: TransientFlows) -> SideBySide | None:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
-        To it are left chains that retract, runs that begin with a periodic state, and what laws or
-        effects of a user's own do that is not known in lanes.
+        To it are left runs that begin with a periodic state, and what laws or effects of a user's
+        own do that is not known in lanes.
         """
-        law = numbers.law
-        if law.retracts or law.tensors or part.cycle_steps:
+        if part.cycle_steps:
             return None
         flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)

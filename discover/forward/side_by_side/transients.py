@@ -237,7 +237,8 @@ class SideBySide:
         known, own = self._known_table, numbers.relaxation_time
         if known is not None and known[0] is own and known[1] is part and known[2] == time:
             return time, known[3]
-        if count < _MANY and time != 0.0:
+        # those of chains that retract depend on more than the times
+        if numbers.law.retracts or (count < _MANY and time != 0.0):
             return time, None
         times = np.asarray(own) * np.exp(time)
         decay = jnp.asarray(float(numbers.law.linear_relaxation))
