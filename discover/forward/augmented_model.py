@@ -256,14 +256,10 @@ class AugmentedModel:
             limit if program.is_judged_by_modes(theta) else np.inf
             for theta, limit in zip(thetas, wanted, strict=True)
         ]
-        if isinstance(part, TransientFlows):
-            assert judging is not None  # of transients alone
-            kernel = program.side_by_side(self._numbers, part)
-            if kernel is not None:
-                vectors = np.asarray(thetas, dtype=float)
-                return kernel.predict(
-                    self._numbers, vectors, part, judging, asked, np.array(wanted)
-                )
+        kernel = program.side_by_side(self._numbers, part)
+        if kernel is not None:
+            vectors = np.asarray(thetas, dtype=float)
+            return kernel.predict(self._numbers, vectors, part, judging, asked, np.array(wanted))
 
         def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
             theta, limit = trial

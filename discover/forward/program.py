@@ -26,7 +26,7 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
-from discover.forward.side_by_side import Kernel, SideBySide
+from discover.forward.side_by_side import Kernel, SideBySide, SteadyCode, SteadySideBySide
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -61,7 +61,7 @@ class Program:
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
-        self._kernels: dict[Any, SideBySide | None] = {}
+        self._kernels: dict[Any, Any] = {}
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
@@ -79,29 +79,35 @@ class Program:
             runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
         )
 
-    def side_by_side(self, numbers: Numbers, part: TransientFlows) -> SideBySide | None:
+    def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
         To it are left runs that begin with a periodic state, and what laws or effects of a user's
         own do that is not known in lanes.
         """
-        if part.cycle_steps:
+        is_steady = isinstance(part, SteadyFlows)
+        if not is_steady and (not isinstance(part, TransientFlows) or part.cycle_steps):
             return None
         flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
+        kind = (is_steady, jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
         if kind not in self._kernels:
             try:
-                kernel = Kernel(self.fluid, numbers, flow)
+                self._kernels[kind] = self._in_lanes(numbers, flow, is_steady)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
-            else:
-                self._kernels[kind] = SideBySide(
-                    self.fluid, kernel, self._rates, self._at_samples, self._made_from
-                )
         return self._kernels[kind]
+
+    def _in_lanes(self, numbers: Numbers, flow: Kinematics | None, is_steady: bool):
+        if is_steady:
+            code = SteadyCode(self.fluid, numbers, flow)
+            own = self._steady_rates, self._recorded_steady
+            return SteadySideBySide(self.fluid, code, *own, self._made_from)
+        kernel = Kernel(self.fluid, numbers, flow)
+        own = self._rates, self._at_samples
+        return SideBySide(self.fluid, kernel, *own, self._made_from)
 
     def is_judged_by_modes(self, theta: np.ndarray) -> bool:
         """Return whether nothing alters the record after the modes, or gives way in series."""
@@ -193,21 +199,30 @@ class Program:
 
     def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
         flow = run.kinematics
-        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
-        rate = run.rate
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-                changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
-                rate = where_in_shear(flow, changed, rate)
         dynamics = self.fluid.dynamics(numbers, used, theta, flow)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
-        stress, felt = steady_states(dynamics, rate, flow)
+        stress, felt = steady_states(dynamics, self._steady_rates(theta, run), flow)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
+        return self._recorded_steady(theta, run, stress, felt)
+
+    def _steady_rates(self, theta, run: SteadyFlows):
+        """Return the rates of a flow curve that the fluid feels where nothing slips."""
+        places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+                changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
+                rate = where_in_shear(run.kinematics, changed, rate)
+        return rate
+
+    def _recorded_steady(self, theta, run: SteadyFlows, stress, felt):
+        """Return the recorded stress of a flow curve, of that before the signal."""
+        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
+        rate = self._steady_rates(theta, run)
         for effect in self._signal:
             if effect.acts_on_steady_states:
                 record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
-                stress = self._as_recorded(theta, effect, record, flow)
+                stress = self._as_recorded(theta, effect, record, run.kinematics)
         return stress
 
     def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):

@@ -1,6 +1,8 @@
 """Predictions of many vectors of parameters at once, in machine code made from laws and effects."""
 
 from discover.forward.side_by_side.kernel import Kernel
+from discover.forward.side_by_side.steady import SteadySideBySide
+from discover.forward.side_by_side.steady_code import SteadyCode
 from discover.forward.side_by_side.transients import SideBySide
 
-__all__ = ["Kernel", "SideBySide"]
+__all__ = ["Kernel", "SideBySide", "SteadyCode", "SteadySideBySide"]

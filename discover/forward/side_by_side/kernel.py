@@ -4,16 +4,16 @@ What is done in them is told by `step`; here stands where numbers lie. Arrays ha
 each run is followed to its own end, and states of the fluid stay in a scratch array.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.side_by_side.layout import Layout as _Layout
+from discover.forward.side_by_side.layout import as_array as _array
 from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
@@ -322,37 +322,3 @@ class Kernel:
         beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
         w.store(a.lanes(a.add(w.load("stress", at), beside)), "stress", at)
         w.store(a.lanes(felt), "felt", at)
-
-
-def _array(values: Sequence[Any]) -> np.ndarray:
-    found = np.empty(len(values), object)
-    found[:] = values
-    return found
-
-
-class _Layout:
-    """Trees of arrays as one axis of numbers, and back."""
-
-    def __init__(self, tree: Any, axes: int):
-        arrays = eqx.filter(
-            tree, lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct) or eqx.is_array(leaf)
-        )
-        leaves, self._structure = jax.tree.flatten(arrays)
-        self._axes = axes
-        self._shapes = [leaf.shape[axes:] for leaf in leaves]
-        self.size = sum(int(np.prod(shape, dtype=int)) for shape in self._shapes)
-
-    def packed(self, tree: Any) -> jax.Array:
-        leaves = jax.tree.leaves(eqx.filter(tree, eqx.is_array))
-        flat = [jnp.asarray(leaf, float).reshape(*leaf.shape[: self._axes], -1) for leaf in leaves]
-        return jnp.concatenate(flat, axis=-1)
-
-    def tree(self, values: Sequence[Any]) -> Any:
-        leaves, place = [], 0
-        for shape in self._shapes:
-            leaf = np.empty(shape, object)
-            for at in np.ndindex(shape):
-                leaf[at] = values[place]
-                place += 1
-            leaves.append(leaf)
-        return jax.tree.unflatten(self._structure, leaves)
