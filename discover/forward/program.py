@@ -26,7 +26,14 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
-from discover.forward.side_by_side import Kernel, SideBySide, SteadyCode, SteadySideBySide
+from discover.forward.side_by_side import (
+    Kernel,
+    PeriodicCode,
+    PeriodicSideBySide,
+    SideBySide,
+    SteadyCode,
+    SteadySideBySide,
+)
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -85,29 +92,38 @@ class Program:
         To it are left runs that begin with a periodic state, and what laws or effects of a user's
         own do that is not known in lanes.
         """
-        is_steady = isinstance(part, SteadyFlows)
-        if not is_steady and (not isinstance(part, TransientFlows) or part.cycle_steps):
+        if isinstance(part, StressFlows) or (isinstance(part, TransientFlows) and part.cycle_steps):
             return None
-        flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
+        flow = None
+        if not isinstance(part, PeriodicFlows):
+            flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        kind = (is_steady, jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None)
+        kind = (
+            type(part),
+            jax.tree.structure(arrays),
+            shapes,
+            *jax.tree.leaves(rest),
+            flow is None,
+        )
         if kind not in self._kernels:
             try:
-                self._kernels[kind] = self._in_lanes(numbers, flow, is_steady)
+                self._kernels[kind] = self._in_lanes(numbers, type(part), flow)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
         return self._kernels[kind]
 
-    def _in_lanes(self, numbers: Numbers, flow: Kinematics | None, is_steady: bool):
-        if is_steady:
-            code = SteadyCode(self.fluid, numbers, flow)
+    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None):
+        fluid, made_from = self.fluid, self._made_from
+        if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
-            return SteadySideBySide(self.fluid, code, *own, self._made_from)
-        kernel = Kernel(self.fluid, numbers, flow)
+            return SteadySideBySide(fluid, SteadyCode(fluid, numbers, flow), *own, made_from)
+        if control is PeriodicFlows:
+            own = self._periodic_rates, self._moduli_recorded, self._moduli_alone
+            return PeriodicSideBySide(fluid, PeriodicCode(fluid, numbers), *own, made_from)
         own = self._rates, self._at_samples
-        return SideBySide(self.fluid, kernel, *own, self._made_from)
+        return SideBySide(fluid, Kernel(fluid, numbers, flow), *own, made_from)
 
     def is_judged_by_modes(self, theta: np.ndarray) -> bool:
         """Return whether nothing alters the record after the modes, or gives way in series."""
@@ -226,12 +242,6 @@ class Program:
         return stress
 
     def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
-        places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
-        commanded = states.frequency * states.strain
-        rates = commanded
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-                rates = effect.felt_rate(self.fluid.values(theta, effect), places, rates)
         dynamics = self.fluid.dynamics(numbers, used, theta, None)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
@@ -242,14 +252,44 @@ class Program:
         def one(state):
             rate, nominal, frequency, steps = state
             found = complex_modulus(dynamics, rate / frequency, frequency, steps, beside)
-            found = found * rate / nominal
-            for effect in self._signal:
-                found = self._modulus_as_recorded(theta, effect, found, nominal, frequency)
-            return jnp.stack([found.real, found.imag])
+            return self._recorded_modulus(theta, found, rate, nominal, frequency)
 
+        rates, commanded = self._periodic_rates(theta, states), states.frequency * states.strain
         # not side by side: each in as many cycles, and as many steps of each, as it needs, which
         # takes a quarter of the time of all in those of the largest
         return jax.lax.map(one, (rates, commanded, states.frequency, states.steps))
+
+    def _periodic_rates(self, theta, states: PeriodicFlows):
+        """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
+        places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
+        rates = states.frequency * states.strain
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+                rates = effect.felt_rate(self.fluid.values(theta, effect), places, rates)
+        return rates
+
+    def _recorded_modulus(self, theta, found, rate, nominal, frequency):
+        """Return G′ and G″ as they are recorded, of those of the fluid at a rate that it feels."""
+        found = found * rate / nominal
+        for effect in self._signal:
+            found = self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+        return jnp.stack([found.real, found.imag])
+
+    def _moduli_recorded(self, numbers, theta, states: PeriodicFlows, of_modes):
+        """Return both moduli of states as they are recorded, of those of the modes."""
+        rates, commanded = self._periodic_rates(theta, states), states.frequency * states.strain
+
+        def one(rate, nominal, frequency, found):
+            beside = self.fluid.beside(numbers, theta, rate * jnp.cos(PHASE), None)
+            found = found + first_harmonic(beside, PHASE) / (rate / frequency)
+            return self._recorded_modulus(theta, found, rate, nominal, frequency)
+
+        return jax.vmap(one)(rates, commanded, states.frequency, of_modes)
+
+    def _moduli_alone(self, numbers, theta, states: PeriodicFlows) -> np.ndarray:
+        used = self.fluid.in_use(theta)
+        found = self.predict(numbers, used, theta, states, None, None, np.float64(np.inf))
+        return np.asarray(found)
 
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.
