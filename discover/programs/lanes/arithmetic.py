@@ -63,6 +63,8 @@ class Arithmetic:
 
     def lanes(self, value: Value) -> Value:
         """Return a value as eight doubles."""
+        if value is None:
+            raise NotTranslatable("a part of what is only known as a whole")
         if self.is_known(value):
             return ir.Constant(DOUBLES, [float(value)] * LANES)
         return value if value.type == DOUBLES else self.chosen(value, 1.0, 0.0)
