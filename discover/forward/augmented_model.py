@@ -1,9 +1,9 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
 An effect at zero amplitude changes nothing, so a subset of effects is a vector of parameters with
-zeros, never another program. Runs are padded to one grid. Transients at a given rate of all trial
-vectors go through one kernel, see `discover.forward.side_by_side`; of what else there is each
-vector is a call of its own, which leaves out the terms that it has at zero.
+zeros, never another program. Runs are padded to one grid. All trial vectors go through one kernel,
+see `discover.forward.side_by_side`; where there is none each vector is a call of its own, which
+leaves out the terms that it has at zero.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
