@@ -26,7 +26,6 @@ from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
 from discover.programs.lanes.arithmetic import INTEGER
-from discover.programs.lanes.machine_code import any_lane
 
 _COUNTS = ("groups", "modes", "most")
 _WIDE = ("strain", "frequency", "shared", "mode", "storage", "loss", "scratch")
@@ -222,7 +221,7 @@ class PeriodicCode:
             )  # fmt: skip
             for value, place in ((way, self._way_at), (change, _CHANGE), (alive, _ALIVE)):
                 self._keep(value, place)
-            some = any_lane(w.builder, a.compare(">", self._kept(_ALIVE), 0.0))
+            some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
             w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
         self._harmonic(group, shared, mode, on, frequency, strain, steps)
 

@@ -25,7 +25,6 @@ from discover.forward.starts.approach import (
 from discover.forward.structure import Numbers
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
 from discover.programs.lanes.arithmetic import INTEGER
-from discover.programs.lanes.machine_code import any_lane
 from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("groups", "modes")
@@ -245,7 +244,7 @@ class SteadyCode:
             alive = a.multiply(alive, a.larger(self._kept(_MOVING), moving[()]))
             self._keep(alive, _ALIVE)
             self._keep(a.add(index, 1.0), _INDEX)
-            some = any_lane(w.builder, a.compare(">", self._kept(_ALIVE), 0.0))
+            some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
             w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
         levels, felt = self._states(), self._kept(_FELT)
         self._keep(0.0, _SUM)

@@ -184,6 +184,11 @@ class Arithmetic:
         """Return the logical not of a truth."""
         return not x if self.is_known(x) else self.builder.not_(x)
 
+    def in_some(self, truths: Value) -> Value:
+        """Return the truth whether one holds in any of the lanes."""
+        bits = ir.IntType(LANES)
+        return self.builder.icmp_unsigned("!=", self.builder.bitcast(truths, bits), bits(0))
+
     def larger(self, x: Value, y: Value) -> Value:
         """Return the larger of two; not a number where one is not."""
         return self._extreme(">", x, y)

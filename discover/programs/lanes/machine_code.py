@@ -8,7 +8,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import llvmlite.ir as ir
 
-from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER, LANES
+from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
 
 Place = Any
 """Where something lies: a whole number, known or of LLVM."""
@@ -120,9 +120,3 @@ class Writing:
             function(*arguments)
 
         return call
-
-
-def any_lane(builder: ir.IRBuilder, truths: Any) -> Any:
-    """Return whether one of eight truths holds."""
-    bits = builder.bitcast(truths, ir.IntType(LANES))
-    return builder.icmp_unsigned("!=", bits, ir.IntType(LANES)(0))
