@@ -88,9 +88,7 @@ def main(kills: int = 10, workers: int = 1) -> int:
             delay = generator.uniform(0.02, 0.8) * whole if killed < kills else None
             started = time.perf_counter()
             process = subprocess.Popen(
-                command(folder, out, workers),
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
+                command(folder, out, workers), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
             )
             try:
                 process.wait(delay)

@@ -8,39 +8,27 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
 - ``compare``: the verdict, and the bands of σ12, N1 and N2 in the held-out runs, of every learner
   that claims one.
 
-Each case is a line of JSON in a file, so a stopped run goes on, and any number of runs add up.
 Seeds of 1 to 9 are for development. The seed that judges, written down before its first case was
 run, and never used to change anything: 20261130.
-
-    python benchmarks/calibration.py --task close-loop --cases 1000 --out loops.jsonl
-    python benchmarks/calibration.py --task compare --cases 1000 --out comparisons.jsonl
-
-With ``--cases 0`` a file is only read, and its table printed.
 """
 
-import argparse
-import json
-import tempfile
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from calibration_tables import TABLES
+from calibration_tables import comparison_table, loop_table
 from independent.folders import write_folder
-from independent.instruments import Recording
 from independent.worlds import MODULUS, TIME, World, draw_world
 
 import discover as dc
 
-JUDGING_SEED = 20261130
+SEED, LIMIT = 20261130, 3600.0
 HELD = "held_"
 _ARITHMETIC = 1e-5
 
 
-def close_loop(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
+def close_loop(data: dc.Dataset, world: World) -> dict:
     """Return what a closed loop says, beside what is there."""
-    del runs  # the loop claims nothing but what is recorded
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     loop = dc.close_loop(data, base, held_out=_held_out(data), max_effects=3)
     said = loop.explanations
@@ -66,11 +54,10 @@ def close_loop(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> di
     }
 
 
-def compare(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
+def compare(data: dc.Dataset, world: World) -> dict:
     """Return what a comparison claims of stresses in the held-out runs, beside what they were."""
     from discover.report.predictions import comparison_predictions
 
-    del runs  # a band is that of the curve, without the noise of a record
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     found = dc.compare(
         data, base, held_out=_held_out(data), learners=["tensor_sindy", "tensor_dense"]
@@ -102,56 +89,45 @@ def compare(data: dc.Dataset, world: World, runs: dict[str, Recording]) -> dict:
     }
 
 
-TASKS: dict[str, Callable[[dc.Dataset, World, dict[str, Recording]], dict]] = {
+TASKS: dict[str, Callable[[dc.Dataset, World], dict]] = {
     "close-loop": close_loop,
     "compare": compare,
 }
+QUESTIONS = tuple(TASKS)
 
 
-def run_case(task: str, seed: int, index: int) -> dict:
+def names(seed: int) -> list[str]:
+    del seed
+    return [str(index) for index in range(1000)]
+
+
+def run(name: str, question: str, seed: int, folder: Path) -> dict:
     """Draw one world, record it, ask, and return the answer beside the truth."""
-    world = draw_world(seed, index)
-    runs = world.make(np.random.default_rng([seed, index, 1]))
-    with tempfile.TemporaryDirectory() as folder:
-        data = dc.load_dataset(write_folder(Path(folder) / "data", runs))
-        started, used = time.perf_counter(), time.process_time()
-        answer = TASKS[task](data, world, runs)
+    world = draw_world(seed, int(name))
+    runs = world.make(np.random.default_rng([seed, int(name), 1]))
+    answer = TASKS[question](dc.load_dataset(write_folder(folder / "data", runs)), world)
     return {
-        "seed": seed,
-        "index": index,
+        "index": int(name),
         "law": world.law,
         "flaw": world.flaw,
         "protocol": world.protocol,
         "noise": world.noise,
         "effects": None if world.effects is None else [sorted(one) for one in world.effects],
         **answer,
-        "seconds": time.perf_counter() - started,
-        "processor_seconds": time.process_time() - used,
     }
 
 
-def main() -> None:
-    """Run the cases that are not there yet, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--task", choices=[*TASKS], default="close-loop")
-    parser.add_argument("--seed", type=int, default=JUDGING_SEED)
-    parser.add_argument("--first", type=int, default=0, help="index of the first case")
-    parser.add_argument("--cases", type=int, default=12)
-    parser.add_argument("--out", type=Path, default=Path("calibration.jsonl"))
-    asked = parser.parse_args()
-    lines = asked.out.read_text("utf-8").splitlines() if asked.out.exists() else []
-    cases = [json.loads(line) for line in lines]
-    done = {(case["seed"], case["index"]) for case in cases}
-    for index in range(asked.first, asked.first + asked.cases):
-        if (asked.seed, index) in done:
-            continue
-        case = run_case(asked.task, asked.seed, index)
-        cases.append(case)
-        with asked.out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(_rounded(case)) + "\n")
-        print(f"{index}: {case['law']}, {case['flaw']}, {case['protocol']}, {case['noise']}: "
-              f"{case['verdict']}, {case['processor_seconds']:.0f} s", flush=True)  # fmt: skip
-    print(TABLES[asked.task](cases))
+def line(row: dict) -> str:
+    return ", ".join(row[key] for key in ("law", "flaw", "protocol", "noise"))
+
+
+def table(rows: list[dict]) -> str:
+    """Return the tables of the questions that were asked."""
+    rows = [row for row in rows if "message" not in row]
+    loops, others = ([r for r in rows if ("explanations" in r) == one] for one in (True, False))
+    return "\n\n".join(
+        make(some) for make, some in ((loop_table, loops), (comparison_table, others)) if some
+    )
 
 
 def _held_out(data: dc.Dataset) -> list[str]:
@@ -180,16 +156,3 @@ def _band(run: str, quantity: str, low, high, truth, size: float | None = None) 
         "inside": float(np.mean((low <= truth) & (truth <= high))),
         "half_width": float(half / size),
     }
-
-
-def _rounded(value):
-    """Return JSON with numbers of four digits, which is what a count needs."""
-    if isinstance(value, dict):
-        return {key: _rounded(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_rounded(one) for one in value]
-    return float(f"{value:.4g}") if isinstance(value, float) else value
-
-
-if __name__ == "__main__":
-    main()

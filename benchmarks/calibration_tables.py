@@ -1,6 +1,6 @@
 """What the cases of `calibration` add up to: how often what was said was so."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.stats import beta
@@ -140,12 +140,6 @@ def comparison_table(cases: Cases) -> str:
                 bands = [b for b in bands if b["source"] == source]
                 lines.append(_coverage(f"  {source}, {quantity}", bands))
     return "\n".join([*lines, _seconds(cases)])
-
-
-TABLES: dict[str, Callable[[Cases], str]] = {
-    "close-loop": loop_table,
-    "compare": comparison_table,
-}
 
 
 def _beside(case: dict) -> list[str]:

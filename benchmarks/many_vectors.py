@@ -90,11 +90,11 @@ CASES = {
 
 def measured() -> dict[str, dict]:
     """Return milliseconds a vector of every case, seconds of the first call, and a prediction."""
-    from discover.closed_loop.candidates import candidates_of
     from discover.compilation_cache import enable_compilation_cache
     from discover.forward import AugmentedModel, make_batch
     from discover.forward.batches import data_scales
     from discover.forward.declared import DeclaredModel
+    from discover.loop.candidates import candidates_of
     from discover.precision import enable_x64
 
     enable_x64()

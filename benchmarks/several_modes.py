@@ -3,18 +3,10 @@
 Three modes recorded by scipy, start-ups with 1 % noise, told as upper convected Maxwell
 with the right spectrum: laws of the library with one constant and with constants by mode,
 mixtures of laws, and chains that no library holds. Of two runs held out one is slower than the
-fastest fitted, one faster. N1 and N2 are known and told to nobody. Each case is a line of JSON, so
-a stopped run goes on.
-
-    python benchmarks/several_modes.py --seed 1 --out modes.jsonl
-    python benchmarks/several_modes.py --task close-loop --seed 1 --out modes-loop.jsonl
-
-Seeds of 1 to 9 are for development.
+fastest fitted, one faster. N1 and N2 are known and told to nobody. Seeds of 1 to 9 are for
+development.
 """
 
-import argparse
-import json
-import time
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +24,8 @@ import discover as dc
 
 MODULI, RELAXATION_TIMES = (200.0, 100.0, 50.0), (0.1, 1.0, 10.0)
 TIMES = np.geomspace(0.02, 20.0, 60)
-FAST, SLOW = (0.3, 1.0, 5.0), (0.02, 0.05, 0.1)
+RATES = {"fast": (0.3, 1.0, 5.0), "slow": (0.02, 0.05, 0.1)}
+QUESTIONS, SEED = ("compare", "close-loop"), 20261201
 NOISE = 0.01
 _IN_INTEGRATION = 2e-3
 """Of the size of a curve: what a band may miss by independent integration."""
@@ -88,17 +81,24 @@ def runs_of(fluid, rates, rng: np.random.Generator) -> tuple[list, dict]:
     return runs, truths
 
 
-def run_case(task: str, name: str, fluid, fitted, rng: np.random.Generator) -> dict:
+def names(seed: int) -> list[str]:
+    del seed
+    return [f"{fluid} {speed}" for fluid in NAMES for speed in RATES]
+
+
+def run(name: str, question: str, seed: int, folder: Path) -> dict:
     """Return what is said of one fluid, beside what is there."""
+    del folder
+    title, speed = name.rsplit(" ", 1)
+    fluid, fitted = fluids(np.random.default_rng(seed))[title], RATES[speed]
+    rng = np.random.default_rng([seed, len(title), int(100 * fitted[0])])
     unseen = (0.6 * fitted[-1], 3.0 * fitted[-1])
     runs, truths = runs_of(fluid, (*fitted, *unseen), rng)
     held_out = [run.name for run in runs[len(fitted) :]]
     base = dc.Fluid(dc.make_law("ucm"), list(MODULI), list(RELAXATION_TIMES))
-    data, began = dc.Dataset(name, tuple(runs)), time.process_time()
-    said = closed_loop if task == "close-loop" else comparison
-    row = {"task": task, "fluid": name, "fitted": list(fitted)}
-    row |= said(data, base, held_out, truths)
-    return {**row, "processor_s": time.process_time() - began}
+    data = dc.Dataset(title, tuple(runs))
+    said = closed_loop if question == "close-loop" else comparison
+    return {"fluid": title, "fitted": list(fitted), **said(data, base, held_out, truths)}
 
 
 def closed_loop(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
@@ -126,12 +126,7 @@ def closed_loop(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
 def comparison(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
     """Return what a comparison says, and how its bands hold N1 and N2."""
     found = dc.compare(
-        data,
-        base,
-        held_out=held_out,
-        learners=["tensor_sindy"],
-        library={"degree": 1},
-        max_terms=3,
+        data, base, held_out=held_out, learners=["tensor_sindy"], library={"degree": 1}, max_terms=3
     )
     sparse = found.outcomes["tensor_sindy"]
     flows = {flow.name: flow for flow in found.judged}
@@ -176,54 +171,32 @@ def _held(band, truth) -> dict:
     return row
 
 
-def main() -> None:
-    """Run the cases that are not in the file yet, and print all."""
-    parser = argparse.ArgumentParser(description="fluids of several modes")
-    parser.add_argument("--task", choices=["compare", "close-loop"], default="compare")
-    parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--only", nargs="*", default=[], help="names of fluids")
-    asked = parser.parse_args()
-    lines = asked.out.read_text("utf-8").splitlines() if asked.out.is_file() else []
-    rows = [json.loads(line) for line in lines]
-    done = {(row["seed"], row["fluid"], tuple(row["fitted"])) for row in rows}
-    for name, fluid in fluids(np.random.default_rng(asked.seed)).items():
-        for rates in (FAST, SLOW):
-            if (asked.seed, name, rates) in done or (asked.only and name not in asked.only):
-                continue
-            rng = np.random.default_rng([asked.seed, len(name), int(100 * rates[0])])
-            row = {"seed": asked.seed, **run_case(asked.task, name, fluid, rates, rng)}
-            rows.append(row)
-            with asked.out.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
-    print_table(rows)
+NAMES = list(fluids(np.random.default_rng(0)))
 
 
-def print_table(rows: list[dict]) -> None:
-    """Print what is said of each fluid, and the bands that miss."""
-    for row in rows:
-        if row.get("task") == "close-loop":
-            print_loop(row)
-            continue
-        law = row["by_mode"]
-        said = "" if law is None else f"; by mode {law['verdict']}: {', '.join(law['constants'])}"
-        terms = ", ".join(f"{t['coefficient']:.3g} {t['term']}" for t in row["terms"])
-        print(f"{row['fluid']} ({row['fitted'][-1]:g} 1/s): {row['verdict']}: {terms}{said}")
-        for band in row["bands"]:
-            for quantity in ("N1", "N2"):
-                held = band[quantity]
-                if held is not None and held["off"] > _IN_INTEGRATION:
-                    off, half = (100.0 * held[k] for k in ("off", "half_width"))
-                    where = f"{band['source']} {band['run']} {quantity}"
-                    print(f"    {where} off {off:.1f} ± {half:.1f} %")
+def line(row: dict) -> str:
+    """Return what is said of a fluid, and the bands that miss."""
+    if "effects" in row:
+        errors = (f"{100.0 * e:.1f} %" for e in row["error_after"] if e is not None)
+        told = (f"{e['effect']} {e['constants']}" for e in row["effects"])
+        return f"{' and '.join(errors)}: {', '.join(told)}"
+    law = row["by_mode"]
+    said = "" if law is None else f"; by mode {law['verdict']}: {', '.join(law['constants'])}"
+    lines = [", ".join(f"{t['coefficient']:.3g} {t['term']}" for t in row["terms"]) + said]
+    for band in row["bands"]:
+        for quantity in ("N1", "N2"):
+            held = band[quantity]
+            if held is not None and held["off"] > _IN_INTEGRATION:
+                off, half = (100.0 * held[k] for k in ("off", "half_width"))
+                where = f"{band['source']} {band['run']} {quantity}"
+                lines.append(f"    {where} off {off:.1f} ± {half:.1f} %")
+    return "\n".join(lines)
 
 
-def print_loop(row: dict) -> None:
-    """Print what a loop says of a fluid."""
-    names = ", ".join(f"{e['effect']} {e['constants']}" for e in row["effects"])
-    errors = " and ".join("-" if e is None else f"{100.0 * e:.1f} %" for e in row["error_after"])
-    print(f"{row['fluid']} ({row['fitted'][-1]:g} 1/s): {row['verdict']}, {errors}: {names}")
-
-
-if __name__ == "__main__":
-    main()
+def table(rows: list[dict]) -> str:
+    """Return the rows, and how many bands hold what nobody was told."""
+    lines = [f"{r.get('case', r.get('fluid'))} ({r['verdict']}): {line(r)}"
+             for r in rows if "message" not in r]  # fmt: skip
+    bands = [b[q] for r in rows for b in r.get("bands", ()) for q in ("N1", "N2") if b[q]]
+    held = sum(band["off"] <= _IN_INTEGRATION for band in bands)
+    return "\n".join([*lines, f"{held} of {len(bands)} bands of N1 and N2 hold their curve"])

@@ -20,7 +20,7 @@ synthetic = { law = "giesekus", parameters = { alpha = 0.2 }, noise = 0.01 }
 learners = ["tensor_sindy"]
 """
 PACKAGES = ("discover", "discover.cli", "tensor_library", "discover.learners.tensor_sindy",
-            "discover.learners.tbnn_ude", "discover.closed_loop", "discover.report")  # fmt: skip
+            "discover.learners.tbnn_ude", "discover.loop", "discover.report")  # fmt: skip
 
 
 def seconds_of(code: str, *arguments: str, **environment: str) -> float:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from discover._version import __version__ as __version__
 
 if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
-    from discover.closed_loop.in_memory import close_loop as close_loop
     from discover.comparison.in_memory import compare as compare
     from discover.dataset import Dataset as Dataset
     from discover.dataset import LinearSweep as LinearSweep
@@ -37,6 +36,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_dense import TensorDense as TensorDense
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
+    from discover.loop.in_memory import close_loop as close_loop
     from discover.protocols import after_alternation as after_alternation
     from discover.protocols import after_steady_flow as after_steady_flow
     from discover.protocols import after_step_strain as after_step_strain
@@ -91,7 +91,7 @@ __all__ = [
 ]
 
 _PLACES = {
-    "discover.closed_loop.in_memory": ("close_loop",),
+    "discover.loop.in_memory": ("close_loop",),
     "discover.comparison.in_memory": ("compare",),
     "discover.dataset": (
         "LinearSweep",
@@ -129,7 +129,7 @@ _PLACES = {
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 
 _PACKAGES = (
-    "closed_loop",
+    "loop",
     "comparison",
     "dataset",
     "effects",
@@ -142,7 +142,7 @@ _PACKAGES = (
     "statistics",
     "study",
 )
-"""Packages that need no import of their own; of these, `effects` and `laws` answer calls too."""
+"""Packages that need no import of their own, and are not listed: the door is `__all__`."""
 
 
 def __getattr__(name: str) -> Any:
@@ -156,4 +156,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_PACKAGES})
+    return [*__all__, "__version__"]

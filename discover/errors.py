@@ -1,6 +1,8 @@
 """The one error that a user's input can cause."""
 
 import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 
 class InputError(ValueError):
@@ -18,6 +20,61 @@ class InputError(ValueError):
     ...     print("a mobility is not negative")
     a mobility is not negative
     """
+
+
+class Problems:
+    """Input errors that are collected and raised together, so that all are mended at once."""
+
+    def __init__(self) -> None:
+        self._found: list[str] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._found)
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Keep an input error for later and go on behind the block."""
+        try:
+            yield
+        except InputError as error:
+            self._found += problems_in(str(error))
+
+    def add(self, text: str) -> None:
+        """Keep one problem, a whole sentence."""
+        self._found.append(text)
+
+    def require_none(self, where: str = "") -> None:
+        """Raise what was collected.
+
+        Parameters
+        ----------
+        where
+            The file or folder, for a list of several.
+
+        Raises
+        ------
+        InputError
+            If there is a problem: its text, or a list with one problem a line, each once.
+        """
+        if self._found:
+            raise InputError(self.listed(where))
+
+    def listed(self, where: str = "") -> str:
+        """Return what was collected, each problem once: its text alone, or a list under a place."""
+        found = list(dict.fromkeys(self._found))
+        if len(found) == 1:
+            return found[0]
+        return _MARK.join([f"{f'{where}: ' if where else ''}{len(found)} problems.", *found])
+
+
+_MARK = "\n- "
+"""Between the problems of one message."""
+
+
+def problems_in(message: str) -> list[str]:
+    """Return the problems that the message of an `InputError` lists; itself where it is one."""
+    first, *others = message.split(_MARK)
+    return others or [first]
 
 
 _FULL = (errno.ENOSPC, errno.EFBIG, errno.EDQUOT)

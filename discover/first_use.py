@@ -5,6 +5,7 @@ process: in a script, in a notebook, and in a worker that only unpickles a fitte
 ``import discover`` alone does not import it.
 """
 
+import os
 import sys
 
 from discover.compilation_cache import enable_compilation_cache
@@ -31,7 +32,20 @@ def set_up() -> None:
         _require_no_single_arrays(jax)
         enable_x64()
     require_double()
+    _keep_developers_messages(jax)
     enable_compilation_cache()
+
+
+def _keep_developers_messages(jax) -> None:
+    """Keep from standard error what XLA and JAX write there for those who build them.
+
+    Such as alarms of slow compilation, a program of another processor in the cache, an accelerator
+    that nobody asked for. Whoever chose a level gets what they asked for.
+    """
+    by_jax = jax.config.jax_logging_level not in (None, "NOTSET")
+    # JAX itself sets the level of XLA to 1 where nobody did
+    if not by_jax and os.environ.get("TF_CPP_MIN_LOG_LEVEL", "1") == "1":
+        jax.config.update("jax_logging_level", "CRITICAL")
 
 
 def require_double() -> None:

@@ -1,6 +1,6 @@
 """One shape of progress, for everything that takes long."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from threading import Event
@@ -48,6 +48,50 @@ def require_wanted() -> None:
     stop = _stop.get()
     if stop is not None and stop.is_set():
         raise Stopped
+
+
+def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callable[[str], Progress]:
+    """Return what gives each part of a task the progress of its share.
+
+    Parameters
+    ----------
+    shares
+        Of the time that the task takes, by part, in the order in which they run; relative to each
+        other. Time left is told from the fraction done, so they are measured, not guessed.
+    """
+    total, begins, at = sum(shares.values()), {}, 0.0
+    for name, share in shares.items():
+        begins[name], at = at / total, at + share
+
+    def part(name: str) -> Progress:
+        return lambda text, fraction: (progress or silent)(
+            text, begins[name] + fraction * shares[name] / total
+        )
+
+    return part
+
+
+def by_stages(progress: Progress | None, rounds: int = 1) -> Callable[[str], None]:
+    """Return what passes on the lines of searches that end by themselves, one after another.
+
+    How many stages a search has is not known. The first line comes when the model it starts from is
+    fitted, after a quarter of its time; each further one leaves two fifths of the rest, until the
+    next search begins, which its first line shows by its beginning (the text before a colon).
+    """
+    begun: list[str] = []
+    left = 1.0
+
+    def say(line: str) -> None:
+        nonlocal left
+        name = line.partition(":")[0] if rounds > 1 else ""
+        if name not in begun and len(begun) < rounds:
+            begun.append(name)
+            left = 0.75
+        else:
+            left *= 0.4
+        (progress or silent)(line, min((len(begun) - left) / rounds, 0.95))
+
+    return say
 
 
 def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:

@@ -1,11 +1,13 @@
 """What is wrong in nested values that a user wrote, in the user's words."""
 
+import re
+from collections.abc import Sequence
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from discover.errors import InputError
-from discover.words import counted
+from discover.errors import InputError, Problems, problems_in
+from discover.words import did_you_mean, nearest
 
 _Model = TypeVar("_Model", bound=BaseModel)
 
@@ -40,7 +42,10 @@ class Section(BaseModel):
     is no 1, and "3" in quotes no 3.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, strict=True,
+        use_attribute_docstrings=True,  # what a key means, as the page of all keys says
+    )  # fmt: skip
 
     @model_validator(mode="before")
     @classmethod
@@ -70,37 +75,94 @@ def validated(model: type[_Model], content: object, where: str) -> _Model:
     Raises
     ------
     InputError
-        If a key is unknown or missing or a value is wrong; names the first, and counts the others.
+        If keys are unknown or missing or values are wrong; names all of them.
     """
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise InputError(_explain(error, where, model)) from None
+        raise InputError(_explain(error, content, where, model)) from None
 
 
-def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
-    problems = error.errors(include_url=False, include_context=False)
-    # an unknown key explains most of what follows it
-    problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
-    places = [_place(problem["loc"]) for problem in problems]
-    first, place = problems[0], places[0]
-    if first["type"] == "extra_forbidden":
-        text = f"unknown key {place!r}. Known keys there are: {_keys(model, first['loc'][:-1])}"
-    elif first["type"] == "missing" and isinstance(first["loc"][-1], int):
-        text = f"{_place(first['loc'][:-1])!r} needs more values than it has; add them"
-    elif first["type"] == "missing":
-        text = f"{place!r} is missing; write it"
-    else:
-        # the branches of a union fail one by one; users see one key
-        wishes = [_plain(p["msg"]) for p, at in zip(problems, places, strict=True) if at == place]
-        wishes = [wishes[0], *(wish.removeprefix("should be ") for wish in wishes[1:])]
-        text = f"{place or 'the file'}: {' or '.join(dict.fromkeys(wishes))}"
-        got = _shown(first.get("input"))
-        if len(got) <= _LONGEST and first["type"] != "value_error":
-            text += f"; got {got}"
-    more = len(set(places)) - 1
-    tail = f" (and {counted(more, 'more problem')} in this file)" if more else ""
-    return f"{where}: {text}.{tail}"
+def _explain(error: ValidationError, content: object, where: str, model: type[BaseModel]) -> str:
+    """Return all that is wrong, a line for each key; unknown keys first."""
+    texts, at = [], _by_place(error)
+    for place in [place for place, of in at.items() if of[0]["type"] == "extra_forbidden"]:
+        *section, key = at[place][0]["loc"]
+        known = _keys(model, tuple(section))
+        near = nearest(key, known)
+        guess = "" if near is None else f" Did you mean {near!r}?"
+        texts.append(f"unknown key {place!r}.{guess} Known keys there are: {', '.join(known)}")
+        content = _renamed(content, section, key, near)
+    if texts:  # what else is wrong shows with these keys spelled rightly, or left out
+        at = {}
+        try:
+            model.model_validate(content)
+        except ValidationError as further:
+            at = _by_place(further)
+    for place, of in at.items():
+        if of[0]["type"] != "extra_forbidden":
+            texts += _of_value(place, of)
+    problems = Problems()
+    for text in texts:
+        end = "" if text.endswith("?") else "."
+        problems.add(f"{'' if len(texts) > 1 else f'{where}: '}{text.rstrip('.')}{end}")
+    return problems.listed(where)
+
+
+def _by_place(error: ValidationError) -> dict[str, list[Any]]:
+    """Return what pydantic found, by place: branches of a union fail one by one, users see one."""
+    at: dict[str, list[Any]] = {}
+    for problem in error.errors(include_url=False):
+        at.setdefault(_place(problem["loc"]), []).append(problem)
+    return at
+
+
+def _renamed(content: Any, section: Sequence[Any], key: Any, name: str | None) -> Any:
+    """Return nested content with a key under another name, if that is free; else without it."""
+    if section and isinstance(content, list | tuple) and isinstance(section[0], int):
+        return [
+            _renamed(part, section[1:], key, name) if i == section[0] else part
+            for i, part in enumerate(content)
+        ]
+    if not isinstance(content, dict):
+        return content
+    if section:  # a part that is no key is the branch of a union
+        first, *rest = section
+        if first not in content:
+            return _renamed(content, rest, key, name)
+        return {**content, first: _renamed(content[first], rest, key, name)}
+    left = {k: value for k, value in content.items() if k != key}
+    return (
+        left if name is None or name in left or key not in content else {**left, name: content[key]}
+    )
+
+
+def _of_value(place: str, problems: Sequence[Any]) -> list[str]:
+    """Return what is wrong with the value of one key; of a section, of several of its keys."""
+    first = problems[0]
+    if first["type"] == "missing" and isinstance(first["loc"][-1], int):
+        return [f"{_place(first['loc'][:-1])!r} needs more values than it has; add them"]
+    if first["type"] == "missing":
+        return [f"{place!r} is missing; write it"]
+    where = place or "the file"
+    several = problems_in(first["msg"])
+    if len(several) > 1:
+        return [f"{where}: {one}" for one in several]
+    wishes = [_plain(problem["msg"]) for problem in problems]
+    wishes = [wishes[0], *(wish.removeprefix("should be ") for wish in wishes[1:])]
+    text = f"{where}: {' or '.join(dict.fromkeys(wishes))}"
+    got = first.get("input")
+    if len(_shown(got)) <= _LONGEST and first["type"] != "value_error":
+        text += f"; got {_shown(got)}"
+    words = [
+        word
+        for problem in problems
+        if problem["type"] == "literal_error"
+        for word in re.findall("'([^']*)'", problem["ctx"]["expected"])
+    ]
+    if isinstance(got, str) and words:
+        text += f".{did_you_mean(got, words)}"
+    return [text]
 
 
 def _shown(value: object) -> str:
@@ -135,14 +197,14 @@ def _is_branch(part: object) -> bool:
     )
 
 
-def _keys(model: type[BaseModel], location: tuple[Any, ...]) -> str:
+def _keys(model: type[BaseModel], location: tuple[Any, ...]) -> list[str]:
     """Return the keys of the section at a place."""
     for part in location:
         field = model.model_fields.get(str(part))
         inner = [] if field is None else list(_models(field.annotation))
         if inner:
             model = inner[0]
-    return ", ".join(field.alias or name for name, field in model.model_fields.items())
+    return [field.alias or name for name, field in model.model_fields.items()]
 
 
 def _models(annotation: Any):

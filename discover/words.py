@@ -3,6 +3,9 @@
 import difflib
 from collections.abc import Iterable, Sequence
 
+_LONGEST = 80
+"""Characters of a name that a message repeats."""
+
 
 def listed(parts: Sequence[str]) -> str:
     """Return what is listed in a sentence: 'one', 'one and another', 'one, another and a third'."""
@@ -24,7 +27,44 @@ def percent_of(share: float) -> str:
     return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"
 
 
+def nearest(given: object, known: Iterable[str]) -> str | None:
+    """Return what is spelled most like a text; None where nothing is.
+
+    Capitals do not count, and a hyphen or a blank is an underscore.
+    """
+    plain: dict[str, str] = {}
+    for name in known:
+        plain.setdefault(_plain(name), name)
+    # of a longer text no name is meant, and difflib would take minutes
+    near = difflib.get_close_matches(_plain(str(given)[:_LONGEST]), list(plain), 1)
+    return plain[near[0]] if near else None
+
+
+def _plain(name: str) -> str:
+    return name.casefold().replace("-", "_").replace(" ", "_")
+
+
 def did_you_mean(given: object, known: Iterable[str]) -> str:
     """Return a question that names what is spelled most like a text; empty where nothing is."""
-    near = difflib.get_close_matches(str(given), list(known), 1)
-    return f" Did you mean {near[0]!r}?" if near else ""
+    near = nearest(given, known)
+    return "" if near is None else f" Did you mean {near!r}?"
+
+
+def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
+    """Return what is said of a name that nobody knows.
+
+    Parameters
+    ----------
+    what
+        What it was to name, in the singular.
+    given
+        The name.
+    known
+        Names that would do.
+    """
+    names = list(known)
+    text = str(given)
+    shown = repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
+    return (
+        f"Unknown {what} {shown}.{did_you_mean(given, names)} Known: {', '.join(names) or 'none'}."
+    )

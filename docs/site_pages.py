@@ -34,7 +34,7 @@ REFERENCE = {
     ),
     "laws": ("Fluids and laws", "laws make_law Fluid AbstractConstitutiveLaw"),
     "learners": ("Learners", "TensorSINDy TBNNUDE TensorDense load build_library ClosedForm"),
-    "loops": ("Comparing and closing the loop", "compare close_loop effects"),
+    "loops": ("Fitting, comparing and closing the loop", "fit compare close_loop effects"),
     "registering": (
         "Additions of your own",
         "register_law register_effect register_closed_form register_learner register_importer",
@@ -49,8 +49,9 @@ RESULTS = {
         "discover.learners.LearnerResult",
     ),
     "loops": (
+        "discover.fitting.NamedLawFit",
         "discover.comparison.comparison.Comparison",
-        "discover.closed_loop.results.loop_result.LoopResult",
+        "discover.loop.loop_result.LoopResult",
     ),
 }
 

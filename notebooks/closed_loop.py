@@ -27,7 +27,7 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.closed_loop import DeclaredModel, run_loop
+from discover.loop import DeclaredModel, run_loop
 from discover.simulate import synthetic_dataset
 
 data = synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01)
@@ -43,9 +43,8 @@ result
 # %% [markdown]
 # ## Why this effect: all candidates, and what each would have gained
 #
-# `score` is the share of the residual that the effect's signature explains to first order,
-# `left_out_error` the error on each run left out in turn after a refit. `aliases` are effects that
-# these data cannot tell from it.
+# `score` is the share of the squared residual that the effect explains to first order, `evidence`
+# twice the log of the posterior odds that it adds, where it was refitted.
 
 # %%
 result.ranking_table()

@@ -178,3 +178,15 @@ def _tuples(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _tuples(item) for name, item in value.items()}
     return tuple(map(_tuples, value)) if isinstance(value, list | tuple) else value
+
+
+def spell(coefficients: Mapping[str, float | int]) -> str:
+    """Return a sum of terms as text, such as ``tr(sigma)*sigma − 2 gammadot``."""
+    text = ""
+    for name, value in coefficients.items():
+        size = f"{abs(value):.4g}"
+        sign = "−" if value < 0 else "+"
+        tensor = f"({name})" if "+" in name and "*" not in name else name
+        text += f" {sign} " if text else ("−" if value < 0 else "")
+        text += tensor if size == "1" else f"{size} {tensor}"
+    return text or "0"

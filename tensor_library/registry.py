@@ -49,6 +49,12 @@ class Registry(MutableMapping[str, T]):
                 self._own = frozenset(self._known)
             return self._known
 
+    @property
+    def built_in(self) -> dict[str, T]:
+        """Return what is always there."""
+        present = self.present
+        return {name: present[name] for name in present if name in (self._own or ())}
+
     def __getitem__(self, name: str) -> T:
         return self._all()[name]
 

@@ -63,7 +63,7 @@ def as_users_run_it() -> Iterator[None]:
 # shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
     "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
-    "test_tbnn_training.py", "test_planting.py", "test_tensor_sindy_estimator.py",
+    "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
     "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
     "test_modulus_errors.py", "test_modes_of_a_stiff_fluid.py", "test_flows_of_fluids.py",
     "test_constants_by_mode.py", "test_loop.py", "test_law_choice.py",
@@ -208,16 +208,6 @@ def left_to_the_verdict():
 def left_to_the_page():
     """Let a patch leave out whether records were misread, of which a page has a sentence alone."""
     return _leave_out_other_readings
-
-
-@pytest.fixture(scope="module")
-def effects_alone() -> Iterator[None]:
-    """Leave out free functions and next tests of loops, which have files of tests of their own."""
-    beyond = importlib.import_module("discover.closed_loop.beyond.beyond_the_search")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(beyond, "_free_functions", lambda *_: ())
-        patch.setattr(beyond, "next_tests", lambda *_: beyond.NextTests())
-        yield
 
 
 @pytest.fixture(scope="session")

@@ -19,7 +19,7 @@ def judged(contestant: ModuleType, fluid: str, seed: int) -> dict:
     answer = contestant.learn(given)
     seconds = time.process_time() - started
     errors = worst_errors(answer, fluid)
-    return {"law": answer.law, "words": answer.words, "errors": errors, "seconds": seconds}
+    return {"law": answer.law, "words": answer.words, "errors": errors, "learning": seconds}
 
 
 def worst_errors(answer: Answer, fluid: str) -> dict[str, float | None]:
@@ -64,7 +64,7 @@ def tables(results: Mapping[tuple[str, str], dict], titles: Mapping[str, str]) -
         rows = {fluid: results[name, fluid] for fluid in FLUIDS if (name, fluid) in results}
         done = {fluid: row for fluid, row in rows.items() if "errors" in row}
         if not done:
-            reason = next(iter(rows.values()))["failed"] if rows else "not run"
+            reason = next(iter(rows.values()))["message"] if rows else "not run"
             lines.append(f"| {title} | {reason} |" + " |" * (len(QUANTITIES) + 2))
             continue
         cells = [_middle([row["errors"][q] for row in done.values()]) for q in QUANTITIES]
@@ -72,7 +72,7 @@ def tables(results: Mapping[tuple[str, str], dict], titles: Mapping[str, str]) -
         right = sum(law is not None and law == FLUIDS[fluid][0] for fluid, law in named.items())
         wrong = sum(law is not None and law != FLUIDS[fluid][0] for fluid, law in named.items())
         cells += [str(right), str(wrong)] if any(named.values()) else ["–", "–"]
-        cells.append(f"{np.median([row['seconds'] for row in done.values()]):.0f}")
+        cells.append(f"{np.median([row['learning'] for row in done.values()]):.0f}")
         missing = "" if len(done) == len(FLUIDS) else f" ({len(done)} of {len(FLUIDS)} fluids)"
         lines.append(f"| {title}{missing} | " + " | ".join(cells) + " |")
     lines += ["", "| N1; extension | " + " | ".join(FLUIDS) + " |", "|---|" + "---|" * len(FLUIDS)]
@@ -82,7 +82,7 @@ def tables(results: Mapping[tuple[str, str], dict], titles: Mapping[str, str]) -
             row = results.get((name, fluid), {})
             errors = row.get("errors")
             pair = [percent(errors[q]) for q in ("N1", "tensile")] if errors else []
-            cells.append("; ".join(pair) or row.get("failed", "not run"))
+            cells.append("; ".join(pair) or row.get("message", "not run"))
         lines.append(f"| {title} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

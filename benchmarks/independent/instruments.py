@@ -4,12 +4,13 @@ Friction and inertia follow the rate of the tool; slip and compliance come betwe
 fluid, so that with them the fluid feels another rate than the tool has.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
-from independent.flow import Flow
+from independent.flow import Flow, oscillation, start_up, step_strain
 from independent.material import Material, RateLaw, Stresses, differences, integrate
 
 _STEP = 1e-6  # of a finite difference, relative
@@ -267,3 +268,75 @@ def _ringing(times: np.ndarray, signal: np.ndarray, frequency: float, damping: f
         max_step=float(np.max(np.diff(times))),
     )
     return solution.y[0]
+
+
+_PERFECT = Instrument()
+
+
+def relaxation_as_run(
+    material: Material, strain: float, rise: float, times: np.ndarray
+) -> Recording:
+    """Return the relaxation after a step of strain, from its end on, with its measured strain.
+
+    The step takes `rise` seconds, before the first sample; the file says nothing of it, so the run
+    looks as if it began at rest with a rate of zero and a strain that is there already.
+    """
+    times = np.asarray(times, float)
+    whole = _PERFECT.record(material, step_strain(strain, rise), times + rise)
+    zero = np.zeros_like(times)
+    return replace(
+        whole, time=times, rate=zero, felt_rate=zero, tool_rate=zero, strain=zero + strain
+    )
+
+
+def alternation_as_from_rest(
+    material: Material, amplitude: float, frequency: float, times: np.ndarray, cycles: int = 10
+) -> Recording:
+    """Return γ̇ = amplitude cos(ωt) in steady alternation, with its time counted from a crest."""
+    times = np.asarray(times, float)
+    late = times + cycles * 2 * np.pi / frequency
+    whole = _PERFECT.record(material, oscillation(amplitude, frequency), late)
+    return replace(whole, time=times)
+
+
+def scaled(recording: Recording, stress: float = 1.0, time: float = 1.0) -> Recording:
+    """Return a record whose stress or time is written in another unit than its column says."""
+    return replace(recording, stress=stress * recording.stress, time=time * recording.time)
+
+
+def nothing(recording: Recording, level: float) -> Recording:
+    """Return a record of the same times and rates without a fluid: a constant stress in Pa."""
+    flat = np.full_like(recording.stress, level)
+    zero = np.zeros_like(flat)
+    return replace(recording, stress=flat, true=Stresses(zero, zero, zero), N1=None, N2=None)
+
+
+NOISE = 0.01
+JUDGE = "judge.csv"
+FLOWS = {
+    "up.csv": (start_up(1.5), 6.0),
+    "swing.csv": (oscillation(2.0, 1.0), 10.0),
+    "wide.csv": (oscillation(4.0, 0.5), 12.0),
+    JUDGE: (oscillation(3.0, 0.8), 10.0),
+}
+
+
+def as_it_is(run: Recording, flow: Flow) -> np.ndarray:
+    """Return the stress as it is recorded."""
+    return run.stress
+
+
+def curve_records(
+    material: Material,
+    instrument: Instrument | None = None,
+    read: Callable[[Recording, Flow], np.ndarray] = as_it_is,
+    seed: int = 0,
+) -> dict[str, Recording]:
+    """Return runs of 120 samples with white noise, of which `read` makes the stress in a flow."""
+    generator, runs = np.random.default_rng(seed), {}
+    for name, (flow, end) in FLOWS.items():
+        run = (instrument or Instrument()).record(material, flow, np.linspace(0.02, end, 120))
+        stress = read(run, flow)
+        size = NOISE * np.sqrt(np.mean(stress**2))
+        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
+    return runs

@@ -50,7 +50,6 @@ class RateLaw(Material):
         """Return the state at rest, shape (m,)."""
 
     def scale(self) -> np.ndarray:
-        """Return the size of each state that counts as one, shape (m,): 1 for a conformation."""
         return np.ones(len(self.rest()))
 
     @abstractmethod
@@ -159,15 +158,12 @@ class StressLaw(RateLaw):
     """A rate law whose state is the extra stress tensor itself, nine numbers in Pa."""
 
     def rest(self) -> np.ndarray:
-        """Return no stress."""
         return np.zeros(9)
 
     def scale(self) -> np.ndarray:
-        """Return the modulus, nine times."""
         return np.full(9, self.modulus)
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return dσ/dt, flattened."""
         return self.stress_change(state.reshape(3, 3), rate).ravel()
 
     @abstractmethod
@@ -175,8 +171,6 @@ class StressLaw(RateLaw):
         """Return dσ/dt in Pa/s, shape (3, 3)."""
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return the state as a tensor."""
-        del rate
         return state.reshape(3, 3)
 
 
@@ -190,21 +184,17 @@ class Modes(RateLaw):
         self._places = [slice(*both) for both in pairwise(ends)]
 
     def rest(self) -> np.ndarray:
-        """Return the states at rest, one after another."""
         return np.concatenate([law.rest() for law in self.laws])
 
     def scale(self) -> np.ndarray:
-        """Return the scales, one after another."""
         return np.concatenate([law.scale() for law in self.laws])
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return the time derivatives, one after another."""
         places = zip(self.laws, self._places, strict=True)
         changes = [law.change(state[place], rate) for law, place in places]
         return np.concatenate(changes)
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        """Return the sum of the stresses."""
         places = zip(self.laws, self._places, strict=True)
         tensors = [law.stress(state[place], rate) for law, place in places]
         return np.sum(tensors, axis=0)

@@ -2,17 +2,20 @@
 
 from collections.abc import Mapping
 
-from independent.authors import giesekus_non_affine, rolie_poly_fene, saramito, white_metzner
-from independent.by_authors import ByAuthors
-from independent.fene_p import FenePeterlin
-from independent.giesekus import Giesekus
-from independent.johnson_segalman import JohnsonSegalman
+from independent import (
+    ExtendedPomPom,
+    FenePeterlin,
+    Giesekus,
+    JohnsonSegalman,
+    PhanThienTanner,
+    PomPom,
+    RoliePoly,
+    RoliePolyBlend,
+    UpperConvectedMaxwell,
+    authors,
+)
+from independent.authors import ByAuthors
 from independent.material import RateLaw
-from independent.maxwell import UpperConvectedMaxwell
-from independent.phan_thien_tanner import PhanThienTanner
-from independent.pom_pom import ExtendedPomPom, PomPom
-from independent.rolie_poly import RoliePoly
-from independent.rolie_poly_blend import RoliePolyBlend
 
 CONSTANTS: dict[str, dict[str, float]] = {
     "ucm": {},
@@ -58,33 +61,31 @@ def material(
     """
     scale = {"modulus": modulus, "relaxation_time": relaxation_time}
     c, time = constants, relaxation_time
-    if law == "ucm":
-        return UpperConvectedMaxwell(**scale)
-    if law == "johnson_segalman":
-        return JohnsonSegalman(c["xi"], **scale)
-    if law == "giesekus":
-        return Giesekus(c["alpha"], **scale)
-    if law in ("ptt_linear", "ptt_linear_non_affine"):
-        return PhanThienTanner(c["epsilon"], "linear", c.get("xi", 0.0), **scale)
-    if law in ("ptt_exponential", "ptt_exponential_non_affine"):
-        return PhanThienTanner(c["epsilon"], "exponential", c.get("xi", 0.0), **scale)
-    if law == "fene_p":
-        return FenePeterlin(c["L2"], **scale)
-    if law == "xpp":
-        return ExtendedPomPom(c["q"], c["alpha"], c["stretch_time_ratio"] * time, **scale)
-    if law in ("pom_pom", "pom_pom_drag_strain"):
-        # growth of the stretch fades over the share of q that the software documents
-        drag_strain = law == "pom_pom_drag_strain"
-        return PomPom(c["q"], c["stretch_time_ratio"] * time, modulus, time, drag_strain, fade=0.05)
-    if law == "rolie_poly":
-        return RoliePoly(c["beta"], c["stretch_time_ratio"] * time, **scale)
-    if law == "rolie_poly_blend":
-        phi, short = c["long_fraction"], c["short_time_ratio"] * time
-        stretch = c["stretch_time_ratio"] * time, c["short_stretch_time_ratio"] * short
-        return RoliePolyBlend((phi, 1 - phi), (time, short), stretch, c["beta"], modulus)
-    functions = (giesekus_non_affine, rolie_poly_fene, saramito, white_metzner)
-    function = {one.__name__: one for one in functions}[law]
-    return ByAuthors(function, dict(c), **scale)
+    kind = law.removeprefix("ptt_").partition("_")[0]
+    match law:
+        case "ucm":
+            return UpperConvectedMaxwell(**scale)
+        case "johnson_segalman":
+            return JohnsonSegalman(c["xi"], **scale)
+        case "giesekus":
+            return Giesekus(c["alpha"], **scale)
+        case "fene_p":
+            return FenePeterlin(c["L2"], **scale)
+        case "xpp":
+            return ExtendedPomPom(c["q"], c["alpha"], c["stretch_time_ratio"] * time, **scale)
+        case "pom_pom" | "pom_pom_drag_strain":
+            # growth of the stretch fades over the share of q that the software documents
+            stretch, drag = c["stretch_time_ratio"] * time, law == "pom_pom_drag_strain"
+            return PomPom(c["q"], stretch, modulus, time, drag, fade=0.05)
+        case "rolie_poly":
+            return RoliePoly(c["beta"], c["stretch_time_ratio"] * time, **scale)
+        case "rolie_poly_blend":
+            phi, short = c["long_fraction"], c["short_time_ratio"] * time
+            stretch = c["stretch_time_ratio"] * time, c["short_stretch_time_ratio"] * short
+            return RoliePolyBlend((phi, 1 - phi), (time, short), stretch, c["beta"], modulus)
+    if law.startswith("ptt_"):
+        return PhanThienTanner(c["epsilon"], kind, c.get("xi", 0.0), **scale)
+    return ByAuthors(getattr(authors, law), dict(c), **scale)
 
 
 def linear_modes(

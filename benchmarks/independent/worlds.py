@@ -9,21 +9,25 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from independent.fene_p import FenePeterlin
+from independent import (
+    KBKZ,
+    ExtendedPomPom,
+    FenePeterlin,
+    Giesekus,
+    JohnsonSegalman,
+    PhanThienTanner,
+    PomPom,
+    RoliePoly,
+    SoftGlass,
+    Thixotropic,
+    UpperConvectedMaxwell,
+    WhiteMetzner,
+    multimode_giesekus,
+)
 from independent.flow import Flow, oscillation, start_up, steps
-from independent.giesekus import Giesekus, multimode_giesekus
 from independent.instruments import Instrument, Recording
-from independent.johnson_segalman import JohnsonSegalman
-from independent.k_bkz import KBKZ
 from independent.material import Material, RateLaw
-from independent.maxwell import UpperConvectedMaxwell
 from independent.noise import correlated, outliers, proportional, white
-from independent.phan_thien_tanner import PhanThienTanner
-from independent.pom_pom import ExtendedPomPom, PomPom
-from independent.rolie_poly import RoliePoly
-from independent.soft_glass import SoftGlass
-from independent.thixotropic import Thixotropic
-from independent.white_metzner import WhiteMetzner
 
 MODULUS, TIME, SAMPLES = 100.0, 1.0, 120
 SCALE = {"modulus": MODULUS, "relaxation_time": TIME}

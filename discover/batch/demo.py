@@ -4,7 +4,7 @@ from importlib.resources import as_file, files
 from pathlib import Path
 
 from discover.batch.tasks import run_close_loop, run_compare
-from discover.progress import Progress
+from discover.progress import Progress, by_shares
 
 
 def run_demo(
@@ -19,13 +19,9 @@ def run_demo(
     seed, overwrite, progress
         As in `discover.batch.tasks.run_compare`.
     """
-    report = progress or (lambda label, fraction: None)
+    part = by_shares(progress, {"comparison": 0.9, "loop": 0.1})
     studies = files("discover.batch") / "demo_studies"
     with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:
-        first = run_compare(
-            comparison, out, seed, overwrite, lambda text, f: report(text, 0.75 * f)
-        )
-        second = run_close_loop(
-            loop, out / "loop", seed, overwrite, lambda text, f: report(text, 0.75 + 0.25 * f)
-        )
+        first = run_compare(comparison, out, seed, overwrite, part("comparison"))
+        second = run_close_loop(loop, out / "loop", seed, overwrite, part("loop"))
     return {"Comparison of two learners": first.report, "Closed loop": second.report}

@@ -9,6 +9,7 @@ import pandas as pd
 
 from discover.dataset.tables.table import read_bytes
 from discover.plain_json import parse_json
+from tensor_library.law_terms import spell
 
 QUANTITIES = ("sigma12", "N1", "N2")
 
@@ -31,11 +32,11 @@ class LearnerRow:
     @property
     def text(self) -> str:
         """The terms as plain text."""
-        parts = []
+        parts = {}
         for term, value, inner in self.terms:
             values = ", ".join(f"{name} = {number:.4g}" for name, number in inner.items())
-            parts.append(f"{value:.4g} {term}" + (f" [{values}]" if values else ""))
-        return " + ".join(parts) or "no term"
+            parts[f"{term} [{values}]" if values else term] = value
+        return spell(parts) if parts else "no term"
 
 
 @dataclass(frozen=True)

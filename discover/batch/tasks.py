@@ -8,11 +8,15 @@ import numpy as np
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
-from discover.progress import Progress
+from discover.progress import Progress, by_shares
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import counted
+
+_LOOP_SHARES = {"loading": 0.05, "search": 0.69, "drawing": 0.26}
+_COMPARE_SHARES = {"comparing": 0.91, "drawing": 0.09}
+"""Of the time of small studies, such as the demonstration's."""
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -111,7 +115,9 @@ def run_compare(
     from discover.study.declared_model import declared_model
 
     sources = read_overlays(study)
-    comparison = compare(study, seed, progress, folder, fit_constants=fit_declared)
+    part = by_shares(progress, _COMPARE_SHARES)
+    comparison = compare(study, seed, part("comparing"), folder, fit_constants=fit_declared)
+    part("drawing")("drawing", 0.0)
     overlays = ()
     if sources:
         model = declared_model(study, load_study_data(study, seed).dataset)
@@ -122,7 +128,9 @@ def run_compare(
         overlays = comparison_overlays(sources, comparison.flows, fluid)
     relaxes = study.model.known_relaxation
     write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
-    return _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
+    ended = _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
+    progress("done", 1.0)
+    return ended
 
 
 def run_close_loop(
@@ -140,25 +148,24 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
     if there is not None:
         return there
-    from discover.closed_loop.each_run import run_loop_on
     from discover.dataset.conditions import material_and_temperature
+    from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
     from discover.report.loop.verdict import loop_verdict
     from discover.report.overlay import loop_overlays, read_overlays
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model, forward_model
 
-    progress("loading data", 0.0)
+    part = by_shares(progress, _LOOP_SHARES)
+    part("loading")("loading data", 0.0)
     sources = read_overlays(study)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
     asked = dict(study.loop)
-    result = run_loop_on(
-        data_of_study, declared, progress, laws=model.choice, store=folder, **asked
-    )
+    result = run_loop_on(data_of_study, declared, part("search"), laws=model.choice, **asked)
     each = data_of_study.each
-    progress("drawing", 0.97)
+    part("drawing")("drawing", 0.0)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
     summary = (
@@ -204,8 +211,8 @@ def fit_declared(model, dataset):
     """
     if not model.free:
         return model
-    from discover.closed_loop import run_loop
     from discover.laws import make_law
+    from discover.loop import run_loop
     from discover.study.declared_model import forward_model
 
     # with no effect allowed the loop only fits the declared model; it wants to know one by name

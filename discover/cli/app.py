@@ -25,7 +25,6 @@ app = typer.Typer(
     help="Find the constitutive equation of a viscoelastic fluid from rheometer data, and say "
     "what the data can and cannot tell. To begin: discover demo",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 

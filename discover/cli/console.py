@@ -8,6 +8,7 @@ from typing import Any
 
 import typer
 
+from discover.errors import problems_in
 from discover.stop_callbacks import on_stop
 
 Report = Callable[[str, float], None]
@@ -62,9 +63,15 @@ def say(text: str, err: bool = False) -> None:
 
 
 def say_error(message: str) -> None:
-    """Print one line on standard error, as every failure of a command ends."""
-    words = (word if len(word) <= _LONGEST else f"{word[:_LONGEST]}…" for word in message.split())
-    say(f"discover: {' '.join(words)}", err=True)
+    """Print on standard error what a command ends with: one line, or one for each problem."""
+    head, *others = [message.partition("\n")[0], *problems_in(message)]
+    lines = [f"discover: {_one_line(head)}", *(f"  - {_one_line(one)}" for one in others)]
+    say("\n".join(lines if len(lines) > 2 else [f"discover: {_one_line(message)}"]), err=True)
+
+
+def _one_line(text: str) -> str:
+    words = (word if len(word) <= _LONGEST else f"{word[:_LONGEST]}…" for word in text.split())
+    return " ".join(words)
 
 
 def _plain(line: str) -> str:

@@ -12,6 +12,7 @@ from discover.cli.console import say
 from discover.cli.guard import guarded
 from discover.cli.options import OverwriteOption
 from discover.errors import InputError
+from discover.words import unknown_name
 
 
 @guarded
@@ -36,7 +37,7 @@ def fetch_data(
     from discover.study.atomic import make_folder, write_text
 
     if name not in CATALOGUE:
-        raise InputError(f"Unknown data set {name!r}; write {' or '.join(CATALOGUE)}.")
+        raise InputError(unknown_name("data set", name, CATALOGUE))
     dataset = CATALOGUE[name]
     typer.echo(f"{dataset.title}, from {dataset.package} {dataset.version}.")
     typer.echo(f"Licence: {dataset.licence}")

@@ -29,10 +29,12 @@ from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
 from discover.identify.rivals.bands import PredictionBand
 from discover.identify.structure.structure import Structure
-from discover.notebook_view import NotebookView, table_of
+from discover.learners.results.term_tables import estimates_of
+from discover.notebook_view import table_of
 from discover.page_view import PageView
 from discover.plain_json import plain
 from discover.statistics import FitVerdict
+from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import LawTerm
 
 
@@ -65,7 +67,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Comparison(PageView, NotebookView):
+class Comparison(PageView, SummaryView):
     """Both learners beside the known part alone, in the same flows.
 
     Attributes
@@ -148,10 +150,23 @@ class Comparison(PageView, NotebookView):
     loadings: OwnLoadings | None = None
 
     _page = "discover.report.in_memory:comparison_page"
+    _index = ("learner", "constant")
 
     def __repr__(self) -> str:
         found = ", ".join(f"{n}: {len(o.terms)} terms" for n, o in self.outcomes.items())
         return f"<Comparison {self.name!r}: {self.verdict}; {found}>"
+
+    def _estimates(self) -> list[Estimate]:
+        found = []
+        rivals = [set(rival.law.coefficients) for rival in self.rivals]
+        for name, outcome in self.outcomes.items():
+            left = self.explanation.lack_of_fit.get(name)
+            found += estimates_of(outcome.terms, left, rivals, (name,))
+            found += [
+                Estimate((name, key), one.value, one.ci95, one.unit or "1")
+                for key, one in outcome.constants.items()
+            ]
+        return found
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return `errors_table` with flow and quantity as columns."""

@@ -15,6 +15,7 @@ from discover.progress import Progress
 from discover.study.data import load_study_data
 from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
+from discover.words import unknown_name
 
 Asked = tuple[str, float, Study]
 """A law, the value of its parameter, and the study of that point."""
@@ -32,11 +33,8 @@ def sweep_studies(study: Study) -> list[Asked]:
     studies = []
     for law in sweep.laws:
         if sweep.parameter not in LAWS[law].parameters:
-            wanted = ", ".join(LAWS[law].parameters) or "none"
-            raise InputError(
-                f"compare.sweep: the law {law!r} has no parameter {sweep.parameter!r}. "
-                f"Write one of its parameters: {wanted}."
-            )
+            said = unknown_name("parameter", sweep.parameter, LAWS[law].parameters)
+            raise InputError(f"compare.sweep: the law {law!r}: {said}")
         for value in sweep.values:
             make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
             made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})

@@ -12,9 +12,10 @@ from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
-from discover.errors import InputError
+from discover.errors import InputError, Problems
 from discover.notebook_view import NotebookView
 from discover.plain_numbers import short
+from discover.words import unknown_name
 
 
 @dataclass(frozen=True)
@@ -132,9 +133,7 @@ class Dataset(NotebookView):
                 f"The run {name!r} of {self.name!r} cannot be used: {self.set_aside[name]}. Name "
                 "another."
             )
-        raise InputError(
-            f"The data set {self.name!r} has no run {name!r}; it has {', '.join(self.names)}."
-        )
+        raise InputError(f"The data set {self.name!r}: {unknown_name('run', name, self.names)}")
 
     def _numbered(self, number: int) -> Run:
         if not -len(self) <= number < len(self):
@@ -201,7 +200,12 @@ class Dataset(NotebookView):
         listed = isinstance(names, Iterable) and not isinstance(names, str)
         if not listed or not all(isinstance(name, str) for name in names):
             raise InputError(f"Runs are named in a list; got {short(names)}.")
-        return replace(self, runs=tuple(self._named(name) for name in names))
+        problems, runs = Problems(), []
+        for name in names:
+            with problems.collected():
+                runs.append(self._named(name))
+        problems.require_none(self.name)
+        return replace(self, runs=tuple(runs))
 
     def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":
         """Return the data with tables beside the runs as runs among them.

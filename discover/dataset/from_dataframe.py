@@ -13,6 +13,7 @@ from discover.dataset.dataset import Dataset
 from discover.dataset.load import DATA_FILES, INDEX_FILE, load_dataset
 from discover.errors import InputError
 from discover.plain_numbers import short
+from discover.words import unknown_name
 
 _KINDS = tuple(name.removesuffix(".csv") for name in DATA_FILES if name != INDEX_FILE)
 
@@ -78,10 +79,11 @@ def from_dataframe(
             )
     no_option = [one for one in options if one not in signature(load_dataset).parameters]
     if no_option:
-        raise InputError(f"from_dataframe has no option {short(no_option[0])}; see load_dataset.")
+        known = list(signature(load_dataset).parameters)[1:]
+        raise InputError(f"from_dataframe: {unknown_name('option', no_option[0], known)}")
     unknown = [kind for kind in tables or {} if kind not in _KINDS]
     if unknown:
-        raise InputError(f"There is no table {unknown[0]!r}; it may be {', '.join(_KINDS)}.")
+        raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
     with TemporaryDirectory() as folder:
         for run, table in by_run.items():

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from discover.dataset.tables.table import Table
 from discover.errors import InputError
 from discover.protocols.kinematics import KINDS
+from discover.words import did_you_mean
 
 _VALUES = {
     "flow": KINDS,
@@ -112,7 +113,8 @@ def _value(index: Table, row: int, column: str) -> str:
         return values[0]  # a time at which the run started, as `sequence` takes it
     if cell and cell not in values:
         raise InputError(
-            f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}. Write one of "
+            f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}."
+            f"{did_you_mean(cell, values)} Write one of "
             f"{', '.join(values)}; an empty cell is {values[0]}."
         )
     return cell or values[0]

@@ -15,10 +15,12 @@ from discover.dataset.read_run import INDEX_FILE, read_run
 from discover.dataset.records.differentiation import DEFAULT_WINDOW
 from discover.dataset.records.sequence import in_sequence
 from discover.dataset.records.thinning import thin_sweep
+from discover.dataset.run import Run
 from discover.dataset.tables import units
-from discover.dataset.tables.table import Table, read_bytes, read_table, shown
-from discover.errors import InputError
+from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table, shown
+from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
+from discover.words import did_you_mean
 
 DATA_VARIABLE = "DISCOVER_DATA"
 """Environment variable that names the folder of data folders."""
@@ -94,9 +96,10 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
         if os.environ.get(DATA_VARIABLE)
         else f" The environment variable {DATA_VARIABLE} is not set."
     )
+    near = next(filter(None, map(did_you_mean_file, candidates)), "")
     raise InputError(
-        f"There is no data folder {str(folder)!r}. Give its path, absolute or relative to the "
-        f"study file or to {DATA_VARIABLE}.{hint}"
+        f"There is no data folder {str(folder)!r}.{near} Give its path, absolute or relative to "
+        f"the study file or to {DATA_VARIABLE}.{hint}"
     )
 
 
@@ -156,34 +159,39 @@ def load_dataset(
     root = resolve_folder(folder, base)
     index = read_index(root)
     names = index.columns["file"]
-    tables, unused = read_material_functions(root, names, amplitude_sweep_rad_s)
+    problems = Problems()
+    tables, unused, sweep = {}, {}, None
+    with problems.collected():
+        tables, unused = read_material_functions(root, names, amplitude_sweep_rad_s)
+    with problems.collected():
+        sweep = find_sweep(root)
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
-    aside = [reason_to_set_aside(index, row, before is not None) for row in range(len(index))]
+    aside: list[str | None] = []
+    for row in range(len(index)):
+        reason = None
+        with problems.collected():
+            reason = reason_to_set_aside(index, row, before is not None)
+        aside.append(reason)
     used = [row for row, reason in enumerate(aside) if reason is None]
-    if not used and aside:
+    if not used and aside and not problems:
         raise InputError(
             f"No run of {root.resolve().name!r} can be fitted: {index.columns['file'][0]} is set "
             f"aside, since {aside[0]}."
         )
-    runs = tuple(
-        read_run(
-            root,
-            index,
-            row,
-            factors[row],
-            rate_is_measured,
-            rate_window,
-            None if before is None else float(before[row]),
-        )
-        for row in used
-    )
+    runs: tuple[Run, ...] = ()
+    for row in used:
+        steady = None if before is None else float(before[row])
+        with problems.collected():
+            run = read_run(root, index, row, factors[row], rate_is_measured, rate_window, steady)
+            runs = (*runs, run)
+    problems.require_none(root.resolve().name)
     if sequence is not None and runs:
         runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
     return Dataset(
         name=root.resolve().name,
         runs=runs,
-        linear_sweep=find_sweep(root),
+        linear_sweep=sweep,
         provenance=_provenance(root),
         set_aside=unused
         | {
@@ -257,23 +265,22 @@ def read_index(root: Path) -> Table:
             "it, with the file name of each run."
         )
     seen: set[str] = set()
+    problems = Problems()
     for line, name in zip(index.lines, index.columns["file"], strict=True):
+        where = f"Line {line} of {INDEX_FILE}"
         if not name:
-            raise InputError(
-                f"Line {line} of {INDEX_FILE} names no file. Name one, or remove the line."
+            problems.add(f"{where} names no file. Name one, or remove the line.")
+        elif not name.isprintable():
+            problems.add(f"{where} names {name!r}; no file is named so. Correct it.")
+        elif name in seen:
+            problems.add(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
+        elif not _is_inside(root, name):
+            problems.add(
+                f"{where} names {name!r}, which lies outside the folder or is a link to there. Put "
+                "the file itself in the folder and name it without a path."
             )
-        if not name.isprintable():
-            raise InputError(
-                f"Line {line} of {INDEX_FILE} names {name!r}; no file is named so. Correct it."
-            )
-        if name in seen:
-            raise InputError(f"{INDEX_FILE} names {name} twice, again on line {line}; keep one.")
         seen.add(name)
-        if not _is_inside(root, name):
-            raise InputError(
-                f"Line {line} of {INDEX_FILE} names {name!r}, which lies outside the folder or is "
-                "a link to there. Put the file itself in the folder and name it without a path."
-            )
+    problems.require_none(INDEX_FILE)
     return index
 
 
@@ -314,8 +321,8 @@ def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs
     """
     if column not in index.columns:
         raise InputError(
-            f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}. "
-            f"Correct the name, or leave {key} out."
+            f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}."
+            f"{did_you_mean(column, index.columns)} Correct the name, or leave {key} out."
         )
     return index.numbers(column)
 
@@ -346,21 +353,19 @@ def read_sweep(path: Path) -> LinearSweep:
         If the file is wrong, or a frequency or modulus is not positive.
     """
     table = read_table(path)
-    frequency = table.required(units.ANGULAR_FREQUENCY)
-    storage = table.required(units.STORAGE_MODULUS)
-    loss = table.required(units.LOSS_MODULUS)
-    for quantity, values in (
-        (units.ANGULAR_FREQUENCY, frequency),
-        (units.STORAGE_MODULUS, storage),
-        (units.LOSS_MODULUS, loss),
-    ):
+    quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
+    frequency, storage, loss = columns = table.all_required(*quantities)
+    problems = Problems()
+    for quantity, values in zip(quantities, columns, strict=True):
         found = units.find_column(tuple(table.columns), quantity)
-        if found is not None and np.any(values <= 0):
-            row = int(np.argmax(values <= 0))
-            raise InputError(
+        rows = np.flatnonzero(values <= 0)
+        if found is not None and rows.size:
+            row = int(rows[0])
+            problems.add(
                 f"{found[0]} in {table.name} must be positive; line {table.lines[row]} holds "
-                f"{shown(table.columns[found[0]][row])}. Remove that line."
+                f"{shown(table.columns[found[0]][row])}. Remove that line.{table.like_it(rows)}"
             )
+    problems.require_none(table.name)
     order = np.argsort(frequency, kind="stable")
     keep, note = thin_sweep(frequency[order])
     order = order[keep]

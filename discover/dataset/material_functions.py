@@ -65,8 +65,7 @@ def read_material_functions(
 
 
 def _flow_curve(table: Table) -> Run:
-    rate = table.required(units.SHEAR_RATE)
-    stress = table.required(units.SHEAR_STRESS)
+    rate, stress = table.all_required(units.SHEAR_RATE, units.SHEAR_STRESS)
     _require_positive(table, rate, "shear_rate")
     order = np.argsort(rate, kind="stable")
 
@@ -132,17 +131,18 @@ def read_over_time(
     """
     quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
     table = read_table(path)
-    time, values = table.required(units.TIME), table.required(quantity)
+    time, values = table.all_required(units.TIME, quantity)
     _require_positive(table, time, "time")
     order = np.argsort(time, kind="stable")  # clocks that are written short repeat themselves
     return time[order], values[order]
 
 
 def _amplitude_sweep(table: Table) -> Run:
-    strain, frequency = table.required(units.STRAIN), table.required(units.ANGULAR_FREQUENCY)
+    strain, frequency, storage, loss = table.all_required(
+        units.STRAIN, units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
+    )
     _require_positive(table, strain, "strain")
     _require_positive(table, frequency, "omega")
-    storage, loss = table.required(units.STORAGE_MODULUS), table.required(units.LOSS_MODULUS)
     order = np.lexsort((strain, frequency))
     return _oscillations(
         table.name, "amplitude sweep", *(v[order] for v in (strain, frequency, storage, loss))
@@ -174,7 +174,7 @@ def _oscillations(name, what, strain, frequency, storage, loss) -> Run:
 def _over_time(
     table: Table, quantity: units.Quantity
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    time, values = table.required(units.TIME), table.required(quantity)
+    time, values = table.all_required(units.TIME, quantity)
     _require_positive(table, time, "time")
     _require_positive(table, values, quantity.stem)
     if len(time) < 3 or np.any(np.diff(time) <= 0):

@@ -14,7 +14,7 @@ from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation, wave_of
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table
-from discover.errors import InputError
+from discover.errors import InputError, Problems
 from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
@@ -63,10 +63,11 @@ def read_run(
     """
     name = index.columns["file"][row]
     table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
-    time = _checked_time(table)
     metadata = _metadata(index, row)
     test = declared_test(index, row, rate_before)
     in_shear = test.flow == "shear"
+    _require_columns(table, in_shear)
+    time = table.required(units.TIME)
     strain = table.quantity(units.STRAIN if in_shear else units.HENCKY_STRAIN)
     rate, derived = _rate(table, test, time, strain, rate_window)
     stress = table.required(units.SHEAR_STRESS if in_shear else units.TENSILE_STRESS)
@@ -105,6 +106,25 @@ def read_run(
         metadata=metadata,
     )
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
+
+
+_OF_SHEAR = (units.SHEAR_STRESS, units.SHEAR_RATE, units.STRAIN)
+_OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
+_BESIDE = (units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE)
+
+
+def _require_columns(table: Table, in_shear: bool) -> None:
+    """Refuse a table with all that is wrong in its columns, and not with the first of it."""
+    problems = Problems()
+    with problems.collected():
+        _checked_time(table)
+    stress, *answers = _OF_SHEAR if in_shear else _OF_EXTENSION
+    with problems.collected():
+        table.required(stress)
+    for quantity in (*answers, *_BESIDE):
+        with problems.collected():
+            table.quantity(quantity)
+    problems.require_none(table.name)
 
 
 def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
@@ -206,11 +226,10 @@ def _checked_time(table: Table) -> Float[np.ndarray, " n"]:
     backwards = np.flatnonzero(np.diff(time) <= 0)
     if backwards.size:
         row = int(backwards[0]) + 1
-        more = f" ({backwards.size - 1} more lines are like it.)" if backwards.size > 1 else ""
         raise InputError(
             f"time in {table.name} must increase strictly; line {table.lines[row]} holds "
             f"{time[row]:g} s after {time[row - 1]:g} s. Sort the rows and remove repeated "
-            f"times.{more}"
+            f"times.{table.like_it(backwards + 1)}"
         )
     return time
 

@@ -1,9 +1,10 @@
 """Runs and data sets as the rest of the software sees them: SI units, checked."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from jaxtyping import Float
 from discover.dataset.loading import Loading
 from discover.dataset.tables.columns import as_column
 from discover.errors import InputError
+from discover.notebook_view import NotebookView
 from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
@@ -50,7 +52,7 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(NotebookView):
     """One experiment in shear or in extension.
 
     In extension the rate is the Hencky rate, the stress the tensile stress σ11 − σ22, and the
@@ -190,6 +192,15 @@ class Run:
         kinds = [name for name, values in self._recorded().items() if values is not None]
         span = f"{self.time[0]:.4g} to {self.time[-1]:.4g} s"
         return f"<Run {self.name!r}: {len(self)} samples, {span}, {', '.join(kinds)}>"
+
+    def _shown(self) -> Iterator[Any]:
+        # what lays out runs in tables rests on this file
+        from discover.dataset.run_table import run_line
+
+        yield repr(self).strip("<>")
+        line = {key: value for key, value in run_line(self).items() if value not in (None, False)}
+        yield pd.DataFrame([{**line, **self.metadata}])
+        yield self.to_dataframe().describe().loc[["min", "mean", "max"]].rename_axis("column")
 
     def _recorded(self) -> dict[str, np.ndarray | None]:
         if self.protocol.control == "oscillation":

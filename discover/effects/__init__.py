@@ -20,25 +20,28 @@ from discover.effects.library_term import (
     library_term,
     simplest_terms,
 )
-from discover.effects.mode_dependence import BY_MODE, ModeDependence
-from discover.effects.registry import effects_table, make_effect, named_effects
+from discover.effects.registry import (
+    built_in_effects,
+    effects_table,
+    make_effect,
+    named_effects,
+)
 from discover.effects.written_state import WrittenState
 
 __all__ = [
-    "BY_MODE",
     "AbstractEffect",
     "ConstitutiveEffect",
     "EffectParameter",
     "KinematicEffect",
     "KnownEffect",
     "LibraryTerm",
-    "ModeDependence",
     "ModeEffect",
     "Record",
     "SeriesElement",
     "SignalEffect",
     "StateEffect",
     "WrittenState",
+    "built_in_effects",
     "effects_table",
     "known_effects",
     "library_effects",

@@ -6,7 +6,8 @@ from typing import Any
 
 from discover.effects.base import AbstractEffect, EffectParameter
 from discover.effects.registry import make_effect
-from discover.errors import InputError
+from discover.errors import InputError, Problems
+from discover.words import nearest, unknown_name
 
 Written = Any
 """As a study has them: effect → parameter → value or ``"fit"``; ``"fit"`` alone fits them all."""
@@ -69,35 +70,42 @@ def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect
             f"{where} must name effects with their values, such as "
             f'{{"rate_rise_time": {{"tau": 0.02}}}}; got {written!r}.'
         )
-    found = []
+    found, problems = [], Problems()
     for name, asked in written.items():
-        try:
-            effect = make_effect(name)
-        except InputError as error:
-            raise InputError(f"{where}: {error}") from None
-        parameters = {parameter.name: parameter for parameter in effect.parameters}
-        if asked == "fit":
-            asked = dict.fromkeys(parameters, "fit")
-        if not isinstance(asked, Mapping):
-            raise InputError(
-                f'{where}: {name} must be "fit", or give its parameters: {", ".join(parameters)}; '
-                f"got {asked!r}."
-            )
-        unknown = [key for key in asked if key not in parameters]
-        if unknown:
-            raise InputError(
-                f"{where}: the effect {name} has no parameter {str(unknown[0])[:60]!r}. It has "
-                f"{', '.join(parameters)}."
-            )
-        missing = [key for key in parameters if key not in asked]
-        if missing:
-            raise InputError(
-                f"{where}: the effect {name} needs {missing[0]} too. Write a number, or "
-                f'{missing[0]} = "fit".'
-            )
-        values = tuple(_value(asked[key], p, f"{where}: {name}") for key, p in parameters.items())
-        found.append(KnownEffect(effect, values))
+        with problems.collected():
+            found.append(_known_effect(name, asked, where))
+    problems.require_none()
     return tuple(found)
+
+
+def _known_effect(name: str, asked: object, where: str) -> KnownEffect:
+    try:
+        effect = make_effect(name)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    parameters = {parameter.name: parameter for parameter in effect.parameters}
+    if asked == "fit":
+        asked = dict.fromkeys(parameters, "fit")
+    if not isinstance(asked, Mapping):
+        raise InputError(
+            f'{where}: {name} must be "fit", or give its parameters: {", ".join(parameters)}; '
+            f"got {asked!r}."
+        )
+    problems, values = Problems(), []
+    unknown = [key for key in asked if key not in parameters]
+    for key in unknown:
+        problems.add(f"{where}: the effect {name}: {unknown_name('parameter', key, parameters)}")
+    meant = {nearest(key, parameters) for key in unknown}
+    for key, parameter in parameters.items():
+        if key in asked:
+            with problems.collected():
+                values.append(_value(asked[key], parameter, f"{where}: {name}"))
+        elif key not in meant:
+            problems.add(
+                f'{where}: the effect {name} needs {key} too. Write a number, or {key} = "fit".'
+            )
+    problems.require_none()
+    return KnownEffect(effect, tuple(values))
 
 
 def _value(asked: object, parameter: EffectParameter, where: str) -> float | None:

@@ -7,13 +7,15 @@ registered, by a program or by an installed package (see docs/adding-an-effect.m
 import importlib
 import pkgutil
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING
 
 from discover.effects import constitutive, kinematic, signal
 from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
-from discover.effects.library_term import library_term
+from discover.effects.library_term import library_effects, library_term
 from discover.errors import InputError
 from discover.new_names import require_new_name
+from discover.words import unknown_name
 from tensor_library.registry import Registry
 from tensor_library.terms import parse_term
 
@@ -37,6 +39,13 @@ EFFECTS: Registry[AbstractEffect] = Registry("effect", "discover.effects", _buil
 def named_effects() -> Mapping[str, AbstractEffect]:
     """Return the effects that have a name: constitutive, kinematic, signal, then registered."""
     return EFFECTS
+
+
+@cache
+def built_in_effects() -> Mapping[str, AbstractEffect]:
+    """Return the effects that a model may have without a user's own, those of the library last."""
+    nameless = library_effects()
+    return EFFECTS.built_in | {effect.name: effect for effect in nameless}
 
 
 def effects_table() -> "pd.DataFrame":
@@ -108,6 +117,6 @@ def make_effect(name: str) -> AbstractEffect:
         return library_term(parse_term(name))
     except ValueError as error:
         raise InputError(
-            f"Unknown effect {name!r}; write a term of the library, such as 'tr(sigma)*sigma', or "
-            f"one of {', '.join(effects)}."
+            f"{unknown_name('effect', name, effects)} A term of the library is an effect too, such "
+            "as 'tr(sigma)*sigma'."
         ) from error

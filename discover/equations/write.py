@@ -12,6 +12,7 @@ from discover.equations.formats.rheotool import rheotool_text
 from discover.equations.formats.ufl import ufl_code
 from discover.errors import InputError
 from discover.plain_json import json_text
+from discover.words import unknown_name
 
 FORMATS: Mapping[str, Callable[[Equation], str]] = {
     "python": numpy_code,
@@ -47,7 +48,7 @@ def write_equation(
         If there is no such format, an option does not belong to it, or it has not this law.
     """
     if form not in FORMATS:
-        raise InputError(f"Unknown format {form!r}; write one of {', '.join(FORMATS)}.")
+        raise InputError(unknown_name("format", form, FORMATS))
     if form != "json":  # which holds what was found, and no more
         said = in_a_solver(equation)
         notes = () if said is None else (said if isinstance(said, str) else said.text,)

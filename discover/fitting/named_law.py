@@ -7,9 +7,6 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
-from discover.closed_loop.final_model import augmented_fluid, declared_law
-from discover.closed_loop.judging.before_after import record_runs
-from discover.closed_loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
@@ -22,11 +19,14 @@ from discover.laws import LAWS
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law, starting_values
 from discover.linear_algebra_threads import in_one_thread
+from discover.loop.final_model import augmented_fluid, declared_law
+from discover.loop.run_record import record_runs
+from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
-from discover.words import did_you_mean
+from discover.words import did_you_mean, unknown_name
 
 _STARTS = 8
 """Starts of a fit, spread evenly over the ranges   [Sobol 1967]; the best end counts."""
@@ -97,7 +97,7 @@ def fit(
     >>> dc.fit("giesekus", data).summary()  # doctest: +SKIP
     """
     if not isinstance(law, str) or law not in LAWS:
-        raise InputError(f"Unknown law {law!r}.{did_you_mean(law, LAWS)} Laws: {', '.join(LAWS)}.")
+        raise InputError(unknown_name("law", law, LAWS))
     if held_out == "each":
         raise InputError("fit has no held_out='each'. Name runs, or use close_loop.")
     bounds, start, fixed = (
@@ -131,23 +131,23 @@ def fit(
         )
     expectation = Expectation(noise, forward.linear_error)
     covariance, degrees = _uncertainty(problem, best)
-    held_batch = make_batch(held) if held else None
-    records = record_runs(model, batch, fitted, [best.theta], held_out=False)
-    if held_batch is not None:
-        records += record_runs(model, held_batch, held, [best.theta], held_out=True)
+    records = record_runs(fitted, model.predictions([best.theta], batch), held_out=False)
+    if held:
+        ahead = model.predictions([best.theta], make_batch(held))
+        records += record_runs(held, ahead, held_out=True)
     active = [known.name for known in forward.effects]
     return NamedLawFit(
         law,
         _constants(model, best, names, covariance, declared),
         covariance,
         degrees,
-        augmented_fluid(model, best, active),
+        augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
         problem.lack_of_fit(best, fitted, expectation),
         tuple(records),
         model,
         best.theta,
-        declared_law(forward, best, {}),
+        declared_law(forward, best.theta, {}),
         data.name,
     )
 

@@ -10,7 +10,6 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.closed_loop.results.run_record import RunRecord
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
 from discover.equations.equation import mean_relaxation_time
@@ -18,9 +17,10 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
-from discover.notebook_view import NotebookView
+from discover.loop.run_record import RunRecord
 from discover.page_view import PageView
 from discover.statistics import LackOfFit
+from discover.summary_view import Estimate, SummaryView
 from discover.words import percent_of
 
 _LABELS = {"modulus_Pa": "G", "relaxation_time_s": "λ"}
@@ -80,7 +80,7 @@ class Constant:
 
 
 @dataclass(frozen=True, eq=False)
-class NamedLawFit(NotebookView, PageView, HasEquation):
+class NamedLawFit(SummaryView, PageView, HasEquation):
     """One named law fitted to runs by least squares.
 
     Attributes
@@ -118,7 +118,7 @@ class NamedLawFit(NotebookView, PageView, HasEquation):
     misfit: LackOfFit
     records: tuple[RunRecord, ...]
     model: AugmentedModel
-    theta: Float[np.ndarray, " p"]
+    theta: Float[np.ndarray, " all"]
     written: Equation | None = None
     title: str = ""
 
@@ -140,46 +140,19 @@ class NamedLawFit(NotebookView, PageView, HasEquation):
         """Whether what the fit leaves is noise."""
         return self.misfit.verdict == "explained"
 
-    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
-        """Return confidence intervals of the constants, columns ``low`` and ``high``.
+    def _estimates(self) -> list[Estimate]:
+        return [
+            Estimate(
+                (one.name,), one.value, None, one.unit, one.standard_error,
+                {"at_bound": one.at_bound},
+            )
+            for one in self.constants
+        ]  # fmt: skip
 
-        From the curvature at the fit and the noise of the residual, autocorrelation included. Where
-        a systematic misfit remains they hold only the noise.
-
-        Parameters
-        ----------
-        level
-            Probability, between 0 and 1.
-
-        Raises
-        ------
-        InputError
-            If `level` is none.
-        """
-        if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
-            raise InputError(f"level must be a number between 0 and 1; got {level!r}. Try 0.95.")
-        quantile = float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom))
-        ends = [constant.interval(quantile) for constant in self.constants]
-        return pd.DataFrame(ends, index=self._index, columns=["low", "high"], dtype=float)
-
-    def summary(self) -> pd.DataFrame:
-        """Return the constants, one line each: value, standard error, 95 % interval, unit."""
-        values = pd.DataFrame(
-            {
-                "value": [constant.value for constant in self.constants],
-                "standard_error": [constant.standard_error for constant in self.constants],
-            },
-            index=self._index,
-            dtype=float,
-        )
-        notes = pd.DataFrame(
-            {
-                "unit": [constant.unit for constant in self.constants],
-                "at_bound": [constant.at_bound for constant in self.constants],
-            },
-            index=self._index,
-        )
-        return pd.concat([values, self.conf_int(), notes], axis=1)
+    def _interval(self, estimate: Estimate, level: float) -> tuple[float, float]:
+        # from the curvature at the fit and the noise of the residual, autocorrelation included
+        one = next(one for one in self.constants if (one.name,) == estimate.key)
+        return one.interval(float(student.ppf(0.5 + 0.5 * level, self.degrees_of_freedom)))
 
     @property
     def correlation(self) -> pd.DataFrame:
@@ -187,11 +160,8 @@ class NamedLawFit(NotebookView, PageView, HasEquation):
         deviation = np.sqrt(np.diag(self.covariance))
         scale = np.where(deviation > 0.0, deviation, 1.0)
         matrix = self.covariance / np.outer(scale, scale)
-        return pd.DataFrame(matrix, index=self._index, columns=self._index)
-
-    @property
-    def _index(self) -> pd.Index:
-        return pd.Index([constant.name for constant in self.constants], name="constant")
+        index = self._index_of(self._estimates())
+        return pd.DataFrame(matrix, index=index, columns=index)
 
     def predict(self, data: Dataset) -> dict[str, Float[np.ndarray, " n"]]:
         """Return what the fitted law records in each run: stress in Pa, or strain, by run."""
@@ -277,14 +247,9 @@ class NamedLawFit(NotebookView, PageView, HasEquation):
             for one, interval in zip(self.constants, ends.to_numpy(), strict=True)
         ]
         said = [f"{', '.join([LAWS[self.law].title, *constants])}."]
-        noise = percent_of(self.misfit.noise)
-        if self.fits_to_the_noise:
-            said.append(f"Fits to the noise ({noise}).")
-        else:
-            said.append(
-                f"Describes the fitted runs to {percent_of(self.error)}; the rest is systematic "
-                f"(noise: {noise}), so intervals hold the noise only."
-            )
+        said.append(self.misfit.described)
+        if not self.fits_to_the_noise:
+            said.append("Intervals hold the noise only.")
         if self.held_out_error is not None:
             said.append(f"Held-out runs: {percent_of(self.held_out_error)}.")
         bound = [one.name for one in self.constants if one.at_bound]
@@ -299,9 +264,3 @@ class NamedLawFit(NotebookView, PageView, HasEquation):
         yield self.text
         yield self.summary().reset_index()
         yield self.to_dataframe()
-
-    def plot(self):
-        """Return a matplotlib figure: every run, measured and fitted."""
-        from importlib import import_module
-
-        return import_module("discover.report.fit").fit_figure(self)

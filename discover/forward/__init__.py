@@ -17,6 +17,7 @@ from discover.forward.batches import (
     names_of_loadings,
 )
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
+from discover.forward.linearised import Linearised, Point, linearised, widths_of
 
 __all__ = [
     "MODULUS",
@@ -26,11 +27,15 @@ __all__ = [
     "Batch",
     "DeclaredModel",
     "FreeParameter",
+    "Linearised",
+    "Point",
     "Records",
     "TransientFlows",
     "data_scales",
     "even",
+    "linearised",
     "make_batch",
     "make_records",
     "names_of_loadings",
+    "widths_of",
 ]

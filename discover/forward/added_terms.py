@@ -36,8 +36,6 @@ class InUse(NamedTuple):
         That one tensor, by its position among those that occur in the library.
     others
         0 without other terms, i + 1 with the i-th alone, one past the last with several.
-    by_mode
-        1 where the terms of the law differ from mode to mode.
     states
         0 without states of the fluid, i + 1 with the i-th alone, one past the last with several.
     times
@@ -47,7 +45,6 @@ class InUse(NamedTuple):
     library: np.int32
     tensor: np.int32
     others: np.int32
-    by_mode: np.int32 = np.int32(0)
     states: np.int32 = np.int32(0)
     times: np.int32 = np.int32(0)
 

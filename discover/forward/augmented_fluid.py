@@ -1,6 +1,6 @@
 """The fluid that a vector of parameters is: a declared law with effects, as integrators take it."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -10,7 +10,6 @@ from jaxtyping import Array, Float
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
-    ModeDependence,
     ModeEffect,
     SeriesElement,
     StateEffect,
@@ -22,7 +21,6 @@ from discover.forward.structure import Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.protocols.kinematics import Kinematics
-from tensor_library.kinematics import rate_of_deformation
 
 
 class OfModes(NamedTuple):
@@ -52,8 +50,8 @@ class AugmentedFluid:
     ----------
     slices
         Where the parameters of each effect stand in the vector, by name.
-    instants
-        Where the instants of steps of the rate stand.
+    of_effects, instants
+        Where the parameters of all effects stand, and the instants of steps of the rate.
     size
         Length of the vector.
     series
@@ -68,9 +66,12 @@ class AugmentedFluid:
         position = max(
             [2 + len(structure.free_parameters), *(end for *_, end in structure.by_mode)]
         )
+        first = position
         for effect in effects:
             self.slices[effect.name] = slice(position, position + len(effect.parameters))
             position += len(effect.parameters)
+        self.of_effects = slice(first, position)
+        self._amplitudes = np.array([self.slices[e.name].start for e in effects], dtype=int)
         self.instants = slice(position, position + structure.step_instants)
         self.size = self.instants.stop
         self.constitutive = [e for e in effects if isinstance(e, ConstitutiveEffect)]
@@ -83,7 +84,6 @@ class AugmentedFluid:
         }
         of_effects = {e.name: at for e, at in self.varying_effects.items()}
         self.added = AddedTerms(self.constitutive, self.slices, of_effects)
-        self.by_mode = next((e for e in effects if isinstance(e, ModeDependence)), None)
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self.states = [e for e in effects if isinstance(e, StateEffect)]
         self.series = [e for e in effects if isinstance(e, SeriesElement)]
@@ -92,18 +92,18 @@ class AugmentedFluid:
         """Return the parameters of an effect."""
         return theta[self.slices[effect.name]]
 
+    def present(self, thetas: Float[Array, "*trials p"] | np.ndarray) -> Any:
+        """Return of each effect whether its amplitude is not zero, in one of several vectors."""
+        return (thetas.reshape(-1, self.size)[:, self._amplitudes] != 0.0).any(axis=0)
+
     def in_use(self, theta: np.ndarray) -> InUse:
         """Return the branches that a parameter vector takes."""
         states = [i for i, e in enumerate(self.states) if theta[self.slices[e.name].start] != 0.0]
         several = len(self.states) + 1
-        used = self.added.in_use(theta)._replace(
+        return self.added.in_use(theta)._replace(
             states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
             times=np.int32(any(self.states[i].changes_times for i in states)),
         )
-        if self.by_mode is None:
-            return used
-        differ = theta[self.slices[self.by_mode.name].start] != 0.0
-        return used._replace(by_mode=np.int32(differ))
 
     def beside(self, numbers, theta, rate, flow: Kinematics | None):
         """Return the recorded stress of the solvent and of what effects add beside the modes.
@@ -146,23 +146,6 @@ class AugmentedFluid:
         built = jax.vmap(named.build)(*columns)
         return LawOfEachMode(law=built, linear_relaxation=built.linear_relaxation)
 
-    def _terms_by_mode(self, law, added, theta, modes: Modes):
-        """Return the function by how much h of each mode differs from that of equal constants."""
-        factors = self.by_mode_factors(theta, modes)
-
-        def of_mode(law, stress, gradient):
-            return law.extra_term(stress, rate_of_deformation(gradient))
-
-        of_law = over_modes(of_mode, law, -1)
-
-        def differing(stress, gradient):
-            # a mode that an effect adds stands after the declared ones, and is as they are in mean
-            declared = jnp.ones(stress.shape[-1]).at[: len(factors)].set(factors)
-            extra = of_law(stress, gradient) + added(stress, gradient)
-            return (declared - 1.0) * extra.at[4:].set(0.0)
-
-        return differing
-
     def of_modes(self, numbers, theta) -> OfModes:
         """Return what a vector of parameters says of each mode."""
         extra = None
@@ -199,11 +182,6 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def by_mode_factors(self, theta, modes: Modes) -> Float[Array, " k"]:
-        """Return the factor on h of each declared mode."""
-        assert self.by_mode is not None
-        return self.by_mode.factors(self.values(theta, self.by_mode), *modes)
-
     def dynamics(
         self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
     ) -> Dynamics:
@@ -221,13 +199,7 @@ class AugmentedFluid:
         added = self.added.rate(theta, used, amplitudes, in_one_piece)
 
         def modes_rate(stress, gradient):
-            same = of_law(stress, gradient) - added(stress, gradient)
-            if self.by_mode is None:
-                return same
-            differing = self._terms_by_mode(law, added, theta, declared)
-            return same - jax.lax.switch(
-                used.by_mode, [lambda s, _: jnp.zeros_like(s), differing], stress, gradient
-            )
+            return of_law(stress, gradient) - added(stress, gradient)
 
         series = None
         if self.series:

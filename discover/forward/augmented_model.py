@@ -6,11 +6,10 @@ see `discover.forward.side_by_side`; where there is none each vector is a call o
 leaves out the terms that it has at zero.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from copy import copy
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -30,9 +29,11 @@ from discover.forward.batches import (
 )
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
+from discover.forward.linearised import Linearised, Point, linearised, widths_of
 from discover.forward.program import program_of
 from discover.forward.structure import Numbers, Structure
 from discover.programs import in_threads
+from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -78,19 +79,19 @@ class AugmentedModel:
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
         free = declared.free_parameters
-        self._program = program_of(
-            Structure(
-                self.effects,
-                tuple(p.name for p in free),
-                # a law without free parameters is data; with them, its values are rebuilt
-                declared.law_name if free else "",
-                declared.parameters if free else (),
-                declared.fit_modulus,
-                tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
-                declared.step_instants,
-                declared.added_modes,
-            )
+        structure = Structure(
+            self.effects,
+            tuple(p.name for p in free),
+            # a law without free parameters is data; with them, its values are rebuilt
+            declared.law_name if free else "",
+            declared.parameters if free else (),
+            declared.fit_modulus,
+            tuple((n, at.start, at.stop) for n, at in declared.by_mode_slices.items()),
+            declared.step_instants,
+            declared.added_modes,
         )
+        self._program = program_of(structure)
+        self._of_every_effect = program_of(structure.with_every_effect())
         fluid = self._program.fluid
         self.slices, self.size, self.instants = fluid.slices, fluid.size, fluid.instants
         parameters = [p for effect in self.effects for p in effect.parameters]
@@ -124,26 +125,22 @@ class AugmentedModel:
             jnp.asarray(float(declared.solvent_viscosity)),
         )
 
-    def at_moduli(
-        self, modulus: Float[np.ndarray, " k"], solvent_viscosity: float | None = None
-    ) -> "AugmentedModel":
-        """Return the same model with other moduli in Pa, in the same program.
-
-        For derivatives: an error that a sweep allows for may make one of many moduli negative.
-
-        Parameters
-        ----------
-        modulus
-            Of the modes, in Pa.
-        solvent_viscosity
-            In Pa s; None leaves it as it is.
-        """
-        other = copy(self)
-        moved = replace(self._numbers, modulus=jnp.asarray(modulus))
-        if solvent_viscosity is not None:
-            moved = replace(moved, solvent_viscosity=jnp.asarray(float(solvent_viscosity)))
-        other.__dict__["_numbers"] = moved
-        return other
+    @cached_property
+    def _beside_every_effect(self) -> tuple[list[int], list[int], np.ndarray]:
+        """What of a vector counts, where it stands beside all effects, and all of them at rest."""
+        own, every = self._program.fluid, self._of_every_effect.fluid
+        at_rest = np.zeros(every.size)
+        for effect in every.structure.effects:
+            inner = [parameter.first_trial for parameter in effect.parameters[1:]]
+            at_rest[every.slices[effect.name]] = [0.0, *inner]
+        # no trial passes through a factor on the moduli that is not fitted
+        here = [*range(0 if self.declared.fit_modulus else 1, own.of_effects.start)]
+        there = [*here, *range(every.instants.start, every.instants.stop)]
+        here += range(own.instants.start, own.instants.stop)
+        for name, at in own.slices.items():
+            here += range(at.start, at.stop)
+            there += range(every.slices[name].start, every.slices[name].stop)
+        return here, there, at_rest
 
     def zero(self) -> Float[np.ndarray, " p"]:
         """Return the vector of the declared model: amplitudes zero, inner parameters at start.
@@ -224,55 +221,92 @@ class AugmentedModel:
         return self.predictions([theta], batch)[0]
 
     def predictions(
-        self, thetas: Sequence[np.ndarray] | np.ndarray, batch: Batch
+        self,
+        thetas: Sequence[np.ndarray] | np.ndarray,
+        batch: Batch,
+        moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n"]:
-        """Return the predicted records of any number of parameter vectors."""
+        """Return the predicted records of any number of parameter vectors.
+
+        Parameters
+        ----------
+        thetas, batch
+            Parameter vectors, and the runs that each predicts.
+        moduli
+            Of the declared modes in Pa for each vector, and behind them the viscosity of the
+            solvent in Pa s. By default as declared. One that an error of a sweep moves may be
+            negative.
+        """
+        trials = self._trials(thetas, moduli=moduli)
         out = np.zeros((len(thetas), *batch.recorded.shape))
         for i, rows in enumerate(batch.rows):
-            found = self._of_part(thetas, batch, i)
+            found = self._of_part(trials, batch, i)
             out[:, rows, : found.shape[2]] = found
         return out
 
+    @cached_property
+    def moduli(self) -> Float[np.ndarray, " c"]:
+        """Moduli of the declared modes in Pa, and behind them the viscosity of the solvent."""
+        return np.append(self.declared.modulus, float(self.declared.solvent_viscosity))
+
+    def _trials(self, thetas, limits: Any = np.inf, moduli=None) -> "_Trials":
+        if moduli is None:
+            moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
+        limits = np.broadcast_to(limits, len(thetas))
+        return _Trials(np.asarray(thetas, dtype=float), moduli, limits)
+
     def _of_part(
-        self, thetas, batch: Batch, number: int, limits: Iterable[float] | None = None
+        self, trials: "_Trials", batch: Batch, number: int
     ) -> Float[np.ndarray, "trials rows n"]:
         """Return the records that a part of a batch holds, in the order of its rows."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
-            return _of_sweeps(self._of_piece(thetas, (part, None, 0)), batch.moduli)
+            return _of_sweeps(self._of_piece(trials, (part, None, 0)), batch.moduli)
         if not isinstance(part, TransientFlows):
-            return self._of_piece(thetas, (part, None, 0))
+            return self._of_piece(trials, (part, None, 0))
         pieces = self._pieces(part, batch, batch.rows[number])
-        found = [self._of_piece(thetas, piece, limits) for piece in pieces]
+        found = [self._of_piece(trials, piece) for piece in pieces]
         runs, samples = part.sample_index.shape
         return np.concatenate(found, axis=1)[:, :runs, :samples]
 
     def _of_piece(
-        self, thetas, piece: "_Piece", limits: Iterable[float] | None = None
+        self, trials: "_Trials", piece: "_Piece"
     ) -> Float[np.ndarray, "trials runs *columns"]:
-        program, (part, judging, asked) = self._program, piece
-        wanted = [np.inf] * len(thetas) if limits is None else limits
-        wanted = [
-            limit if program.is_judged_by_modes(theta) else np.inf
-            for theta, limit in zip(thetas, wanted, strict=True)
-        ]
-        kernel = program.side_by_side(self._numbers, part)
-        if kernel is not None:
-            vectors = np.asarray(thetas, dtype=float)
-            return kernel.predict(self._numbers, vectors, part, judging, asked, np.array(wanted))
+        program, (part, *judging) = self._program, piece
+        judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
+        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
+        kernel = self._of_every_effect.side_by_side(self._numbers, part)
+        if kernel is None:
+            return self._one_by_one(trials, piece)
+        here, there, at_rest = self._beside_every_effect
+        vectors = np.tile(at_rest, (len(trials.thetas), 1))
+        vectors[:, there] = trials.thetas[:, here]
+        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
+        if not np.any(alone):
+            return kernel.predict(self._numbers, *beside, part, *judging)
+        found = self._one_by_one(trials.taken(alone), piece)
+        out = np.empty((len(alone), *found.shape[1:]))
+        out[alone] = found
+        if not np.all(alone):
+            out[~alone] = kernel.predict(self._numbers, *beside.taken(~alone), part, *judging)
+        return out
 
-        def one(trial: tuple[np.ndarray, float]) -> np.ndarray:
-            theta, limit = trial
+    def _one_by_one(
+        self, trials: "_Trials", piece: "_Piece"
+    ) -> Float[np.ndarray, "trials runs *columns"]:
+        """Return what vectors predict in a call of its own for each."""
+        program, (part, judging, _) = self._program, piece
+
+        def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
+            theta, moduli, limit = trial
+            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
+            numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
             used = program.fluid.in_use(theta)
             weights = self._weights(theta, part)
-            found = program.predict(
-                self._numbers, used, theta, part, judging, weights, np.float64(limit)
-            )
-            return np.asarray(found)
+            return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        trials = zip(thetas, wanted, strict=True)
-        found = in_threads(one, trials, is_compiled=shape in program.met)
+        found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
 
@@ -305,6 +339,7 @@ class AugmentedModel:
         thetas: Sequence[np.ndarray] | np.ndarray,
         batch: Batch,
         limits: Float[np.ndarray, " trials"] | None = None,
+        moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the weighted residuals of parameter vectors; not finite where one fails.
 
@@ -312,8 +347,8 @@ class AugmentedModel:
 
         Parameters
         ----------
-        thetas, batch
-            Parameter vectors, and the runs that each predicts.
+        thetas, batch, moduli
+            As in `predictions`.
         limits
             Sums of squares from which on a vector is of no use: its residuals are infinite. What
             has reached its limit is not followed to the end of its runs, nor, in tests that are
@@ -321,10 +356,9 @@ class AugmentedModel:
             times as long as a steady one.
         """
         if limits is None:
-            return batch.records.residual(self.predictions(thetas, batch))
-        vectors = np.asarray(thetas, dtype=float)
-        out = np.zeros((len(vectors), *batch.recorded.shape))
-        sums = np.zeros(len(vectors))
+            return batch.records.residual(self.predictions(thetas, batch, moduli))
+        trials, sums = self._trials(thetas, limits, moduli), np.zeros(len(thetas))
+        out = np.zeros((len(thetas), *batch.recorded.shape))
         # a factor may lessen what a loading leaves on the way
         ahead = np.inf if batch.records.loadings is not None else 1.0
         parts = sorted(enumerate(batch.parts), key=lambda one: _BY_SPEED.index(type(one[1])))
@@ -333,7 +367,8 @@ class AugmentedModel:
             if not len(asked):
                 break
             left = ahead * (limits[asked] - sums[asked])
-            found = self._of_part(vectors[asked], batch, i, left)
+            some = trials.taken(asked)._replace(limits=left)
+            found = self._of_part(some, batch, i)
             rows, n = batch.rows[i], found.shape[2]
             off = batch.records.of_runs(rows, n).residual(found)
             out[np.ix_(asked.tolist(), rows, range(n))] = off
@@ -341,6 +376,62 @@ class AugmentedModel:
                 sums[asked] += np.sum(off**2, axis=(1, 2))
         out[~(sums < limits)] = np.inf  # what is not a number among them
         return out
+
+    def linearise(
+        self,
+        theta: Float[np.ndarray, " p"],
+        batch: Batch,
+        positions: Sequence[int] = (),
+        moves: Float[np.ndarray, "m c"] | None = None,
+    ) -> Linearised:
+        """Return the weighted residuals of a vector and their derivatives, from one call.
+
+        Parameters
+        ----------
+        theta, batch
+            The vector, and the runs.
+        positions
+            Parameters by which to differentiate, by differences of one side, away from an end of
+            their range.
+        moves
+            Of the moduli in Pa and of the solvent in Pa s: half the difference between what is left
+            after each move and after its opposite follows the derivatives. It is the change by the
+            move where records are linear in the moduli.
+        """
+        if moves is None or not len(moves):
+            return linearised(self, [Point(theta, positions)], batch)[0]
+        widths = widths_of(self, theta, positions)
+        vectors = np.tile(theta, (1 + len(widths) + 2 * len(moves), 1))
+        vectors[np.arange(1, 1 + len(widths)), list(positions)] += widths
+        still = np.zeros((1 + len(widths), len(self.moduli)))
+        moduli = self.moduli + np.concatenate([still, moves, -np.asarray(moves)])
+        found = self.residuals(vectors, batch, moduli=moduli)
+        base, moved, up, down = np.split(found, np.cumsum([1, len(widths), len(moves)]))
+        with np.errstate(invalid="ignore", over="ignore"):  # what ran away
+            by_parameters = (moved - base) / widths[:, None, None]
+            jacobian = np.concatenate([by_parameters, 0.5 * (up - down)])
+        return Linearised(base[0], jacobian, tuple(positions))
+
+    def vectors_at_once(self, batch: Batch) -> int:
+        """Return how many vectors cost what one does: as many as stand side by side."""
+        kernels = (
+            isinstance(part, TransientFlows)
+            and self._of_every_effect.side_by_side(self._numbers, part) is not None
+            for part in batch.parts
+        )
+        return LANES if all(kernels) else 1
+
+
+class _Trials(NamedTuple):
+    """Parameter vectors side by side, and the moduli and the limit of each."""
+
+    thetas: Float[np.ndarray, "trials p"]
+    moduli: Float[np.ndarray, "trials c"]
+    limits: Float[np.ndarray, " trials"]
+
+    def taken(self, which: np.ndarray) -> "_Trials":
+        """Return some of them."""
+        return _Trials(*(each[which] for each in self))
 
 
 _Piece = tuple[Flows, Records | None, int]

@@ -1,6 +1,7 @@
 """What is compiled of a model: predictions for one structure of law and effects."""
 
 import logging
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -10,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.effects import (
+    AbstractEffect,
     KinematicEffect,
     Record,
     SignalEffect,
@@ -33,6 +35,8 @@ from discover.forward.side_by_side import (
     SideBySide,
     SteadyCode,
     SteadySideBySide,
+    code_of,
+    intervals,
 )
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
@@ -54,13 +58,22 @@ _FEW_MODES = 6
 # Modes from which on weights of steps are worth a program of their own
 _MANY_MODES = 4
 
+# Runs of which it is known whether vectors choose their steps in them
+_KEPT = 8
+
 
 class Program:
     """Predictions and residuals for one structure, compiled when first called."""
 
     def __init__(self, structure: Structure):
         self.fluid = AugmentedFluid(structure)
-        kinematic = [e for e in structure.effects if isinstance(e, KinematicEffect)]
+        self._number = {effect.name: i for i, effect in enumerate(structure.effects)}
+        still = KinematicEffect.felt_rate
+        kinematic = [
+            e
+            for e in structure.effects
+            if isinstance(e, KinematicEffect) and type(e).felt_rate is not still
+        ]
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
@@ -69,6 +82,7 @@ class Program:
         self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
+        self._known_parts: list[tuple[TransientFlows, bool]] = []
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
@@ -99,31 +113,42 @@ class Program:
             flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
+        chooses = isinstance(part, TransientFlows) and self._chooses_steps(part)
         kind = (
             type(part),
             jax.tree.structure(arrays),
             shapes,
             *jax.tree.leaves(rest),
             flow is None,
+            chooses,
         )
         if kind not in self._kernels:
             try:
-                self._kernels[kind] = self._in_lanes(numbers, type(part), flow)
+                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, chooses)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
         return self._kernels[kind]
 
-    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None):
-        fluid, made_from = self.fluid, self._made_from
+    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None, chooses: bool):
+        given, made_from = (self.fluid, numbers, flow), self._made_from
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
-            return SteadySideBySide(fluid, SteadyCode(fluid, numbers, flow), *own, made_from)
+            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
         if control is PeriodicFlows:
-            own = self._periodic_rates, self._moduli_recorded, self._moduli_alone
-            return PeriodicSideBySide(fluid, PeriodicCode(fluid, numbers), *own, made_from)
-        own = self._rates, self._at_samples
-        return SideBySide(fluid, Kernel(fluid, numbers, flow), *own, made_from)
+            own = self._periodic_rates, self._moduli_recorded
+            return PeriodicSideBySide(self.fluid, code_of(PeriodicCode, *given), *own, made_from)
+        kernel = code_of(Kernel, *given, chooses=chooses)
+        return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
+
+    def _chooses_steps(self, part: TransientFlows) -> bool:
+        """Return whether runs have intervals in which vectors choose their steps."""
+        for known, chooses in self._known_parts:
+            if known is part:
+                return chooses
+        found = bool(np.any(intervals(part)[0] > 1))
+        self._known_parts = [*self._known_parts[1 - _KEPT :], (part, found)]
+        return found
 
     def is_judged_by_modes(self, theta: np.ndarray) -> bool:
         """Return whether nothing alters the record after the modes, or gives way in series."""
@@ -166,7 +191,8 @@ class Program:
         limit,
     ):
         flow = run.kinematics
-        rate, tool_rate = self._rates(theta, run)
+        present = self.fluid.present(theta)
+        rate, tool_rate = self._rates(theta, present, run)
         times = run.times[::2]
         dynamics = self.fluid.dynamics(
             numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
@@ -182,10 +208,13 @@ class Program:
         judged = Judged(weight, recorded, beside, limit)
         stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._at_samples(theta, run, stress, felt, tool_rate)
+        return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
-    def _rates(self, theta, run: TransientFlows):
-        """Return the rate that the fluid feels, at half steps, and that of the tool at steps."""
+    def _rates(self, theta, present, run: TransientFlows):
+        """Return the rate that the fluid feels, at half steps, and that of the tool at steps.
+
+        What effects do is computed where they are present, in one of the vectors at least.
+        """
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -195,22 +224,46 @@ class Program:
         rate = run.commanded_rate
         if run.steps is not None:
             rate = run.steps.in_rate(rate, run.times, theta[self.fluid.instants])
-        for effect in self._upstream:
-            changed = effect.felt_rate(self.fluid.values(theta, effect), instrument_times, rate)
-            rate = where_in_shear(flow, changed, rate)
-        tool_rate = rate[::2]
-        for effect in self._downstream:
-            changed = effect.felt_rate(self.fluid.values(theta, effect), instrument_times, rate)
-            rate = where_in_shear(flow, changed, rate)
-        return rate, tool_rate
 
-    def _at_samples(self, theta, run: TransientFlows, stress, felt, tool_rate):
+        def shaped(rate, effects):
+            for effect in effects:
+
+                def felt(rate, effect=effect):
+                    values = self.fluid.values(theta, effect)
+                    changed = effect.felt_rate(values, instrument_times, rate)
+                    return where_in_shear(flow, changed, rate)
+
+                rate = self._if_present(theta, present, effect, felt, rate)
+            return rate
+
+        upstream = shaped(rate, self._upstream)
+        return shaped(upstream, self._downstream), upstream[::2]
+
+    def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
+        """Return what an effect makes of a value.
+
+        It is computed where one of the vectors has the effect; to those that have it not the value
+        stays what it is, to the last digit.
+        """
+        amplitude = theta[self.fluid.slices[effect.name].start]
+        return jax.lax.cond(
+            present[self._number[effect.name]],
+            lambda value: jnp.where(amplitude != 0.0, change(value), value),
+            lambda value: value,
+            value,
+        )
+
+    def _at_samples(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
         """Return the recorded stress at the samples, of that at all steps before the signal."""
+        times = run.times[::2]
         for effect in self._signal:
-            record = Record(
-                run.times[::2], felt, stress, run.clock_factor, run.strain_before, tool_rate
-            )
-            stress = self._as_recorded(theta, effect, record, run.kinematics)
+
+            def distorted(stress, effect=effect):
+                strain = run.strain_before
+                record = Record(times, felt, stress, run.clock_factor, strain, tool_rate)
+                return self._as_recorded(theta, effect, record, run.kinematics)
+
+            stress = self._if_present(theta, present, effect, distorted, stress)
         return stress[run.sample_index]
 
     def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
@@ -218,33 +271,44 @@ class Program:
         dynamics = self.fluid.dynamics(numbers, used, theta, flow)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
-        stress, felt = steady_states(dynamics, self._steady_rates(theta, run), flow)
+        present = self.fluid.present(theta)
+        rates = self._steady_rates(theta, present, run)
+        stress, felt = steady_states(dynamics, rates, flow)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._recorded_steady(theta, run, stress, felt)
+        return self._recorded_steady(theta, present, run, stress, felt)
 
-    def _steady_rates(self, theta, run: SteadyFlows):
+    def _steady_rates(self, theta, present, run: SteadyFlows):
         """Return the rates of a flow curve that the fluid feels where nothing slips."""
         places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
         for effect in (*self._upstream, *self._downstream):
             if effect.acts_on_steady_states:
-                changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
-                rate = where_in_shear(run.kinematics, changed, rate)
+
+                def felt(rate, effect=effect):
+                    changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
+                    return where_in_shear(run.kinematics, changed, rate)
+
+                rate = self._if_present(theta, present, effect, felt, rate)
         return rate
 
-    def _recorded_steady(self, theta, run: SteadyFlows, stress, felt):
+    def _recorded_steady(self, theta, present, run: SteadyFlows, stress, felt):
         """Return the recorded stress of a flow curve, of that before the signal."""
         places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
-        rate = self._steady_rates(theta, run)
+        rate = self._steady_rates(theta, present, run)
         for effect in self._signal:
             if effect.acts_on_steady_states:
-                record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
-                stress = self._as_recorded(theta, effect, record, run.kinematics)
+
+                def distorted(stress, effect=effect):
+                    record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
+                    return self._as_recorded(theta, effect, record, run.kinematics)
+
+                stress = self._if_present(theta, present, effect, distorted, stress)
         return stress
 
     def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
         dynamics = self.fluid.dynamics(numbers, used, theta, None)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
+        present = self.fluid.present(theta)
 
         def beside(felt):
             return self.fluid.beside(numbers, theta, felt, None)
@@ -252,44 +316,49 @@ class Program:
         def one(state):
             rate, nominal, frequency, steps = state
             found = complex_modulus(dynamics, rate / frequency, frequency, steps, beside)
-            return self._recorded_modulus(theta, found, rate, nominal, frequency)
+            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
 
-        rates, commanded = self._periodic_rates(theta, states), states.frequency * states.strain
+        rates = self._periodic_rates(theta, present, states)
+        commanded = states.frequency * states.strain
         # not side by side: each in as many cycles, and as many steps of each, as it needs, which
         # takes a quarter of the time of all in those of the largest
         return jax.lax.map(one, (rates, commanded, states.frequency, states.steps))
 
-    def _periodic_rates(self, theta, states: PeriodicFlows):
+    def _periodic_rates(self, theta, present, states: PeriodicFlows):
         """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
         places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
         rates = states.frequency * states.strain
         for effect in (*self._upstream, *self._downstream):
             if effect.acts_on_steady_states:
-                rates = effect.felt_rate(self.fluid.values(theta, effect), places, rates)
+
+                def felt(rates, effect=effect):
+                    return effect.felt_rate(self.fluid.values(theta, effect), places, rates)
+
+                rates = self._if_present(theta, present, effect, felt, rates)
         return rates
 
-    def _recorded_modulus(self, theta, found, rate, nominal, frequency):
+    def _recorded_modulus(self, theta, present, found, rate, nominal, frequency):
         """Return G′ and G″ as they are recorded, of those of the fluid at a rate that it feels."""
         found = found * rate / nominal
         for effect in self._signal:
-            found = self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+
+            def distorted(found, effect=effect):
+                return self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+
+            found = self._if_present(theta, present, effect, distorted, found)
         return jnp.stack([found.real, found.imag])
 
-    def _moduli_recorded(self, numbers, theta, states: PeriodicFlows, of_modes):
+    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, of_modes):
         """Return both moduli of states as they are recorded, of those of the modes."""
-        rates, commanded = self._periodic_rates(theta, states), states.frequency * states.strain
+        rates = self._periodic_rates(theta, present, states)
+        commanded = states.frequency * states.strain
 
         def one(rate, nominal, frequency, found):
             beside = self.fluid.beside(numbers, theta, rate * jnp.cos(PHASE), None)
             found = found + first_harmonic(beside, PHASE) / (rate / frequency)
-            return self._recorded_modulus(theta, found, rate, nominal, frequency)
+            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
 
         return jax.vmap(one)(rates, commanded, states.frequency, of_modes)
-
-    def _moduli_alone(self, numbers, theta, states: PeriodicFlows) -> np.ndarray:
-        used = self.fluid.in_use(theta)
-        found = self.predict(numbers, used, theta, states, None, None, np.float64(np.inf))
-        return np.asarray(found)
 
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.

@@ -10,7 +10,7 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.inference.evidence import criterion, evidence
-from discover.inference.least_squares import NO_PRIOR, Fit, Prior, best_of, fit_batch, jacobians
+from discover.inference.least_squares import NO_PRIOR, Fit, Prior, best_of, fit_batch
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation, judged_cost, summarise
@@ -74,9 +74,8 @@ class FitProblem:
 
     def at(self, theta: np.ndarray, free: Sequence[int]) -> Fit:
         """Return what parameters leave as they are, and its derivatives in the free ones."""
-        residual = self.model.residuals([theta], self.batch)
-        derivatives = jacobians(self.model, self.batch, [theta], residual, [free])[0]
-        return Fit(theta, tuple(free), residual[0], derivatives)
+        found = self.model.linearise(theta, self.batch, free)
+        return Fit(theta, tuple(free), found.residual, found.jacobian)
 
     def independent_samples(self, fit: Fit) -> float:
         """Return how many independent samples what a fit leaves is worth."""

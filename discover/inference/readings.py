@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch, even
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 from discover.inference.modulus_errors import modulus_shifts
 from discover.statistics.noise.outliers import stray
 from discover.statistics.reading.reading_faults import Reading
@@ -37,12 +37,11 @@ def unseen_readings(
     model: AugmentedModel, batch: Batch, runs: Sequence[Run], fit: Fit, theta: np.ndarray
 ) -> list[Reading]:
     """Return runs that no fit saw for the same question, as these parameters predict them."""
-    residual = model.residuals([theta], batch)
-    if batch.records.loadings is None:
-        columns = jacobians(model, batch, [theta], residual, [fit.free])[0]
-    else:
+    found = model.linearise(theta, batch, fit.free)
+    columns = found.jacobian
+    if batch.records.loadings is not None:
         columns = _with_factors(model, batch, theta, fit.free)
-    return _readings(batch, runs, residual[0], columns, *_of_moduli(model, batch, theta))
+    return _readings(batch, runs, found.residual, columns, *_of_moduli(model, batch, theta))
 
 
 def beside_one_another(
@@ -78,11 +77,10 @@ def _with_factors(
     """Return changes of the weighted predictions by constants, and by factors of the loadings."""
     own, plain = batch.records.loadings, batch.without_factors()
     assert own is not None
-    residual = model.residuals([theta], plain)
-    columns = jacobians(model, plain, [theta], residual, [free])[0]
-    predicted = residual[0] + batch.recorded * batch.weight
+    found = model.linearise(theta, plain, free)
+    predicted = found.residual + batch.recorded * batch.weight
     factors = np.where(np.asarray(own.members)[..., None], predicted, 0.0)
-    return np.concatenate([columns, factors])
+    return np.concatenate([found.jacobian, factors])
 
 
 def _readings(
@@ -126,14 +124,8 @@ def _of_moduli(
     modulus = np.asarray(model.declared.modulus, dtype=float)
     found = np.zeros((0, *np.shape(batch.weight)))
     if len(modulus) > 1:
-        moved = [
-            [
-                model.at_moduli(modulus * (1 + sign * _STEP * one)).residuals([theta], batch)[0]
-                for sign in (1, -1)
-            ]
-            for one in np.eye(len(modulus))
-        ]
-        found = np.nan_to_num(np.array([(up - down) / (2 * _STEP) for up, down in moved]))
+        moves = np.pad(_STEP * np.diag(modulus), [(0, 0), (0, 1)])
+        found = np.nan_to_num(model.linearise(theta, batch, moves=moves).jacobian) / _STEP
     return found, modulus_shifts(model, theta, batch)
 
 

@@ -13,7 +13,7 @@ from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import TransientFlows, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.inference.least_squares import Fit, gauss_newton_step
+from discover.inference.least_squares import gauss_newton_step
 from discover.protocols.rate_steps import steps_between_samples
 
 _MOST = 40
@@ -124,7 +124,7 @@ def with_own_instants(
 
 def instants_found(
     model: AugmentedModel,
-    fit: Fit,
+    theta: Float[np.ndarray, " p"],
     bounds: Mapping[int, tuple[float, float]],
     runs: Sequence[Run],
     held_out: Sequence[Run],
@@ -136,7 +136,8 @@ def instants_found(
             share, ci95 = step.share, None
             if step.place is not None:
                 at = model.instants.start + step.place
-                share, ci95 = float(fit.theta[at]), [step.at(end) for end in bounds[at]]
+                share = float(theta[at])
+                ci95 = [step.at(end) for end in bounds[at]] if at in bounds else None
             line = {"between_s": [step.start, step.end], "instant_s": step.at(share), "ci95": ci95}
             found.setdefault(run.source, []).append(line)
     return found

@@ -139,6 +139,23 @@ class Fluid(eqx.Module):
             modes += f" of {low} s" if low == high else f" from {low} to {high} s"
         return f"<Fluid: {type(self.law).__name__}, {modes}>"
 
+    def _repr_html_(self) -> str:
+        """Return law, constants and modes as a notebook shows them."""
+        import pandas as pd
+
+        from discover.laws.registry import LAWS, name_of
+        from discover.notebook_view import as_html
+
+        named = name_of(self.law)
+        law = type(self.law).__name__ if named is None else LAWS[named[0]].described(named[1])
+        modulus, time = np.asarray(self.modulus), np.asarray(self.relaxation_time)
+        viscosity = float(np.sum(modulus * time) + self.solvent_viscosity)
+        said = f"{law}. {counted(self.n_modes, 'mode')}, zero-shear viscosity {viscosity:.4g} Pa s"
+        if self.solvent_viscosity > 0.0:
+            said += f", of which solvent {float(self.solvent_viscosity):.4g} Pa s"
+        modes = {"modulus_Pa": modulus, "relaxation_time_s": time, "viscosity_Pa_s": modulus * time}
+        return as_html(f"{said}.") + as_html(pd.DataFrame(modes))
+
     @classmethod
     def dimensionless(cls, law: AbstractConstitutiveLaw) -> "Fluid":
         """Return the single mode with unit modulus and unit relaxation time."""

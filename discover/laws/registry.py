@@ -15,12 +15,15 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 
-from discover.errors import InputError
+from discover.errors import InputError, Problems
 from discover.laws import textbook
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.named import NamedLaw
+from discover.laws.of_function import law_of_function
 from discover.new_names import require_new_name
 from discover.plain_numbers import as_number, short
+from discover.words import nearest, unknown_name
+from tensor_library.algebra import Symmetric
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.registry import Registry
 
@@ -102,11 +105,13 @@ def _same_law(made: AbstractConstitutiveLaw, law: AbstractConstitutiveLaw) -> bo
 
 def register_law(
     name: str,
-    build: Callable[..., AbstractConstitutiveLaw],
+    build: Callable[..., AbstractConstitutiveLaw] | None = None,
     parameters: Mapping[str, tuple[float, float]] | None = None,
     title: str = "",
     source: str = "",
     written: Callable[[], IsotropicFunction] | None = None,
+    *,
+    extra_term: Callable[..., Symmetric] | None = None,
 ) -> NamedLaw:
     """Make a law of one's own known by name, to studies, loops and exports in this process.
 
@@ -118,6 +123,7 @@ def register_law(
         As studies are to spell it: lower-case letters, digits and underscores.
     build
         The class of the law, or a function that makes the law from its parameters, in their order.
+        Not needed where `extra_term` is given.
     parameters
         Name and admissible range (low, high) of each parameter; they are dimensionless.
     title, source
@@ -125,19 +131,34 @@ def register_law(
     written
         Returns h written out, for exports of a law that is no sum of terms; see
         `tensor_library.isotropic_function`.
+    extra_term
+        h as a plain function of stress and rate, both dimensionless, and of the parameters by name;
+        the law is then λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h. Written with `tensor_library.algebra`
+        (``trace``, ``square``, ``inner``, ``anticommutator``, ``identity_like``) and numbers.
 
     Raises
     ------
     InputError
-        If the name is taken or is none, a range is none, or `build` makes no law.
+        If the name is taken or is none, a range is none, `build` makes no law, `extra_term` does
+        not take these parameters or returns no tensor, or both or neither are given.
 
     Examples
     --------
     >>> import discover as dc
-    >>> dc.register_law("my_law", MyLaw, {"k": (0.0, 10.0)})  # doctest: +SKIP
-    >>> dc.make_law("my_law", {"k": 1.0})  # doctest: +SKIP
+    >>> from tensor_library import trace
+    >>> def softening(stress, rate, k):
+    ...     return k * trace(stress) ** 2 * stress
+    >>> law = dc.register_law("softening", extra_term=softening, parameters={"k": (0.0, 10.0)})
+    >>> dc.make_law("softening", {"k": 1.0}).linear_relaxation
+    True
+    >>> del dc.laws.LAWS["softening"]
     """
     require_new_name(name, [*LAWS.present, *RESERVED], "law")
+    if (build is None) == (extra_term is None):
+        raise InputError(
+            f"The law {name!r} needs either build, a class or function that makes the law, or "
+            "extra_term, a function h(stress, rate, parameters); give one of them."
+        )
     ranges = {}
     for key, ends in (parameters or {}).items():
         try:
@@ -149,6 +170,9 @@ def register_law(
                 f"The range of {key!r} must be two numbers (low, high), low < high; got {ends!r}."
             )
         ranges[str(key)] = (low, high)
+    if extra_term is not None:
+        build = law_of_function(name, extra_term, tuple(ranges))
+    assert build is not None
     _require_law(name, build, ranges)
     shown = title or name.replace("_", " ")
     entry = NamedLaw(shown, build, ranges, source=source, written=written)
@@ -228,29 +252,30 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
         )
     parameters = dict(parameters or {})
     if not isinstance(name, str) or name not in LAWS:
-        raise InputError(f"Unknown law {name!r}; write one of {', '.join(LAWS)}.")
-    entry = LAWS[name]
-    unknown = [key for key in parameters if key not in entry.parameters]
-    if unknown:
-        wanted = ", ".join(entry.parameters) or "none"
-        raise InputError(
-            f"The law {name!r} has no parameter {unknown[0]!r}. Write one of its parameters: "
-            f"{wanted}."
-        )
-    values = []
+        raise InputError(unknown_name("law", name, LAWS))
+    entry, problems, values = LAWS[name], Problems(), []
+    for key in parameters:
+        if key not in entry.parameters:
+            said = unknown_name("parameter", key, entry.parameters)
+            problems.add(f"The law {name!r}: {said}")
+    meant = {nearest(key, entry.parameters) for key in parameters if key not in entry.parameters}
     for key, (low, high) in entry.parameters.items():
         if key not in parameters:
-            raise InputError(
-                f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to {high:g}."
-            )
+            if key not in meant:
+                problems.add(
+                    f"The law {name!r} needs its parameter {key!r}. Give it, from {low:g} to "
+                    f"{high:g}."
+                )
+            continue
         try:
             value = as_number(key, parameters[key])
         except InputError:
             value = math.nan
         if not low <= value <= high:
-            raise InputError(
+            problems.add(
                 f"The parameter {key!r} of the law {name!r} must be a number from {low:g} to "
                 f"{high:g}; got {short(parameters[key])}."
             )
         values.append(value)
+    problems.require_none()
     return entry.build(*values)

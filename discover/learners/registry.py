@@ -9,6 +9,7 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.results.result import LearnerResult
 from discover.new_names import require_new_name
+from discover.words import unknown_name
 from tensor_library.library import TermLibrary
 from tensor_library.registry import Registry
 
@@ -125,7 +126,7 @@ def learn_with(name: str, task: LearningTask) -> tuple[LearnerResult, Fluid]:
         If there is no such learner, or it returns something else than a result.
     """
     if name not in LEARNERS:
-        raise InputError(f"Unknown learner {name!r}; write one of {', '.join(learner_names())}.")
+        raise InputError(unknown_name("learner", name, learner_names()))
     start = perf_counter()
     found = LEARNERS[name].learn(task)
     if not isinstance(found, LearnerResult):

@@ -1,5 +1,6 @@
 """What every learner does with runs: take them, and once it has a fluid predict them."""
 
+import html
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -15,9 +16,14 @@ from discover.dataset.run import Run
 from discover.learners.files.estimator_file import EstimatorFile, write_estimator
 from discover.learners.files.provenance import Provenance, provenance_of
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
+from discover.learners.results.term_tables import estimates_of
 from discover.learners.runs import as_runs
-from discover.learners.settings import check_settings
+from discover.learners.settings import ARITHMETIC, check_settings
 from discover.linear_algebra_threads import in_one_thread
+from discover.protocols.sampling import sampling_interval
+from discover.statistics import LackOfFit, lack_of_fit
+from discover.summary_view import Estimate, SummaryView
+from tensor_library.law_terms import spell
 
 if TYPE_CHECKING:
     import xarray
@@ -31,7 +37,7 @@ _Learner = TypeVar(
 )  # not Self, which the tests' hook cannot check
 
 
-class RunPrediction(RegressorMixin, BaseEstimator):
+class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     """What is common to estimators: what they are fitted to, prediction, score, law, file."""
 
     fluid_: "Fluid"
@@ -44,6 +50,8 @@ class RunPrediction(RegressorMixin, BaseEstimator):
 
     _saved: ClassVar[tuple[str, ...]]
     """Attributes of the fit that a file holds."""
+
+    _index = ("term",)
 
     _saved_types: ClassVar[tuple[type, ...]]
     """Dataclasses among them and among the parameters."""
@@ -71,6 +79,7 @@ class RunPrediction(RegressorMixin, BaseEstimator):
         # once, for it may be read only once
         runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
         require_known_rate(known, runs)
+        self._left = None
         self._learn(runs, known)
         self.n_features_in_ = 1
         self.runs_ = tuple(runs)
@@ -90,6 +99,80 @@ class RunPrediction(RegressorMixin, BaseEstimator):
             relaxation_time=tuple(map(float, self.fluid_.relaxation_time)),
             solvent_viscosity=float(self.fluid_.solvent_viscosity),
         )
+
+    @property
+    def lack_of_fit_(self) -> LackOfFit | None:
+        """What the law leaves of the runs it was fitted to; None of a file that does not say."""
+        check_is_fitted(self, "fluid_")
+        if getattr(self, "_left", None) is None and hasattr(self, "runs_"):
+            self._left = self._what_it_leaves(list(self.runs_))
+        return self._left
+
+    def _what_it_leaves(self, runs: list[Run]) -> LackOfFit:
+        predicted = self._predict_runs(runs)
+        for run, values in zip(runs, predicted, strict=True):
+            if not np.all(np.isfinite(values)):
+                nan = float("nan")
+                reason = f"the integration diverges in {run.name}"
+                return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
+        found = lack_of_fit(
+            [values - run.recorded for run, values in zip(runs, predicted, strict=True)],
+            [run.recorded for run in runs],
+            even=[1.0 / run.sizes(run.recorded) for run in runs],
+            intervals=[sampling_interval(run.time, run.protocol, run.quantity) for run in runs],
+        )
+        if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
+            return replace(found, verdict="explained", reason="what is left is arithmetic")
+        return found
+
+    @property
+    def text(self) -> str:
+        """The law, how well it describes the fitted runs, and which terms are determined."""
+        terms = self.result_.terms
+        law = spell({term.term: term.coefficient for term in terms}) if terms else "no term"
+        said = [f"h = {law}."]
+        left = self.lack_of_fit_
+        if left is not None:
+            said.append(left.described)
+        if terms and left is not None and left.verdict != "explained":
+            said.append(f"{self._empirical} No term is determined.")
+        elif terms and self._tells_terms:
+            sure = [
+                one.key[0] for one in self._estimates() if one.notes["determined"].startswith("yes")
+            ]
+            said.append(f"Determined, if the law is in the library: {', '.join(sure) or 'none'}.")
+        return " ".join(said)
+
+    _empirical: ClassVar[str] = "The terms are an empirical fit, not an identified law."
+
+    @property
+    def _tells_terms(self) -> bool:
+        return any(term.ci95 is not None for term in self.result_.terms)
+
+    def _estimates(self) -> list[Estimate]:
+        check_is_fitted(self, "result_")
+        rivals = [row["support"] for row in self.result_.details.get("rivals", ())]
+        return estimates_of(self.result_.terms, self.lack_of_fit_, rivals)
+
+    def __repr__(self, N_CHAR_MAX: int = 700) -> str:
+        if not hasattr(self, "result_"):
+            return super().__repr__(N_CHAR_MAX)
+        return f"<{type(self).__name__}: {self.text}>"
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.equation_
+        yield self.summary().reset_index()
+
+    def _repr_html_(self) -> str:
+        if not hasattr(self, "result_"):
+            return f"<pre>{html.escape(repr(self))}</pre>"
+        return super()._repr_html_()
+
+    def _repr_mimebundle_(self, **options: Any) -> dict[str, str]:
+        # what scikit-learn shows of an estimator is its parameters
+        del options
+        return {"text/plain": repr(self), "text/html": self._repr_html_()}
 
     def save(self, path: str | Path) -> Path:
         """Write the fitted estimator to one file, without pickle; `discover.load` reads it.
@@ -113,17 +196,18 @@ class RunPrediction(RegressorMixin, BaseEstimator):
             path,
             self.learner,
             {name: value for name, value in parameters.items() if name != "progress"},
-            {name: getattr(self, name) for name in self._saved},
-            self._saved_types,
+            {name: getattr(self, name) for name in (*self._saved, "lack_of_fit_")},
+            (*self._saved_types, LackOfFit),
         )
 
     @classmethod
     def _from_file(cls, file: EstimatorFile) -> Any:
-        parameters, fitted = file.read(cls._saved_types)
+        parameters, fitted = file.read((*cls._saved_types, LackOfFit))
         try:
             estimator = cls(**parameters)
             for name in cls._saved:
                 setattr(estimator, name, fitted[name])
+            estimator._left = fitted.get("lack_of_fit_")
         except (KeyError, TypeError) as error:
             raise file.damaged(error) from None
         return estimator

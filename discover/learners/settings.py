@@ -10,13 +10,19 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.progress import checked
-from tensor_library.library import TermLibrary
+from tensor_library.library import TermLibrary, build_library
 
 PerMode = float | int | Sequence[float] | np.ndarray | jax.Array
 """A number, or one value for each relaxation mode, shape (k,)."""
 
 _WHOLE = {"max_terms": 1, "n_members": 1, "n_folds": 0, "n_stability": 0, "random_state": 0}
 """Settings that are whole numbers, with the least that each may be."""
+
+ARITHMETIC = 1e-5
+"""Relative misfit that both integrations together may leave: the floor of the sparse search."""
+
+DEFAULT_DEGREE = 1
+"""Degree in the invariants of the terms that are searched where nobody names others."""
 
 _POSITIVE = ("misfit_floor", "strain_step")
 
@@ -58,6 +64,11 @@ def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
             f"{name} must be positive and finite, a number or one for each mode; got {value!r}."
         )
     return values.astype(float)
+
+
+def default_library() -> TermLibrary:
+    """Return the terms that are searched where nobody names others, by commands and in Python."""
+    return build_library(degree=DEFAULT_DEGREE)
 
 
 def check_library(library: TermLibrary | None) -> None:

@@ -10,6 +10,7 @@ from scipy.stats import qmc
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.registry import LAWS, starting_values
+from discover.words import unknown_name
 from tensor_library.algebra import Symmetric
 
 _POINTS = 5
@@ -124,7 +125,7 @@ def student_of(law: str) -> Student:
         return STUDENTS[law]
     if law not in LAWS or not LAWS[law].parameters:
         known = dict.fromkeys([*STUDENTS, *(name for name in LAWS if LAWS[name].parameters)])
-        raise InputError(f"Unknown student {law!r}; write one of {', '.join(known)}.")
+        raise InputError(unknown_name("student", law, known))
     entry = LAWS[law]
     ranges = entry.parameters.values()
     shares = qmc.Halton(len(ranges), scramble=False).random(_POINTS + 1)[1:]

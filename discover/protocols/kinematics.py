@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float
 
 from discover.errors import InputError
 from discover.programs import on_device
-from discover.words import listed
+from discover.words import listed, unknown_name
 from tensor_library.contraction import contracted
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
@@ -138,7 +138,7 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
         What is recorded; by default σ12 in shear and the tensile stress in extension.
     """
     if not isinstance(kind, str) or kind not in _GRADIENT:
-        raise InputError(f"Unknown flow {kind!r}; the flows are {', '.join(KINDS)}.")
+        raise InputError(unknown_name("flow", kind, KINDS))
     gradient = np.array(_GRADIENT[kind])
     rate = gradient * np.array([2.0, 2.0, 2.0, 1.0])  # γ̇ = L + Lᵀ
     recorded = np.array(_RECORDED[quantity or recorded_name(kind)])

@@ -1,6 +1,6 @@
 """What is said of a free function."""
 
-from discover.closed_loop import FreeForm
+from discover.loop import FreeForm
 from discover.report.wording import effect_title
 
 _WHAT = {
@@ -21,6 +21,5 @@ def free_form_sentence(found: FreeForm) -> str:
     """Return what a free function is and where it stands, without a full stop."""
     beside = " and ".join(map(effect_title, found.beside)) or "the declared model"
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
-    verb = "explains" if found.explains else "takes up most of"
     what = _WHAT[found.slot].format(variable=found.variable)
-    return f"{what}{shape}, beside {beside} {verb} what is left"
+    return f"{what}{shape}, beside {beside} explains what is left"

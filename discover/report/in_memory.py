@@ -5,8 +5,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
+from discover.loop.loop_result import LoopResult
 from discover.report.comparison.report import write_comparison
 from discover.report.loop.report import write_loop
 from discover.report.page import made_by
@@ -41,7 +41,7 @@ def loop_page(result: LoopResult) -> str:
     """Return the report on a closed loop as one page."""
     kept = _PageAlone(_fingerprint(result.to_json()))
     run = made_by(kept.fingerprint, "discover.close_loop(...) in Python", (), "")
-    write_loop(result, kept, result.title or "closed loop", result.summary, run=run)
+    write_loop(result, kept, result.title or "closed loop", result.described, run=run)
     return kept.page
 
 

@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.closed_loop import RunRecord
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
 from discover.dataset.tables.table import read_table, shown
@@ -16,7 +15,9 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.forward import DeclaredModel as ForwardDeclared
 from discover.laws import LAWS, Fluid, make_law
+from discover.loop import RunRecord
 from discover.study.schema import OverlayAsked, Study
+from discover.words import listed
 
 COLUMNS = ("run", "time_s", "quantity", "value")
 """What a file of curves has, as in ``predictions.csv``."""
@@ -208,7 +209,7 @@ def _read(path: Path) -> Points:
     missing = [name for name in COLUMNS if name not in table.columns]
     if missing:
         raise InputError(
-            f"{table.name} has no column {missing[0]}; an overlay has the columns "
+            f"{table.name} has no column {listed(missing)}; an overlay has the columns "
             f"{', '.join(COLUMNS)}, as predictions.csv does. Its columns are {table.listed}."
         )
     sources = set(table.columns.get("source", ()))

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from discover.closed_loop import LoopResult, RunRecord
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
 from discover.learners.registry import BANDS_ONLY
+from discover.loop import LoopResult, RunRecord
 from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder
 

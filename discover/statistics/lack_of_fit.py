@@ -95,6 +95,20 @@ class LackOfFit:
     advice: str = ""
 
     @property
+    def described(self) -> str:
+        """How well the model describes the records it was fitted to, in one sentence."""
+        if self.verdict == "no_signal":
+            return f"The runs hold no signal: {self.reason}."
+        if not np.isfinite(self.misfit):
+            return f"Does not describe the fitted runs: {self.reason}."
+        if self.verdict == "explained":
+            return f"Fits to the noise ({percent_of(self.noise or self.misfit)})."
+        return (
+            f"Describes the fitted runs to {percent_of(self.misfit)}; the rest is systematic "
+            f"(noise: {percent_of(self.noise)})."
+        )
+
+    @property
     def noise_unsure(self) -> bool:
         """Whether `noise` is no more than what changes from sample to sample."""
         return self.changing is not None and self.noise <= self.changing

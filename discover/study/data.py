@@ -13,6 +13,7 @@ from discover.laws.multimode import Fluid
 from discover.protocols.kinematics import MODULI
 from discover.simulate.synthetic import SyntheticDataset, synthetic_dataset
 from discover.study.schema import Study
+from discover.words import unknown_name
 
 
 @dataclass(frozen=True)
@@ -151,8 +152,9 @@ def _observed(
     if missing:
         left = f" {whole.left_out}" if whole.left_out else ""
         raise InputError(
-            f"[data] observe names {sorted(missing)[0]}, which no run of {dataset.name!r} has. "
-            f"Write some of {', '.join(sorted({run.quantity for run in whole}))}.{left}"
+            f"[data] observe: no run of {dataset.name!r} has it. "
+            f"{unknown_name('quantity', sorted(missing)[0], sorted({r.quantity for r in whole}))}"
+            f"{left}"
         )
     wanted = dataset.names if fit is None else fit
     by_name = {run.name: [] for run in dataset}

@@ -3,72 +3,25 @@
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 
 from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.loading import LARGEST
+from discover.effects.known import known_effects
+from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS
 from discover.learners.registry import learner_names
-from discover.protocols.classes import FLOW_CLASSES, FlowClass
+from discover.study.compare_section import Compare
+from discover.study.key_values import (
+    ByHand,
+    LawNames,
+    NotNegative,
+    Positive,
+    Seed,
+    SyntheticLaw,
+    require_parameters,
+)
 from discover.validation import Section
-from tensor_library.closed_forms import CLOSED_FORMS
-
-
-def _known_law(name: str) -> str:
-    if name not in LAWS:
-        raise ValueError(f"unknown law {name[:60]!r}; write one of {', '.join(LAWS)}")
-    return name
-
-
-def _known_or_learned(name: str) -> str:
-    return name if name == "learned" else _known_law(name)
-
-
-def _known_law_or_several(given: Any) -> Any:
-    if isinstance(given, list | tuple):
-        if len(set(given)) < 2:
-            raise ValueError("law as a list names two laws or more to choose from, each once")
-        return tuple(_known_law(str(name)) for name in given)
-    return given if given == ANY else _known_or_learned(str(given))
-
-
-def _known_learner(name: str) -> str:
-    if name not in learner_names():
-        raise ValueError(
-            f"unknown learner {name[:60]!r}; write one of {', '.join(learner_names())}"
-        )
-    return name
-
-
-def _known_form(name: str) -> str:
-    if name not in CLOSED_FORMS:
-        raise ValueError(
-            f"unknown closed form {name[:60]!r}; write some of {', '.join(CLOSED_FORMS)}"
-        )
-    return name
-
-
-ClosedFormName = Annotated[str, AfterValidator(_known_form)]
-LearnerName = Annotated[str, AfterValidator(_known_learner)]
-SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
-LawNames = Annotated[str | tuple[str, ...], BeforeValidator(_known_law_or_several)]
-Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes
-# wider than any instrument, and narrow enough that squares and ratios compute
-_LEAST, _MOST = 1e-15, 1e15
-
-
-def _not_tiny(value: float) -> float:
-    if value < _LEAST:
-        raise ValueError(f"should be at least {_LEAST:g}; got {value:g}")
-    return value
-
-
-Positive = Annotated[float, Field(gt=0, le=_MOST), AfterValidator(_not_tiny)]
-
-
-NotNegative = Annotated[float, Field(ge=0, le=_MOST)]
-ByHand = Annotated[tuple[Positive, ...], Field(min_length=1, max_length=MOST_MODES)]
-"""A constant of each relaxation mode."""
 
 Role = Literal["fit", "judge"] | None
 """What a table beside the runs is for; by default it judges, unless there is no run to fit."""
@@ -78,24 +31,44 @@ class Synthetic(Section):
     """Data computed from a known law instead of measured."""
 
     law: SyntheticLaw
+    """Name of the law that makes the data; `discover laws` lists them."""
     parameters: dict[str, float] = Field(default_factory=dict)
+    """Its parameters by name, dimensionless."""
     protocol: Literal["paper"] = "paper"
+    """The eight shear series of the paper."""
     noise: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Standard deviation of the noise over the rms of each run."""
     seed: Seed = 0
+    """Of the noise."""
     samples: Annotated[int, Field(ge=10, le=100_000)] = 201
+    """Samples of each run."""
+
+    @model_validator(mode="after")
+    def _names(self):
+        require_parameters(self.law, self.parameters)
+        return self
 
 
 class Data(Section):
     """Where the runs come from and which of them no fit may see."""
 
     folder: str | None = None
+    """Data folder; a relative path starts at the study file, then at `DISCOVER_DATA`, then at the
+    working directory."""
     synthetic: Synthetic | None = None
+    """Data computed from a known law, in place of a folder."""
     material: Annotated[str, Field(max_length=80)] = ""
+    """Name of the material, for titles."""
     fit: tuple[str, ...] | None = None
+    """Runs to fit, by file name; all that are not held out where left out."""
     held_out: tuple[str, ...] | Literal["each"] = ()
+    """Runs that only test the result, by file name, or `"each"`: each in turn."""
     clock_factor: str | None = None
+    """Column of `runs.csv` with instrument time = time / factor."""
     rate: Literal["commanded", "measured"] = "commanded"
+    """Whether `shear_rate_1_s` was commanded or measured."""
     rate_before: str | None = None
+    """Column of `runs.csv` with the rate of the steady flow before each run, in 1/s."""
     observe: (
         tuple[
             Literal[
@@ -111,13 +84,22 @@ class Data(Section):
         ]
         | None
     ) = None
+    """What is fitted of what was recorded; every stress but N1 and N2 where left out. The rest
+    tests the result."""
     sequence: str | None = None
+    """Column of `runs.csv` that orders runs made one after another on one sample."""
     flow_curve: Role = None
+    """Role of `flow_curve.csv`."""
     relaxation: Role = None
+    """Role of `relaxation.csv`."""
     creep: Role = None
+    """Role of `creep.csv`."""
     amplitude_sweep: Role = None
+    """Role of `amplitude_sweep.csv`."""
     amplitude_sweep_rad_s: Positive | None = None
+    """Frequency of `amplitude_sweep.csv` in rad/s where the file has none."""
     lve: Role = None
+    """Role of `lve.csv`, which also gives the modes of `modes = "lve"`."""
 
     @model_validator(mode="after")
     def _one_source(self):
@@ -147,21 +129,44 @@ class Model(Section):
     """
 
     law: LawNames = "ucm"
+    """Known part: the name of a law, `"learned"`, several names or `"any"` to choose from."""
     modulus_Pa: Positive | Literal["fit"] | ByHand = 1.0
+    """Modulus in Pa, a list for several modes, or `"fit"`."""
     relaxation_time_s: Positive | Literal["fit"] | ByHand = 1.0
+    """Relaxation time in s, a list for several modes, or `"fit"`."""
     modes: Literal["lve"] | Annotated[int, Field(strict=True, ge=1, le=MOST_MODES)] | None = None
+    """Modes from `lve.csv`: `"lve"` for as many as it supports, or a number of them."""
     sweep_rad_s: tuple[Positive, Positive] | None = None
+    """Range [low, high] of the sweep's frequencies that count, in rad/s."""
     solvent_viscosity_Pa_s: NotNegative | Literal["fit"] | None = None
+    """Solvent viscosity in Pa s, or `"fit"`; that of the sweep where left out."""
     elastic_modulus_Pa: NotNegative | Literal["fit"] | None = None
+    """Elastic constant of a solid in Pa, or `"fit"` from the sweep."""
     parameters: dict[str, float | Literal["fit"]] = Field(default_factory=dict)
+    """Parameters of the law by name: numbers, or `"fit"`."""
     by_mode: tuple[str, ...] = ()
+    """Constants that may differ from mode to mode, as a smooth function of the relaxation time."""
     known_relaxation: bool = True
+    """Whether the linear term −σ/λ is known; if not, the learners find it."""
     effects: dict[str, dict[str, float | Literal["fit"]] | Literal["fit"]] = Field(
         default_factory=dict
     )
+    """Effects known beside the law, with values or `"fit"`; `discover effects` lists them."""
     from_: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
         default=None, alias="from"
     )
+    """Result folder whose law, modes and effects are taken over."""
+
+    @model_validator(mode="after")
+    def _names(self):
+        problems = Problems()
+        if isinstance(self.law, str) and self.law in LAWS and self.from_ is None:
+            with problems.collected():
+                require_parameters(self.law, self.parameters)
+        with problems.collected():
+            known_effects(self.effects, "effects")
+        problems.require_none()
+        return self
 
     @model_validator(mode="after")
     def _window(self):
@@ -211,12 +216,19 @@ class Loop(Section):
     """How far the closed loop may go."""
 
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
+    """Most effects that are added."""
     strain: tuple[float, float] | None = None
+    """Range [low, high] of strain that is fitted and tested."""
     effects: tuple[str, ...] | Literal["named"] | None = None
+    """Candidates by name or by term, or `"named"`; all where left out."""
     noise: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Relative noise, where it is known."""
     most_samples: Annotated[int, Field(ge=10, le=20_000)] = 400
+    """Most samples of a run that are used."""
     explanations: Annotated[int, Field(ge=1, le=64)] = 8
+    """Most explanations that are carried side by side."""
     loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
+    """Relative scatter of the loadings, where each run is a loading of its own."""
 
     @model_validator(mode="after")
     def _window(self):
@@ -227,69 +239,6 @@ class Loop(Section):
             )
         if self.strain is not None and not 0 <= self.strain[0] < self.strain[1]:
             raise ValueError(f"strain must be [low, high] with 0 <= low < high; got {self.strain}")
-        return self
-
-
-class Library(Section):
-    """Candidate terms: tensors × invariants up to a degree, plus closed forms."""
-
-    degree: Annotated[int, Field(ge=0, le=2)] = 1
-    closed_forms: tuple[ClosedFormName, ...] = ()
-
-
-class Sweep(Section):
-    """The same comparison again over laws and values of one parameter, as synthetic data.
-
-    The paper's study of linear and exponential PTT over the extensibility is one.
-    """
-
-    laws: Annotated[tuple[SyntheticLaw, ...], Field(min_length=1)]
-    parameter: str
-    values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
-
-
-class NextExperiment(Section):
-    """What the user could measure next."""
-
-    flows: Annotated[tuple[FlowClass, ...], Field(min_length=1)] = FLOW_CLASSES
-    observe: Annotated[tuple[Literal["sigma12", "N1", "N2"], ...], Field(min_length=1)] = (
-        "sigma12",
-        "N1",
-        "N2",
-    )
-    weissenberg_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.5, 1.0, 2.0, 4.0)
-    deborah_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.25, 0.5, 1.0, 2.0)
-    noise: Annotated[float, Field(gt=0, le=1)] | None = None
-
-
-class Compare(Section):
-    """Which learners, which candidate terms, which flows they are judged on."""
-
-    learners: tuple[LearnerName, ...] = ("tensor_sindy", "tbnn_ude")
-    library: Library = Library()
-    test: Literal["paper"] = "paper"
-    optimizer: Literal["stlsq", "sr3", "ssr", "frols"] = "stlsq"
-    selection: Literal["bic", "held_out", "one_standard_error"] = "bic"
-    max_terms: Annotated[int, Field(ge=1, le=12)] = 5
-    recipe: Literal["default", "thorough", "paper"] = "default"
-    quick: bool = False
-    members: Annotated[int, Field(ge=1, le=64)] = 3
-    most_samples: Annotated[int, Field(ge=10, le=20_000)] = 1000
-    seed: Seed = 0
-    use_normal_stresses: bool = False
-    high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
-    sweep: Sweep | None = None
-    distillation: bool = False
-    next: NextExperiment = NextExperiment()
-    laws: tuple[SyntheticLaw, ...] = ()
-    loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None
-
-    @model_validator(mode="after")
-    def _at_least_one(self):
-        if len(set(self.laws)) != len(self.laws):
-            raise ValueError("name each of the laws once")
-        if not self.learners or len(set(self.learners)) != len(self.learners):
-            raise ValueError("name each learner once, and at least one")
         return self
 
 
@@ -305,11 +254,17 @@ class OverlayAsked(Section):
     """A curve that the user wants beside the others: a law, or what a file holds."""
 
     label: Annotated[str, Field(max_length=60)] = ""
+    """Name of the curve."""
     law: SyntheticLaw | None = None
+    """Law that is drawn."""
     parameters: dict[str, float] = Field(default_factory=dict)
+    """Its parameters."""
     modulus_Pa: Modes = None
+    """Its modulus in Pa, or one of each mode; the declared ones where left out."""
     relaxation_time_s: Modes = None
+    """Its relaxation time in s, or one of each mode."""
     file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
+    """File with the columns of `predictions.csv`, in place of a law."""
 
     @model_validator(mode="after")
     def _one_kind(self):
@@ -328,16 +283,22 @@ class Report(Section):
     """What the page shows beside the results."""
 
     overlay: Annotated[tuple[OverlayAsked, ...], Field(max_length=4)] = ()
+    """Curves beside those of the report."""
 
 
 class Study(Section):
     """One study: data, declared model, and what to do with them."""
 
     data: Data
+    """Where the runs come from, and which test the result."""
     model: Model = Model()
+    """The known part of the law."""
     loop: Loop = Loop()
+    """How far `discover close-loop` goes."""
     compare: Compare = Compare()
+    """What `discover compare` runs."""
     report: Report = Report()
+    """What the page shows besides."""
     _path: Path | None = PrivateAttr(default=None)
     _text: str = PrivateAttr(default="")
 

@@ -213,7 +213,9 @@ def test_a_wrong_study_ends_with_one_line_and_exit_code_2(tmp_path, command, cas
     result = invoke(command, tmp_path / "bad.toml", "--out", tmp_path / "out")
     assert result.exit_code == 2, result.output
     assert word in result.stderr
-    assert result.stderr.strip().count("\n") == 0
+    first, *problems = result.stderr.strip().split("\n")
+    assert first.startswith("discover: ")
+    assert all(line.startswith("  - ") for line in problems)
     assert "Traceback" not in result.output
     assert result.stdout == ""
 
@@ -330,3 +332,30 @@ def test_nothing_is_kept_where_the_user_says_so(tmp_path, monkeypatch):
     monkeypatch.setenv("DISCOVER_NO_CACHE", "1")
     assert enable_compilation_cache(tmp_path / "compiled") is None
     assert not (tmp_path / "compiled").exists()
+
+
+def test_completion_knows_commands_and_options():
+    def completed(words):
+        environment = {"_DISCOVER_COMPLETE": "complete_bash", "COMP_WORDS": words}
+        environment["COMP_CWORD"] = str(len(words.split()) - 1)
+        done = subprocess.run(
+            [sys.executable, "-c", "from discover.cli import main; main()"],
+            capture_output=True, text=True, timeout=60, env={**os.environ, **environment},
+        )  # fmt: skip
+        return done.stdout.split()
+
+    assert completed("discover close") == ["close-loop"]
+    assert "--held-out" in completed("discover fit --held")
+    assert completed("discover zzz") == []  # control: nothing begins so
+
+
+def test_help_loads_no_more_than_it_shows():
+    # half a second on an idle machine; what takes longer is numbers, and shells
+    code = (
+        "import sys\nfrom discover.cli import main\nsys.argv = ['discover', '--help']\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print([m for m in ('jax', 'numpy', 'pandas', 'pydantic') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "--show-completion" in done.stdout
+    assert done.stdout.strip().endswith("[]")

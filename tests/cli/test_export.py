@@ -11,8 +11,6 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
-from discover.closed_loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
-from discover.closed_loop.results.stages import DeclaredEffect
 from discover.effects import make_effect
 from discover.equations import (
     AugmentedLaw,
@@ -26,6 +24,8 @@ from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.read import read_result_laws
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
+from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.loop.parts import DeclaredEffect
 from tensor_library import LawTerm
 
 

@@ -1,17 +1,17 @@
-"""A deterministic slice of ``benchmarks/malformed_inputs.py``: whatever the command line reads."""
+"""A deterministic slice of ``benchmarks/malformed.py``: whatever the command line reads."""
 
 import io
 import os
 import tempfile
 from pathlib import Path
 
-import malformed_cases
-import malformed_inputs
+import harm
+import malformed
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from malformed_cases import KINDS, Case
-from malformed_inputs import Outcome, attempt, complaint
+from malformed import Outcome, attempt, complaint
+from malformed_kinds import KINDS, Case, complete_results
 
 from discover import cli
 from discover.batch.run import folder_names
@@ -26,7 +26,7 @@ def nothing_is_computed():
     with pytest.MonkeyPatch.context() as patch, tempfile.TemporaryDirectory() as scratch:
         patch.delenv("DISCOVER_DATA", raising=False)
         patch.chdir(scratch)  # where commands put results by default
-        with malformed_inputs.stopped_at_the_first_computation():
+        with malformed.stopped_at_the_first_computation():
             yield
 
 
@@ -38,11 +38,16 @@ def test_a_malformed_input_ends_with_code_2_a_place_and_a_remedy(kind, seed):
     assert wrong is None, (wrong, outcome)
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("package", "options")])
+HARMED_OTHERWISE = ("package", "options", "estimator", "frame")
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in KINDS if kind not in HARMED_OTHERWISE and "nonsense" not in kind]
+)
 def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
-    monkeypatch.setattr(malformed_cases, "mutate_text", lambda text, source: text.encode())
-    monkeypatch.setattr(malformed_cases, "mutate_values", lambda content, source: content)
-    monkeypatch.setattr(malformed_cases, "spoil_file", lambda path, source: None)
+    monkeypatch.setattr(harm, "mutate_text", lambda text, source: text.encode())
+    monkeypatch.setattr(harm, "mutate_values", lambda content, source: content)
+    monkeypatch.setattr(harm, "spoil_file", lambda path, source: None)
     _, outcome, _ = attempt(kind, 0, tmp_path)
     assert outcome.code in (0, None), outcome
 
@@ -65,14 +70,35 @@ def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
     ],
 )
 def test_the_judge_tells_bad_endings_from_good_ones(code, stdout, stderr, wrong):
-    assert complaint(CASE, Outcome(code, stdout, stderr, 0.1)) == wrong
+    assert complaint(CASE, Outcome(code, stdout, stderr)) == wrong
+
+
+def test_nonsense_that_is_taken_without_a_word_is_seen():
+    case = Case(["data", "check", "data"], ("data",), nonsense="time_s2")
+    assert complaint(case, Outcome(0, "2 runs")) == "takes nonsense: time_s2"
+    assert complaint(case, Outcome(0, "warning: time_s2 is no unit")) is None
+    assert complaint(case, Outcome(2, "", "discover: data: correct time_s2.")) is None
+
+
+@pytest.mark.parametrize("error", [RuntimeError("x"), MemoryError(), SystemError()])
+def test_a_fault_of_the_software_is_seen(tmp_path, monkeypatch, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr("discover.dataset.checking.folder.read_index", fail)
+    harm.write_files(tmp_path, harm.SANE["FOLDER"])
+    case = Case(["data", "check", str(tmp_path)])
+    assert complaint(case, malformed.run_call(case.call)) in (
+        "fails in the software",
+        "ends with 1",
+    )
 
 
 def test_a_reader_that_waits_for_ever_would_be_found(tmp_path, monkeypatch):
-    monkeypatch.setattr(malformed_inputs, "LIMIT", 0.2)
+    monkeypatch.setattr(malformed, "LIMIT", 0.2)
     os.mkfifo(tmp_path / "pipe")
     monkeypatch.setattr("discover.cli.main", lambda: (tmp_path / "pipe").read_text())
-    assert complaint(CASE, malformed_inputs.run(["demo"])) == "takes too long"
+    assert complaint(CASE, malformed.run_call(["demo"])) == "takes too long"
 
 
 def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, monkeypatch):
@@ -80,7 +106,7 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
     (tmp_path / "a.csv").write_text("time_s,shear_rate_1_s,stress_Pa\n0,1,0\n1,1,1\n")
     (tmp_path / "b\x1b[2J.csv").write_text("")
     Path(os.fsdecode(bytes(tmp_path) + b"/c\xff.csv")).write_text("")
-    outcome = malformed_inputs.run(["data", "check", str(tmp_path)])
+    outcome = malformed.run_call(["data", "check", str(tmp_path)])
     assert outcome.code == 0, outcome
     assert "c" in outcome.stdout
     assert all(c.isprintable() or c == "\n" for c in outcome.stdout)
@@ -94,16 +120,16 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
 
 
 def test_a_damaged_result_is_not_taken_for_a_complete_one(tmp_path):
-    malformed_cases.complete_results(tmp_path)
+    complete_results(tmp_path)
     again = ["close-loop", str(tmp_path / "study.toml"), "--out", str(tmp_path / "out"), "--json"]
-    assert malformed_inputs.run(again).code == 0
+    assert malformed.run_call(again).code == 0
     (tmp_path / "out" / "loop.json").write_bytes(b"\x90")
-    assert malformed_inputs.run(again).code is None  # it computes
+    assert malformed.run_call(again).code is None  # it computes
 
 
 def test_a_batch_says_its_failures_on_standard_error_however_quiet(tmp_path):
     (tmp_path / "s.toml").write_text("[data]\n")
-    outcome = malformed_inputs.run(
+    outcome = malformed.run_call(
         ["batch", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--quiet"]
     )
     assert outcome.code == 2
@@ -115,10 +141,10 @@ def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
     mine, other = tmp_path / "mine", tmp_path / "other"
     for folder in (mine, other):
         folder.mkdir()
-        malformed_cases.write_files(folder, malformed_cases.FOLDER)
+        harm.write_files(folder, harm.SANE["FOLDER"])
     for path, told in ((".", False), ("../other", True), (str(other), True)):
         (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
-        outcome = malformed_inputs.run(
+        outcome = malformed.run_call(
             ["close-loop", str(mine / "s.toml"), "--out", str(tmp_path / "out"), "--overwrite"]
         )
         assert outcome.code is None
@@ -142,10 +168,10 @@ def test_what_would_fail_after_the_training_is_refused_before(tmp_path):
         'sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1, -5.0] }',
     ):
         synthetic = "sweep" in section
-        malformed_cases.write_files(tmp_path, malformed_cases.FOLDER)
+        harm.write_files(tmp_path, harm.SANE["FOLDER"])
         data = 'synthetic = { law = "ucm", samples = 11 }' if synthetic else 'folder = "."'
         (tmp_path / "s.toml").write_text(f"[data]\n{data}\n[compare]\n{section}\n")
-        outcome = malformed_inputs.run(
+        outcome = malformed.run_call(
             ["compare", str(tmp_path / "s.toml"), "--out", str(tmp_path / "o"), "--overwrite"]
         )
         assert outcome.code == 2, outcome

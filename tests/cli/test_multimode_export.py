@@ -172,4 +172,4 @@ def test_the_exported_latex_has_every_mode_and_brackets_the_slip(exported):
     assert [tuple(map(float, p)) for p in pairs] == list(zip(MODULI, RELAXATION, strict=True))
     stress, rate = r"\boldsymbol{\sigma}", r"\dot{\boldsymbol{\gamma}}"
     sum_of_both = rf"{stress} \cdot {rate} + {rate} \cdot {stress}"
-    assert rf" - 0.12 \, \left({sum_of_both}\right)" in text
+    assert rf" + 0.12 \, \left({sum_of_both}\right)" in text

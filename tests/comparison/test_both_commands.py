@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation, start_up
+from independent import Giesekus, multimode_giesekus, oscillation, start_up
 from independent.folders import write_folder
-from independent.giesekus import multimode_giesekus
 from independent.instruments import Instrument
 from independent.noise import white
 

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import Giesekus, Modes, PhanThienTanner, start_up
-from independent.imposed_stress import strain_at
-from independent.sweeps import modulus_of
+from independent.sweeps import modulus_of, strain_at
 
 import discover as dc
 from discover.errors import InputError

@@ -6,10 +6,9 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import UpperConvectedMaxwell
+from independent import Thixotropic, UpperConvectedMaxwell
 from independent import start_up as start_up_of_scipy
 from independent.instruments import Instrument
-from independent.thixotropic import Thixotropic
 
 from discover.comparison.judging.bands.dense_library import (
     open_where_dense_is_wide,

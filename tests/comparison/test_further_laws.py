@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from independent import RoliePoly
 from independent.flow import start_up as independent_start_up
-from independent.rolie_poly import RoliePoly
 
 from discover.comparison.fitting.further_laws import fit_further_laws
 from discover.comparison.outcomes.flows import Flow

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Modes, PhanThienTanner
+from independent import Modes, PhanThienTanner, multimode_giesekus
 from independent.flow import start_up as independent_start_up
-from independent.giesekus import multimode_giesekus
 
 from discover.comparison.fitting import law_by_mode
 from discover.comparison.fitting.coefficients_in_modes import (

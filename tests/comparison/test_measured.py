@@ -1,13 +1,13 @@
 """Comparisons of measured data: each set ends with exit 0, a whole page and a verdict.
 
-All five sets, whole, are compared by `benchmarks/measured_comparisons.py`, which asks the same.
+All five sets, whole, are compared by `benchmarks/measured.py`, which asks the same.
 """
 
 import json
 from pathlib import Path
 
 import pytest
-from measured_comparisons import what_is_missing
+from measured import what_is_missing
 from typer.testing import CliRunner
 
 from discover.cli import app

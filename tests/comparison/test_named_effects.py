@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, UpperConvectedMaxwell
+from independent import FenePeterlin, Giesekus, Thixotropic, UpperConvectedMaxwell
 from independent import start_up as start_up_of_scipy
-from independent.fene_p import FenePeterlin
 from independent.instruments import Instrument
-from independent.thixotropic import Thixotropic
 
 from discover.comparison.fitting.named_effects import (
     NamedExplanation,

@@ -6,7 +6,7 @@ import pytest
 from discover.comparison.judging.next_measurement import LEAST_NOISE, next_measurement
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.laws import Fluid, make_law
-from discover.study.schema import NextExperiment
+from discover.study.compare_section import NextExperiment
 
 
 @pytest.mark.parametrize(

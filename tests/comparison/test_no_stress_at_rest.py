@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hostile_fluids_materials import Heated
+from hostile_materials import Heated
 from independent import UpperConvectedMaxwell
 from independent import start_up as flow_of
 from independent.flow import steps

@@ -81,7 +81,7 @@ def test_factors_are_told_with_intervals(loaded):
     for one in told:
         low, high = one.ci95
         assert high - low < 0.03
-        # of four in one draw, in three standard deviations; benchmarks/loadings.py counts intervals
+        # of four in one draw, in three standard deviations; benchmarks/readings.py counts intervals
         assert abs(one.factor - FACTORS[one.run]) < 1.53 * 0.5 * (high - low)
 
 

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from independent import Giesekus
 from independent.flow import start_up, steps
 from independent.folders import write_folder
-from independent.giesekus import Giesekus
 from independent.instruments import Instrument
 
 import discover as dc

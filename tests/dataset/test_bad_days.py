@@ -9,10 +9,9 @@ import random
 
 import numpy as np
 import pytest
+from harm import SANE, TOKENS, mutate_text
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from malformed_cases import FOLDER, RUN
-from mutations import TOKENS, mutate_text
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -22,6 +21,8 @@ from discover.study import RunFolder, fingerprint, read_study
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model
 
+FOLDER = SANE["FOLDER"]
+RUN = FOLDER["a.csv"]
 LAOS = "time_ms,strain,stress_kPa\n" + "".join(
     f"{i},{np.sin(0.3 * i):.6f},{np.cos(0.3 * i - 0.3):.6f}\n" for i in range(24)
 )

@@ -14,7 +14,9 @@ import typer.main
 import discover
 import tensor_library
 from discover.cli import app
+from discover.laws import LAWS
 from discover.study import read_study
+from discover.study.schema import Study
 
 ROOT = Path(__file__).parents[2]
 OF_THE_ROOT = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CODE_OF_CONDUCT.md")
@@ -134,3 +136,37 @@ def test_the_readme_shows_one_picture_that_follows_light_and_dark():
 
 def test_the_readme_fits_two_screens():
     assert len((ROOT / "README.md").read_text("utf-8").splitlines()) <= 100
+
+
+def test_the_page_of_all_keys_is_that_of_the_schema():
+    path = ROOT / "docs" / "study_keys.py"
+    spec = importlib.util.spec_from_file_location("study_keys", path)
+    made = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(made)
+    assert made.PAGE.read_text("utf-8") == made.study_page(), "run: python docs/study_keys.py"
+
+
+def test_every_key_of_a_study_file_says_what_it_means():
+    schema = Study.model_json_schema()
+    sections = [schema, *(part for part in schema["$defs"].values() if "properties" in part)]
+    assert len(sections) > 5
+    for section in sections:
+        for key, entry in section["properties"].items():
+            assert entry.get("description"), f"{section['title']}.{key}"
+
+
+def test_the_ten_answers_run():
+    page = "docs/ten-questions.md"
+    known = set(LAWS.present)
+    names = {}
+    try:
+        for text in blocks(page, "python"):
+            exec(compile(text, page, "exec"), names)
+    finally:
+        for name in set(LAWS.present) - known:
+            del LAWS[name]
+    assert len(re.findall(r"^## \d+\. .*\?$", (ROOT / page).read_text("utf-8"), re.M)) == 10
+    assert (names["errors"] > 0.0).all()
+    assert "the rest is systematic" in names["answer"]  # the runs were made with another α
+    assert names["loop"].verdict == "effects_added"
+    assert names["number"] == 1

@@ -98,7 +98,7 @@ def test_methods_and_results_that_users_hold_are_in_the_reference(site):
             assert f"discover.{learner}.{method}" in places
     for method in ("to_html", "to_dataframe", "to_json", "errors_table"):
         assert f"discover.comparison.comparison.Comparison.{method}" in places
-        assert f"discover.closed_loop.results.loop_result.LoopResult.{method}" in places
+        assert f"discover.loop.loop_result.LoopResult.{method}" in places
     assert "discover.equations.Equation.latex" in places
 
 

@@ -8,10 +8,10 @@ import pytest
 from independent_folder import MOBILITY, write_folder
 
 import discover as dc
-from discover.closed_loop import in_memory
 from discover.learners.tbnn_ude import DefaultRecipe
 from discover.learners.tbnn_ude.estimator import TBNNUDE
 from discover.learners.tensor_sindy.estimator import TensorSINDy
+from discover.loop import in_memory
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary
 

@@ -68,6 +68,11 @@ def test_everything_named_is_there_and_listed():
     assert not hasattr(dc, "gremlins")
 
 
+def test_the_door_lists_public_names_alone_also_where_submodules_are_loaded():
+    code = "import discover as dc, discover.cli, discover.report; print(*dir(dc))"
+    assert python(code).split() == sorted([*dc.__all__, "__version__"])
+
+
 def test_type_checkers_see_what_runs():
     tree = ast.parse(inspect.getsource(dc))
     block = next(node for node in tree.body if isinstance(node, ast.If))

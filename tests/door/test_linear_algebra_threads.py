@@ -7,11 +7,11 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 import discover as dc
 from discover import linear_algebra_threads
-from discover.closed_loop import loop
 from discover.comparison import run_comparison
 from discover.learners import distillation
 from discover.learners.run_prediction import RunPrediction
 from discover.linear_algebra_threads import in_one_thread, use_one_thread_from_the_start
+from discover.loop import loop
 
 TWO = pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="a library takes no more than cores")
 

@@ -42,7 +42,6 @@ def test_where_no_flow_turns_damping_by_strain_is_wagners_law(protocol, flow):
     [(INTEGRAL, "strain_damping"), (Giesekus(0.3, **SCALE), "giesekus_mobility")],
     ids=["K-BKZ", "Giesekus"],
 )
-@pytest.mark.usefixtures("effects_alone")
 def test_a_loop_names_damping_by_strain_where_it_is_and_not_elsewhere(material, name):
     lot, runs = np.random.default_rng(3), []
     for rate in (0.5, 2.0, 4.0):

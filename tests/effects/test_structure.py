@@ -7,11 +7,11 @@ import pytest
 from independent import Structured, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
-from discover.closed_loop.candidates import candidates_of
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.loop.candidates import candidates_of
 from discover.protocols import (
     after_alternation,
     in_flow,

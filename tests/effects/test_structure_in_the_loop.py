@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from independent import Giesekus, Structured, Thixotropic, UpperConvectedMaxwell, steps
 
-from discover.closed_loop import DeclaredModel, run_loop
 from discover.dataset import Dataset, Run
+from discover.loop import DeclaredModel, run_loop
 from discover.protocols import shear_rates, step_rates
 
 TIMES = np.append(np.geomspace(0.05, 6.0, 20), 6.0 + np.geomspace(0.05, 6.0, 20))

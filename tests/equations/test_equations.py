@@ -155,10 +155,12 @@ def read_latex(text):
     assert set(parameters) <= letters
     library = build_library(degree=2, closed_forms=("exp", "saturating"))
     names = {term.latex(): term for term in library.terms}
-    head = r"\overset{\nabla}{\boldsymbol{\sigma}} = \dot{\boldsymbol{\gamma}}"
-    head += r" - \boldsymbol{\sigma}"
+    head = r"\overset{\nabla}{\boldsymbol{\sigma}} + \boldsymbol{\sigma}"
     assert law.startswith(head)
-    terms, rest = [], law[len(head) :]
+    rest = law[len(head) :]
+    tail = r" = \dot{\boldsymbol{\gamma}}"
+    assert rest.endswith(tail)
+    terms, rest = [], rest.removesuffix(tail)
     while rest:
         match = re.match(rf" ([+-]) {number} \\, ", rest)
         rest = rest[match.end() :]
@@ -166,7 +168,7 @@ def read_latex(text):
         rest = rest[len(latex) :]
         term: CandidateTerm = names[latex]
         size = float(match[2]) * 10.0 ** int(match[3] or 0)
-        sign = 1.0 if match[1] == "-" else -1.0
+        sign = 1.0 if match[1] == "+" else -1.0
         terms.append(LawTerm(term.name, sign * size, {n: parameters[n] for n in term.inner_names}))
     modes = re.findall(rf"(G|\\lambda)_\{{\d+\}} &= {number}", text)
     values = {"G": [], r"\lambda": []}

@@ -9,10 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import sympy
-from independent.giesekus import Giesekus
+from independent import Giesekus, Structured, Thixotropic
 from independent.homogeneous import UNIT
-from independent.structured import Structured
-from independent.thixotropic import Thixotropic
 from scipy.integrate import solve_ivp
 
 from discover.effects import StateEffect, make_effect, named_effects

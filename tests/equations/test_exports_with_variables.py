@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import sympy
+from independent import PomPom
 from independent.homogeneous import UNIT
-from independent.pom_pom import PomPom
 from scipy.integrate import solve_ivp
 from test_named_exports import read_latex, value
 

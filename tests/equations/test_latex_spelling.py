@@ -60,15 +60,18 @@ def value(tree, letters):
 
 
 def extra_by_latex(law, letters=()):
-    """Return h at every state from the right-hand side γ̇ − σ − h."""
+    """Return h at every state from the left-hand side, the convected derivative + σ + h."""
+    law, *assigned = law.split(r", \qquad ")
     left, _, right = law.partition(" = ")
-    assert left == r"\overset{\nabla}{\boldsymbol{\sigma}}"
-    right, *assigned = right.split(r", \qquad ")
+    assert right == r"\dot{\boldsymbol{\gamma}}"
+    head = r"\overset{\nabla}{\boldsymbol{\sigma}} + "
+    assert left.startswith(head)
+    left = left.removeprefix(head)
     inner = {e.lhs.name: float(e.rhs) for e in map(read, assigned)} | dict(letters)
     found = []
     for stress, rate in STATES:
         letters = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **inner}
-        found.append(rate - stress - value(read(right), letters))
+        found.append(value(read(left), letters) - stress)
     return np.array(found)
 
 

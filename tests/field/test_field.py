@@ -1,11 +1,10 @@
 """The benchmark of the field: its judge, its data, and what it keeps."""
 
 import json
-import sys
 
-import field_table
 import numpy as np
 import pytest
+import run
 from field import Answer
 from field.cases import training
 from field.contestants import classical_fits, upper_convected_maxwell
@@ -58,15 +57,13 @@ def test_two_simulators_agree_in_extension():
     np.testing.assert_allclose(Giesekus(0.3).pull(1.0, times), other, atol=1e-6)
 
 
-def test_a_case_that_is_kept_is_not_run_again_and_is_in_the_table(tmp_path, monkeypatch, capsys):
+def test_a_case_that_is_kept_is_not_run_again_and_is_in_the_table(tmp_path, capsys):
     errors = dict.fromkeys(("sigma12", "N1", "N2", "tensile"), 0.125)
-    row = {"law": "giesekus", "words": "kept", "errors": errors, "seconds": 7.0}
-    file = field_table.kept(tmp_path, "classical_fits", "Giesekus")
-    file.write_text(json.dumps(row), encoding="utf-8")
+    row = {"case": "classical_fits Giesekus", "question": "learn", "seed": 1, "law": "giesekus"}
+    file = tmp_path / "field.jsonl"
+    file.write_text(json.dumps(row | {"words": "kept", "errors": errors, "learning": 7.0}) + "\n")
     before = file.read_bytes()
-    asked = ["--contestants", "classical_fits", "--fluids", "Giesekus"]
-    monkeypatch.setattr(sys, "argv", ["field_table.py", "--out", str(tmp_path), *asked])
-    field_table.main()
+    run.main(["field", "--cases", "classical_fits Giesekus", "--out", str(file)])
     assert file.read_bytes() == before
     said = capsys.readouterr().out
     assert (

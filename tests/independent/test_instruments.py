@@ -11,8 +11,13 @@ from independent import (
     steps,
 )
 from independent.folders import maxwell_sweep, write_folder, write_study, write_table
-from independent.instruments import Instrument
-from independent.misread import alternation_as_from_rest, nothing, relaxation_as_run, scaled
+from independent.instruments import (
+    Instrument,
+    alternation_as_from_rest,
+    nothing,
+    relaxation_as_run,
+    scaled,
+)
 from independent.noise import correlated, outliers, proportional, rms, white
 
 from discover.dataset import load_dataset

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from calibration import run_case
 from calibration_tables import calibration_error, comparison_table, is_right, loop_table, share
 from independent import SoftGlass, UpperConvectedMaxwell, start_up
 from independent.instruments import Instrument
 from independent.worlds import FLOWS, NOISES, draw_world, known_flaws, known_laws, unknown_laws
+from run import ask
 
 SCALE = {"modulus": 100.0, "relaxation_time": 2.0}
 
@@ -176,8 +176,8 @@ def test_a_world_without_noise_holds_the_law_of_the_library_that_it_names():
 
 
 @pytest.mark.slow
-def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold():
-    found = run_case("compare", 7, 0)
+def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold(tmp_path):
+    found = ask("calibration", "0", "compare", 7, str(tmp_path), 3600.0)
     assert (found["law"], found["flaw"], found["verdict"]) == ("Maxwell", "sound", "explained")
     assert found["terms"] == []
     assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "tensor_dense"}

@@ -112,8 +112,9 @@ def model_of(function, size, bounds=None):
 
     low, high = np.array(bounds or [[-1e3] * size, [1e3] * size])
     return SimpleNamespace(
-        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked
-    )
+        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked,
+        vectors_at_once=lambda batch: 1,
+    )  # fmt: skip
 
 
 @pytest.fixture(autouse=True)

@@ -4,9 +4,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import RoliePoly
+from independent import RoliePolyBlend as Independent
 from independent.homogeneous import UNIT
-from independent.rolie_poly import RoliePoly
-from independent.rolie_poly_blend import RoliePolyBlend as Independent
 from independent.sweeps import first_harmonic as first_harmonic_of
 from independent.sweeps import modulus_of, oscillating
 from scipy.integrate import solve_ivp

@@ -1,9 +1,8 @@
 """Records of chains that stretch, made on full tensors by scipy, with a term beside their law."""
 
 import numpy as np
+from independent import PomPom, RoliePoly
 from independent.homogeneous import UNIT
-from independent.pom_pom import PomPom
-from independent.rolie_poly import RoliePoly
 from scipy.integrate import solve_ivp
 
 import discover as dc

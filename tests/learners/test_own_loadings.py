@@ -83,7 +83,7 @@ def test_sensitivities_are_those_with_the_factors_let_go():
 
 @pytest.mark.slow
 def test_sparse_regression_holds_the_mobility_whatever_the_loadings():
-    found = dc.TensorSINDy(modulus=100.0).fit(runs_of(FACTORS)).result_
+    found = dc.TensorSINDy(build_library(), modulus=100.0).fit(runs_of(FACTORS)).result_
     assert [term.term for term in found.terms] == ["sigma.sigma"]
     low, high = found.terms[0].ci95
     assert low < MOBILITY < high
@@ -92,7 +92,9 @@ def test_sparse_regression_holds_the_mobility_whatever_the_loadings():
 
 @pytest.mark.slow
 def test_sparse_regression_takes_factors_for_a_law_where_all_are_one_loading():
-    found = dc.TensorSINDy(modulus=100.0).fit(runs_of(FACTORS, loading=None)).result_
+    found = (
+        dc.TensorSINDy(build_library(), modulus=100.0).fit(runs_of(FACTORS, loading=None)).result_
+    )
     told = [term for term in found.terms if term.term == "sigma.sigma"]
     held = bool(told) and told[0].ci95[0] < MOBILITY < told[0].ci95[1]
     assert len(found.terms) > 1 or not held

@@ -5,7 +5,16 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.programs.lanes import LANES, Arithmetic, NotTranslatable, Translation, Writing
+from discover.programs.lanes import (
+    LANES,
+    Arithmetic,
+    NotTranslatable,
+    Translation,
+    Writing,
+    callable_of,
+    kept,
+    machine_code,
+)
 
 SPECIAL = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 1e-320, -1.0, 800.0])
 
@@ -19,7 +28,7 @@ def in_lanes(function, *arguments):
     for i, value in enumerate(leaves):
         w.store(Arithmetic(w.builder).lanes(value), "y", i)
     x, y = np.array(arguments, dtype=float), np.empty((len(leaves), LANES))
-    w.compiled()(x.ctypes.data, y.ctypes.data)
+    callable_of(w.compiled(), 0, 2)(x.ctypes.data, y.ctypes.data)
     return y if len(leaves) > 1 else y[0]
 
 
@@ -120,3 +129,24 @@ def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
 def test_a_decomposition_alone_is_refused():
     with pytest.raises(NotTranslatable):
         in_lanes(lambda x: jax.lax.linalg.lu(jnp.eye(2) * x)[0][0], np.ones(LANES))
+
+
+def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(machine_code, "program_folder", lambda: tmp_path)
+    made = []
+
+    def written(value=b"machine code"):
+        made.append(value)
+        return value
+
+    assert kept(("this test", 1), written) == kept(("this test", 1), written) == b"machine code"
+    assert len(made) == 1
+    (file,) = tmp_path.iterdir()
+    file.write_bytes(file.read_bytes()[:-1] + b"!")
+    assert kept(("this test", 1), written) == b"machine code"
+    assert len(made) == 2
+    for _ in range(2):  # what a function of this module does may change, and no version tells
+        kept(("this test", in_lanes), written)
+    assert len(made) == 4

@@ -5,11 +5,11 @@ import pytest
 from independent import authors
 from independent.homogeneous import UNIT
 
-from discover.closed_loop import ErrorPair, LoopResult, RunRecord
 from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
+from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.protocols import start_up
 from discover.report.loop.report import write_loop
 from discover.report.overlay import comparison_overlays, loop_overlays, read_overlays

@@ -3,8 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import RoliePoly
 from independent.homogeneous import UNIT
-from independent.rolie_poly import RoliePoly
 from scipy.integrate import solve_ivp
 
 from discover.forward.enough_steps import in_enough_steps

@@ -6,7 +6,7 @@ from itertools import pairwise
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent.giesekus import Giesekus
+from independent import Giesekus
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 

@@ -6,9 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent.giesekus import multimode_giesekus
-from independent.imposed_stress import strain_at
-from independent.sweeps import modulus_of
+from independent import multimode_giesekus
+from independent.sweeps import modulus_of, strain_at
 
 from discover.errors import InputError
 from discover.forward.fluids import (

@@ -3,8 +3,7 @@
 import jax
 import numpy as np
 import pytest
-from independent.authors import rolie_poly_fene
-from independent.by_authors import ByAuthors
+from independent.authors import ByAuthors, rolie_poly_fene
 from independent.homogeneous import GiesekusFluid
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq

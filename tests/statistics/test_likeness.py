@@ -5,14 +5,10 @@ import pytest
 from independent import Giesekus, WhiteMetzner, oscillation, start_up
 from scipy.signal import lfilter
 
-from discover.closed_loop.judging.fitted_runs import FittedRuns
-from discover.closed_loop.judging.reasons import Grounds, reasons
-from discover.closed_loop.judging.unseen_runs import UnseenRuns
-from discover.statistics import LackOfFit, lack_of_fit
+from discover.statistics import lack_of_fit
 from discover.statistics.likeness import likeness
 from discover.statistics.noise.running_mean import averaged_over
 from discover.statistics.noise.wandering import wandering
-from discover.statistics.residual import Expectation
 
 LENGTHS = (80, 80, 120)
 DRAWS = 40
@@ -154,21 +150,3 @@ def test_only_what_is_not_explained_is_said_to_look_like_something():
     left = lack_of_fit(noise, records)
     assert left.verdict == "explained"
     assert left.likeness == ""
-
-
-def reasons_of(likeness, structured=True, outliers=0):
-    left = LackOfFit(
-        "unexplained" if structured else "explained", 0.025, 0.004, 0.9, 1e-6, outliers,
-        expected=0.004, likeness=likeness,
-    )  # fmt: skip
-    fitted = FittedRuns(left, not structured, not structured, 0.0, True, True)
-    unseen = UnseenRuns(0.0, 0.0, True, False)
-    return reasons(Grounds(fitted, unseen, Expectation(), structured, False, None, (), (), "a.csv"))
-
-
-def test_a_loop_says_what_is_left_may_be_beside_a_missing_effect():
-    text = reasons_of("what is left wanders", outliers=2)
-    assert "Some effect is still missing, or a fault of the instrument" in text
-    assert "what is left wanders. Besides" in text
-    assert "Some effect is still missing." in reasons_of("")
-    assert "fault of the instrument" not in reasons_of("", structured=False)

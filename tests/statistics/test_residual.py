@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from planting import Noise
+from independent.noise import correlated
 
 from discover.statistics.noise.whiteness import noise_probability
 from discover.statistics.residual import (
@@ -19,7 +19,8 @@ PHASE = np.linspace(0.0, 6.0, SAMPLES)
 
 
 def noise(correlation=0.0, seed=0, size=0.01):
-    drawn = Noise(size, correlation).draw((RUNS, SAMPLES), np.random.default_rng(seed))
+    lot, still = np.random.default_rng(seed), np.ones(SAMPLES)
+    drawn = np.array([correlated(still, size, correlation, lot) - still for _ in range(RUNS)])
     return drawn / np.sqrt(SAMPLES)
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discover.errors import InputError
+from discover.errors import InputError, problems_in
+from discover.laws import make_law
 from discover.study import RunFolder, fingerprint, parse_study, read_study
 from discover.study.atomic import write_text
 from discover.study.data import load_study_data
@@ -83,7 +84,7 @@ def test_a_wrong_study_is_one_error_that_names_the_key(content, words):
         parse_study(content, "my.toml")
     message = str(error.value)
     assert message.startswith("my.toml: ")
-    assert "\n" not in message
+    assert "\n" not in message.replace("\n- ", "")  # a line for each problem, and no other
     for word in words:
         assert word in message
 
@@ -231,3 +232,36 @@ def test_a_run_cannot_be_fitted_whose_stress_is_not_observed(tmp_path):
     data = {"folder": str(with_an_extension(tmp_path / "melt")), "observe": ["sigma12"]}
     with pytest.raises(InputError, match=r"pull\.csv.*recorded nothing that is in observe"):
         load_study_data(parse_study({"data": data | {"fit": ["pull.csv"]}}))
+
+
+def test_all_problems_of_a_study_file_are_told_at_once_each_with_what_was_probably_meant():
+    content = {
+        "data": {"foldr": "a", "flow_curve": "judg"},
+        "model": {"law": "giesekus", "parameters": {"alfa": 0.3}, "effects": {"wall_slp": "fit"}},
+        "lop": {},
+        "loop": {"strain": [3, 1], "max_efects": 2},
+    }
+    with pytest.raises(InputError) as error:
+        parse_study(content, "my.toml")
+    problems = problems_in(str(error.value))
+    meant = ("folder", "judge", "alpha", "wall_slip", "loop", "max_effects")
+    for name in meant:
+        assert sum(f"Did you mean {name!r}?" in one for one in problems) == 1, name
+    assert sum("strain must be" in one for one in problems) == 1
+    assert len(problems) == 7
+    assert str(error.value).startswith("my.toml: 7 problems.")
+
+
+def test_one_problem_is_one_sentence_and_a_name_like_no_other_gets_no_guess():
+    with pytest.raises(InputError) as error:
+        parse_study({"data": SYNTHETIC, "zzz": 1}, "my.toml")
+    assert str(error.value).startswith("my.toml: unknown key 'zzz'. Known keys there are: data")
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [("Giesekus", "giesekus"), ("linear-PTT", "ptt_linear"), ("rolie poly", "rolie_poly")],
+)
+def test_laws_are_recognised_by_other_spellings(given, meant):
+    with pytest.raises(InputError, match=f"Did you mean '{meant}'"):
+        make_law(given)

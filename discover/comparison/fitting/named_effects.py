@@ -20,7 +20,7 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, KinematicEffect
 from discover.forward import AugmentedModel, Batch, data_scales, make_batch
 from discover.inference.evidence import WINDOW
 from discover.inference.fit_uncertainty import uncertainty
-from discover.inference.least_squares import Fit, fit_batch, jacobians
+from discover.inference.least_squares import Fit, fit_batch
 from discover.inference.modulus_errors import modulus_shifts, response
 from discover.inference.problem import FitProblem, effect_of
 from discover.inference.step_instants import with_own_instants, with_places, with_rate_steps
@@ -310,7 +310,6 @@ def _of_moduli(
     change = shifts / np.where(weight > 0, weight, 1.0)
     if fit.free:
         off = response(fit.jacobian, modulus_shifts(model, fit.theta, problem.batch))
-        residual = model.residuals([fit.theta], batch)
-        slope = jacobians(model, batch, [fit.theta], residual, [fit.free])[0]
+        slope = model.linearise(fit.theta, batch, fit.free).jacobian
         change = change - np.tensordot(off, slope / np.where(weight > 0, weight, 1.0), axes=(0, 0))
     return np.sum(np.nan_to_num(change) ** 2, axis=0)

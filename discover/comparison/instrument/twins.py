@@ -9,7 +9,6 @@ from discover.comparison.instrument.free_constants import FreeConstants
 from discover.effects import AbstractEffect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, Batch
-from discover.inference.least_squares import jacobians
 
 _TWIN = 0.02
 """Share of a term's signature beyond those of the constants, below which the two are the same."""
@@ -41,8 +40,7 @@ def twins_of_constants(
         If these runs cannot tell two of the constants apart.
     """
     at = [model.positions(term.name)[0] for term in terms]
-    residual = model.residuals([theta], batch)
-    derivatives = jacobians(model, batch, [theta], residual, [[*constants.free, *at]])[0]
+    derivatives = model.linearise(theta, batch, [*constants.free, *at]).jacobian
     rows = derivatives.reshape(len(derivatives), -1)
     count = len(constants.free)
     _require_told_apart(list(constants.positions), rows[:count])

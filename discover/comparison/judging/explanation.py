@@ -13,13 +13,11 @@ from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset.records.repeats import Repeats
 from discover.learners.registry import BANDS_ONLY
 from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.settings import ARITHMETIC
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.sampling import sampling_interval
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
-
-ARITHMETIC = 1e-5
-"""Relative misfit that both integrations together may leave: the floor of the sparse search."""
 
 _NONE = 1e-3
 """Coefficient of I, of the modulus, up to which arithmetic and rates between samples make one."""

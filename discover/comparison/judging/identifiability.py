@@ -22,12 +22,11 @@ from discover.identify import (
     check_physics,
     find_twins,
 )
-from discover.identify.exact.relations import spell
 from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.study.declared_model import DeclaredModel
-from tensor_library.law_terms import LawTerm, LawTerms
+from tensor_library.law_terms import LawTerm, LawTerms, spell
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 

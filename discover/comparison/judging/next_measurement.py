@@ -16,7 +16,7 @@ from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.multimode import Fluid
 from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.protocols import another_between_samples
-from discover.study.schema import NextExperiment
+from discover.study.compare_section import NextExperiment
 from tensor_library.law_terms import LawTerms
 
 LEAST_NOISE = 0.01

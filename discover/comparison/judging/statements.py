@@ -204,7 +204,7 @@ def _few_flows(measured: int, n_terms: int, own_loadings: bool) -> str:
 def no_flow_left(flows: Sequence[Flow], n_terms: int) -> bool:
     """Return whether a law was never asked of another flow than those that its terms take.
 
-    As `discover.closed_loop.explanations.untested` asks of a loop; a law without terms takes one.
+    As `discover.loop.runs.why_untested` asks of a loop; a law without terms takes one.
     """
     kinds = {flow.kind for flow in _measured(flows)}
     return kinds == {"training"} and _flows_measured(flows) <= max(n_terms, 1)

@@ -39,7 +39,7 @@ from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table, shown
-from discover.errors import InputError
+from discover.errors import InputError, problems_in
 
 _RUN_QUANTITIES = (
     units.TIME,
@@ -83,7 +83,7 @@ def check_folder(
     try:
         index = read_index(root)
     except InputError as error:
-        return Findings([Finding("error", "runs", INDEX_FILE, str(error))])
+        return Findings(_errors("runs", INDEX_FILE, error))
     findings = [*_clock(index, clock_factor), *_before(index)]
     try:
         before = rates_before(index, None)
@@ -111,6 +111,10 @@ def check_folder(
     return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
 
 
+def _errors(what: str, where: str, error: InputError) -> list[Finding]:
+    return [Finding("error", what, where, one) for one in problems_in(str(error))]
+
+
 def _runs(
     root: Path,
     index: Table,
@@ -131,7 +135,7 @@ def _runs(
             rate = None if before is None else float(before[row])
             runs.append(read_run(root, index, row, rate_before=rate))
         except InputError as error:
-            findings.append(Finding("error", "run", name, str(error)))
+            findings += _errors("run", name, error)
             continue
         findings += doubts_of_run(runs[-1])
         findings += _columns(root, name, unused, converted)
@@ -163,7 +167,7 @@ def _tables(
     try:
         tables, aside = read_material_functions(root, index.columns["file"])
     except InputError as error:
-        return {}, [Finding("error", "tables", "", str(error))]
+        return {}, _errors("tables", "", error)
     for table in tables.values():
         kind = str(run_line(table)["flow"])
         what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
@@ -289,7 +293,7 @@ def _sweep(
     try:
         sweep = find_sweep(root)
     except InputError as error:
-        return None, None, [Finding("error", "sweep", SWEEP_FILE, str(error))]
+        return None, None, _errors("sweep", SWEEP_FILE, error)
     if sweep is None:
         text = (
             f"The folder has no {SWEEP_FILE}. Without a linear sweep the relaxation times must be "

@@ -9,7 +9,6 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
@@ -17,6 +16,7 @@ from pathlib import Path
 
 from discover.dataset.tables.toml_file import read_toml
 from discover.errors import InputError
+from discover.words import unknown_name
 
 _PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
 """Tables of ``names.toml`` that name one quantity, the better first."""
@@ -214,9 +214,7 @@ def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
     """
     for key, listed in names.items():
         if key not in shipped_names():
-            near = get_close_matches(key, shipped_names(), 1, 0.5)
-            known = f"Is {near[0]} meant?" if near else f"Known are {', '.join(shipped_names())}."
-            raise InputError(f"{where}: {key[:40]!r} is no quantity that has names. {known}")
+            raise InputError(f"{where}: {unknown_name('quantity', key, shipped_names())}")
         for name in listed:
             if not isinstance(name, str) or not plain(name):
                 raise InputError(

@@ -9,6 +9,7 @@ from discover.dataset.importing.spreadsheet import read_spreadsheet
 from discover.dataset.importing.text_export import Block
 from discover.errors import InputError
 from discover.new_names import require_new_name
+from discover.words import unknown_name
 from tensor_library.registry import Registry
 
 
@@ -97,8 +98,8 @@ def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
         return None
     if form is not None and form not in IMPORTERS:
         raise InputError(
-            f"Unknown format {form!r}; known are {', '.join([TEXT, *IMPORTERS])}. Install the "
-            "package that brings it, or leave --format out."
+            f"{unknown_name('format', form, [TEXT, *IMPORTERS])} Install the package that brings "
+            "it, or leave --format out."
         )
     ending = path.suffix.lower()
     name = form or next((n for n, one in IMPORTERS.items() if ending in one.suffixes), None)

@@ -13,7 +13,8 @@ from discover.dataset.load import SWEEP_FILE, TESTS_FILE, read_sweep
 from discover.dataset.material_functions import read_over_time
 from discover.dataset.tables import units
 from discover.dataset.tables.table import read_table
-from discover.errors import InputError
+from discover.errors import InputError, Problems
+from discover.words import did_you_mean
 
 SWEEP, RELAXATION, CREEP = SWEEP_FILE.removesuffix(".csv"), "relaxation", "creep"
 
@@ -154,11 +155,14 @@ def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
         root / TESTS_FILE, TESTS_FILE, "Tests at several temperatures are listed there; write one "
         "with the columns file, test and temperature_C."
     )  # fmt: skip
+    problems = Problems()
     for column in ("file", "test", "temperature_C"):
         if column not in table.columns:
-            raise InputError(
-                f"{TESTS_FILE} has no column {column!r}; it has {table.listed}. Add it."
+            problems.add(
+                f"{TESTS_FILE} has no column {column!r}; it has {table.listed}."
+                f"{did_you_mean(column, table.columns)} Add it."
             )
+    problems.require_none(TESTS_FILE)
     degrees, seen = table.numbers("temperature_C"), set()
     names, tests = table.columns["file"], table.columns["test"]
     for celsius, name, test in zip(map(float, degrees), names, tests, strict=True):

@@ -1,7 +1,6 @@
 """Text tables, read safely and with errors that name file, column and line."""
 
 import csv
-import difflib
 import io
 import os
 import re
@@ -12,14 +11,18 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.dataset.tables.units import Quantity, find_column
-from discover.errors import InputError
+from discover.errors import InputError, Problems
 from discover.inputs_kept import note_input
+from discover.words import did_you_mean, listed, nearest
 
 LARGEST_FILE = 300_000_000
 """Bytes; some five million samples. More cannot be looked at, let alone fitted."""
+
+_MOST_LINES = 6
+"""Faulty lines of a file that a message names."""
 
 _PIECE = 2**20
 """Bytes that are read at once."""
@@ -79,12 +82,11 @@ class Table:
         values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
         finite = np.isfinite(values)
         if not np.all(finite):
-            row = int(np.argmin(finite))
-            missing = int(np.sum(~finite))
-            more = f" ({missing - 1} more lines are like it.)" if missing > 1 else ""
+            rows = np.flatnonzero(~finite)
+            row = int(rows[0])
             raise InputError(
                 f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
-                f"{shown(text[row])}. {_remedy(text[row], row)}{more}"
+                f"{shown(text[row])}. {_remedy(text[row], row)}{self.like_it(rows)}"
             )
         large = np.abs(values) > LARGEST_VALUE
         if np.any(large):
@@ -95,6 +97,10 @@ class Table:
                 "line."
             )
         return np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values)
+
+    def like_it(self, rows: Int[np.ndarray, " faulty"]) -> str:
+        """Return which lines of the file have the fault of the first of some rows too."""
+        return _like_it([self.lines[row] for row in rows])
 
     def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
         """Return a known quantity in SI units, or None if no column holds it.
@@ -136,6 +142,15 @@ class Table:
                 f"{self.listed}. {_rename(quantity, self.columns)}"
             )
         return values
+
+    def all_required(self, *quantities: Quantity) -> list[Float[np.ndarray, " n"]]:
+        """Return several such quantities; if something is wrong, all that is, in one error."""
+        problems, found = Problems(), []
+        for quantity in quantities:
+            with problems.collected():
+                found.append(self.required(quantity))
+        problems.require_none(self.name)
+        return found
 
 
 def read_bytes(
@@ -192,13 +207,24 @@ def read_bytes(
     except (FileNotFoundError, NotADirectoryError):
         folder = path.parent.name
         place = f" in {folder}" if folder and str(path) != name else ""
-        raise InputError(f"There is no file {name}{place}. {if_missing}") from None
+        raise InputError(
+            f"There is no file {name}{place}.{did_you_mean_file(path)} {if_missing}"
+        ) from None
     except OSError as error:
         raise InputError(
             f"{name} cannot be read: {error.strerror or error}. Check the file and who may read it."
         ) from None
     except ValueError:
         raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+
+
+def did_you_mean_file(path: Path) -> str:
+    """Return a question that names the file or folder spelled most like one that is not there."""
+    try:
+        there = [entry.name for entry in os.scandir(path.parent)]
+    except (OSError, ValueError):  # the folder is not there either, or may not be read
+        return did_you_mean_file(path.parent) if path.parent != path.parent.parent else ""
+    return did_you_mean(path.name, (name for name in there if not name.startswith(".")))
 
 
 def _read(file: BinaryIO, size: int, largest: int) -> bytes:
@@ -240,7 +266,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     header: list[str] = []
     rows: list[list[str]] = []
     lines: list[int] = []
-    start = 1
+    start, ragged, why_ragged = 1, [], ""
     try:
         for cells in reader:
             first, start = start, reader.line_num + 1
@@ -250,13 +276,16 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
                 header = _header(cells, first, name)
                 continue
             if len(cells) != len(header):
-                raise InputError(_ragged(name, cells, len(header), first))
+                why_ragged = why_ragged or _ragged(name, cells, len(header), first)
+                ragged.append(first)
             rows.append(cells)
             lines.append(first)
     except csv.Error as error:
         raise InputError(
             f"{name} is not a comma-separated table: line {start} ({error}). Mend the quotes there."
         ) from None
+    if ragged:
+        raise InputError(why_ragged + _like_it(ragged))
     if not header:
         raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
     if not rows:
@@ -312,6 +341,16 @@ def _header(cells: list[str], line: int, name: str) -> list[str]:
     return columns
 
 
+def _like_it(lines: Sequence[int]) -> str:
+    """Return which lines are as faulty as the first of them, as the end of a message."""
+    others = [str(line) for line in lines[1:]]
+    if len(others) > _MOST_LINES:
+        others = [*others[:_MOST_LINES], f"{len(others) - _MOST_LINES} more"]
+    if not others:
+        return ""
+    return f" (Line{'s' * (len(others) > 1)} {listed(others)} too.)"
+
+
 def _ragged(name: str, cells: list[str], wanted: int, line: int) -> str:
     if len(cells) > wanted and all(_NUMBER.fullmatch(cell.strip()) for cell in cells):
         why = " Decimal commas look so too: write decimal points."
@@ -350,9 +389,9 @@ def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:
                 f"{shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
                 "or put another unit after the underscore."
             )
-    near = difflib.get_close_matches(quantity.column, list(columns), 1)
-    if near:
-        return f"Is {shown(near[0])} meant? Then rename it."
+    near = nearest(quantity.column, columns)
+    if near is not None:
+        return f"Is {shown(near)} meant? Then rename it."
     return "Add it, or rename the column that holds it."
 
 

@@ -35,15 +35,16 @@ def law_latex(
     named
         A law with a name to whose h the terms are added.
     """
-    text = r"\overset{\nabla}{\boldsymbol{\sigma}} = \dot{\boldsymbol{\gamma}}"
+    # all on the left, so that each term has the sign that tables and files give it
+    text = r"\overset{\nabla}{\boldsymbol{\sigma}}"
     if linear_relaxation:
-        text += r" - \boldsymbol{\sigma}"
+        text += r" + \boldsymbol{\sigma}"
     notation = LatexNotation(digits)
     defined: list[tuple[str, str]] = []
     if named is not None:
         spelled = latex_letters(named, notation)
         defined, summands = named.function.spell(notation, spelled)
-        text += "".join(f" - {summand}" for summand in summands)
+        text += "".join(f" + {summand}" for summand in summands)
         defined = [(spelled[name], value) for name, value in defined]
         rates = named.function.spell_rates(notation, spelled)
         defined = [(rf"\dot{{{spelled[name]}}}", value) for name, value in rates] + defined
@@ -56,8 +57,9 @@ def law_latex(
         other = {
             n: value for n, value in term.inner.items() if letters.setdefault(n, value) != value
         }
-        sign = "-" if term.coefficient >= 0 else "+"
+        sign = "+" if term.coefficient >= 0 else "-"
         text += f" {sign} {parse_term(term.term).spell(notation, abs(term.coefficient), other)}"
+    text += r" = \dot{\boldsymbol{\gamma}}"
     defined += [(notation.letter(n), latex_number(v, digits)) for n, v in letters.items()]
     return text + "".join(f"{SEPARATOR}{letter} = {value}" for letter, value in defined)
 

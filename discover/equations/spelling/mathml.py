@@ -127,9 +127,9 @@ def law_element(
     """
     stress, rate = _TENSORS["sigma"], _TENSORS["gammadot"]
     convected = f"<mover><mrow>{stress}</mrow><mo style='font-size:70%'>▽</mo></mover>"
-    relaxation = f"<mo>−</mo>{stress}" if linear_relaxation else ""
+    relaxation = f"<mo>+</mo>{stress}" if linear_relaxation else ""
     extra = [
-        _SIGN.format("−" if t.coefficient >= 0 else "+")
+        _SIGN.format("+" if t.coefficient >= 0 else "−")
         + term_mathml(t.term, t.inner, abs(t.coefficient))
         for t in terms
     ]
@@ -139,7 +139,7 @@ def law_element(
         names = (*function.constants, *function.where, *function.rates)
         letters = {n: notation.letter(n) for n in names}
         defined, summands = function.spell(notation, letters)
-        extra = [_SIGN.format("−") + one for one in summands] + extra
+        extra = [_SIGN.format("+") + one for one in summands] + extra
         first = named.constants[0]
         fixed = [(n, number(first[n])) for n in first if n not in named.differing]
         rates = [
@@ -150,6 +150,9 @@ def law_element(
             f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}"
             for left, value in [*rates, *((letters[n], value) for n, value in [*defined, *fixed])]
         ]
-    parts = [f"{convected}<mo>=</mo>{rate}{relaxation}", *extra, *where]
+    # all on the left, so that each term has the sign that tables and files give it
+    parts = [f"{convected}{relaxation}", *extra]
+    parts[-1] += f"<mo form='infix'>=</mo>{rate}"
+    parts += where
     law = "<wbr/>".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)
     return f'<div class="law" style="text-align:center;margin:.6em 0">{law}</div>'

@@ -262,10 +262,15 @@ def krogstad_weights(
         Its length, in the unit of time of the remainders.
     """
     half_first, half_second, half_third = phi_functions(0.5 * z)
-    first, second, third = phi_functions(z)
+    # those of z follow from those of its half   [Skaflestad & Wright 2009, Appl. Numer. Math. 59,
+    # 783]: sums of positive numbers, which lose no digit
+    half = jnp.exp(0.5 * z)
+    first = 0.5 * (half + 1.0) * half_first
+    second = 0.25 * (half_first * half_first + 2.0 * half_second)
+    third = 0.125 * (half_first * half_second + half_second + 2.0 * half_third)
     return KrogstadWeights(
-        half=jnp.exp(0.5 * z),
-        full=jnp.exp(z),
+        half=half,
+        full=half * half,
         a21=0.5 * step * half_first,
         a31=step * (0.5 * half_first - half_second),
         a32=step * half_second,

@@ -6,49 +6,59 @@ each run is followed to its own end, and states of the fluid stay in a scratch a
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.side_by_side.layout import Layout as _Layout
+from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.layout import as_array as _array
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Step, laid_out
-from discover.forward.structure import Numbers
-from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
-from discover.programs.lanes.arithmetic import INTEGER
+from discover.forward.side_by_side.own_widths import OWN, OwnWidths
+from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
+from discover.programs.lanes import LANES
+from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("runs", "steps", "modes", "tabled")
 # of all modes and lanes: rates, parameters, modes and the limit of each vector; and what is written
 _WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "scratch")
-_WHOLE = ("last", "flags", "goes_on")
-_SCALAR = ("width", "table", "flow", "jump", "weight", "recorded")
+_WHOLE = ("last", "held", "flags", "goes_on")
+_SCALAR = ("width", "whole", "least", "table", "flow", "jump", "weight", "recorded")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 _EIGHT_BITS = ir.IntType(8)
 
-# Where in the scratch array what stands that is carried from step to step
-_MISSING, _EARLIER, _SHEARED, _MISSED, _TAKEN, _SUM, _OTHER_SUM, _LEVELS = range(8)
+# Where the number of steps stands, beside whether any vector is of use
+_STEPS = 1
+
+# Where in the scratch array what stands; the last few, and the modes behind them, are the state
+# that is carried from step to step
+_MISSED, _TAKEN, _SUM, _OTHER_SUM = range(4)
+_OWN = range(4, 4 + len(OWN))
+_STATE = _OWN.stop
+_MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
 
-class Kernel:
-    """Machine code for one structure of law and effects, with numbers and runs as data.
+class Kernel(Code):
+    """Machine code for the effects of a fluid and a law, with all constants and runs as data.
 
     Attributes
     ----------
     flags
         Which parts of it a vector needs.
+    steps_taken
+        By eight vectors at once, in all calls so far.
 
     Parameters
     ----------
     fluid
-        The fluid with its effects.
-    numbers
-        One of those that it is called with; their values are data.
+        The effects, of a structure without constants of the law.
+    found
+        Shapes of what is data to it; see `laid_out`.
     flow
         Kinematics of one run; None where all are simple shear.
+    chooses
+        Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
 
     Raises
     ------
@@ -56,27 +66,24 @@ class Kernel:
         If a law or an effect does what is not known in lanes.
     """
 
-    def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
-        self.flags = Flags(fluid)
+    counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
+
+    def __init__(
+        self,
+        fluid: AugmentedFluid,
+        found: tuple[Mode, Shared],
+        flow: Kinematics | None,
+        chooses: bool,
+    ):
+        super().__init__(fluid, found, flow)
+        self._chooses, self.steps_taken = chooses, 0
         self._times_at = self.flags.names.index("times")
-        theta = jax.ShapeDtypeStruct((fluid.size,), float)
-        found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
-        of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
-        self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
-        law = eqx.combine(found[0].law, found[1].law)
-        is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
-        self._variables = law.variables
-        self._step = Step(fluid, eqx.filter(law, is_array, inverse=True))
+        self._variables = self._law.variables
+        self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
-        self._arithmetic = Arithmetic(self._w.builder)
-        self._write = Translation(self._arithmetic)
-        self._runs()
-        self._call = self._w.compiled()
-        # what was written is large, and the code is made
-        del self._w, self._arithmetic, self._write, self._parameters, self._on
+        self._make(fluid, found, flow, chooses)
 
     def __call__(
         self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
@@ -98,21 +105,20 @@ class Kernel:
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
-        felt, goes_on = np.zeros_like(stress), np.ones(1, np.int64)
+        felt, goes_on = np.zeros_like(stress), np.zeros(2, np.int64)
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
-        scratch = np.empty((self._state_at + modes * (4 + self._variables), LANES))
+        size = self._state_at + modes * (4 + self._variables)
+        # a step whose width is chosen holds the state three times
+        scratch = np.empty((_STATE + 3 * (size - _STATE), LANES))
         arrays = given | {
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
         }  # fmt: skip
         # contiguous already; were one of them not, the code would read what is not its own
         laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
         self._call(runs, steps, modes, tabled, *(array.ctypes.data for array in laid))
+        self.steps_taken += int(goes_on[_STEPS])
         return stress, felt, bool(goes_on[0])
-
-    def packed(self, tree: Any, of_mode: bool) -> jax.Array:
-        """Return a part of `laid_out` as one array, of modes with these first."""
-        return (self._of_mode if of_mode else self._shared).packed(tree)
 
     def flows(self, flow: Kinematics | None) -> np.ndarray:
         """Return the kinematics of runs as one array, shape (runs, numbers)."""
@@ -121,7 +127,7 @@ class Kernel:
             return np.zeros((1, 1))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
-    def _runs(self) -> None:
+    def _body(self) -> None:
         w = self._w
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
@@ -131,6 +137,11 @@ class Kernel:
         ]
         self._on = dict(zip(self.flags.names, truths, strict=True))
         self._keep(0.0, _MISSED)
+        self._next = w.builder.alloca(INTEGER)
+        self._held = OwnWidths(
+            w, self._arithmetic, _OWN, _STATE, range(_LEVELS, self._state_at),
+            self._state_at, self._variables, self._on["states"],
+        )  # fmt: skip
         w.store(INTEGER(1), "goes_on", 0)
         with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
             self._of_run(run)
@@ -152,8 +163,9 @@ class Kernel:
         size = self._flow.size
         kinematics = [self._splat("flow", w.at((run, size), (i, 1))) for i in range(size)]
         flow = self._flow.tree(kinematics) if size else None
-        for place in (_MISSING, _EARLIER, _SHEARED, _TAKEN):
+        for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, *_OWN):
             self._keep(0.0, place)
+        w.builder.store(INTEGER(0), self._next)
         place = _LEVELS
         for levels, rest in self._levels:
             for _ in range(levels):
@@ -163,31 +175,62 @@ class Kernel:
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
         with w.loop(w.load("last", run), self._goes_on) as number, self._arithmetic.apart():
-            self._of_step(run, number, flow)
+            if self._chooses:
+                is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
+                with w.builder.if_then(is_next), self._arithmetic.apart():
+                    self._of_interval(run, number, flow)
+            else:
+                self._of_grid(run, number, flow)
         with w.builder.if_then(self._goes_on()), self._arithmetic.apart():
             self._at_start(run, flow)
             with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
                 self._beside(run, number, flow)
 
-    def _of_step(self, run, number, flow) -> None:
-        w, counts, write, step = self._w, self._w.counts, self._write, self._step
-        shared, on, add = self._parameters, self._on, self._arithmetic.add
-        steps = counts["steps"]
+    def _of_grid(self, run, number, flow) -> None:
+        """Write a step of the grid."""
+        w, steps = self._w, self._w.counts["steps"]
         half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
         rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
         width = self._splat("width", w.at((run, steps), (number, 1)))
+        self._of_step(run, number, flow, rates, width, TRUTH(0))
+        self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), rates[2])
+
+    def _of_interval(self, run, number, flow) -> None:
+        """Write a step of the grid, or several in which the rate is a straight line."""
+        w, steps = self._w, self._w.counts["steps"]
+        half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
+        rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
+        count, is_held = self._held.steps(run, number, half)
+        w.builder.store(w.at((number, 1), (count, 1)), self._next)
+        last = w.load("rate", w.at((half, 1), (count, 2)))
+        first = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
+        with self._held.parts(run, number, is_held, rates) as (begin, width, felt):
+            self._of_step(run, number, flow, felt, width, is_held)
+            if self._series:
+                with w.builder.if_then(self._on["series"]), self._arithmetic.apart():
+                    # the interval before asks what series elements take at the beginning
+                    is_first = self._arithmetic.compare("==", begin, 0.0)
+                    earlier, now = w.load("felt", first), self._kept(_EARLIER)
+                    w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
+        number = w.at((number, 1), (count, 1), (-1, 1))
+        self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), last)
+
+    def _of_step(self, run, number, flow, rates, width, is_held) -> None:
+        w, counts, write, step = self._w, self._w.counts, self._write, self._step
+        shared, on, add = self._parameters, self._on, self._arithmetic.add
+        w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
         levels, earlier = self._states(), self._kept(_EARLIER)
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
         )
         if self._series:
             with w.builder.if_then(on["series"]), self._arithmetic.apart():
-                self._foresee(run, number, flow, width, slow, rates, before, scale_last)
+                self._foresee(run, number, flow, width, slow, rates, before, scale_last, is_held)
         taken = self._kept(_TAKEN)
         for place in (_SUM, _OTHER_SUM):
             self._keep(0.0, place)
         with w.loop(counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow)
+            mode, weights, stress, at = self._mode(run, number, mode_number, width, slow, is_held)
             after = write(
                 step.of_mode,
                 shared, mode, on, flow, slow, stress, tuple(rates), taken, earlier, weights,
@@ -218,9 +261,9 @@ class Kernel:
                 )  # fmt: skip
                 self._keep(missing[()], _MISSING)
         self._keep(taken, _EARLIER)
-        self._record(run, number, flow, recorded[()], taken, rates[2])
+        self._keep(recorded[()], _RECORDED)
 
-    def _foresee(self, run, number, flow, width, slow, rates, before, scale_last) -> None:
+    def _foresee(self, run, number, flow, width, slow, rates, before, scale_last, is_held) -> None:
         """Write what series elements take in a step."""
         w, write, step, add = self._w, self._write, self._step, self._arithmetic.add
         shared, on, earlier = self._parameters, self._on, self._kept(_EARLIER)
@@ -228,7 +271,7 @@ class Kernel:
         for place in sums:
             self._keep(0.0, place)
         with w.loop(w.counts["modes"]) as mode_number, self._arithmetic.apart():
-            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow)
+            mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow, is_held)
             rate = add(rates[0], earlier)
             found = write(step.foreseen, shared, mode, on, flow, slow, stress, rate, weights)
             for place, value in zip(sums, found, strict=True):
@@ -251,7 +294,7 @@ class Kernel:
             found.append(values)
         return tuple(found)
 
-    def _mode(self, run, number, mode_number, width, slow):
+    def _mode(self, run, number, mode_number, width, slow, is_held):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, builder, counts = self._w, self._w.builder, self._w.counts
         size = self._of_mode.size
@@ -259,7 +302,7 @@ class Kernel:
             [w.load("mode", w.at((mode_number, size), (i, 1))) for i in range(size)]
         )
         untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
-        own = builder.or_(self._on["own weights"], untabled)
+        own = builder.or_(builder.or_(self._on["own weights"], untabled), is_held)
         # past the table's end its first row is read, and not used
         row = builder.select(untabled, INTEGER(0), mode_number)
         tabled = w.at((run, counts["steps"]), (number, 1))

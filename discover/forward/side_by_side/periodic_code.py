@@ -7,14 +7,14 @@ by the modified Newton method of `starts.periodic_states`, with its derivatives 
 
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.layout import Layout, as_array
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.starts.half_cycles import mirror
 from discover.forward.starts.modified_newton import (
     Approximation,
@@ -23,9 +23,9 @@ from discover.forward.starts.modified_newton import (
     relative_change,
 )
 from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
-from discover.forward.structure import Numbers
-from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
+from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
+from discover.protocols.kinematics import Kinematics
 
 _COUNTS = ("groups", "modes", "most")
 _WIDE = ("strain", "frequency", "shared", "mode", "storage", "loss", "scratch")
@@ -81,8 +81,8 @@ def _approximation(way, size: int) -> Approximation:
     )
 
 
-class PeriodicCode:
-    """Machine code for periodic states of one structure of law and effects.
+class PeriodicCode(Code):
+    """Machine code for periodic states.
 
     No state of the fluid changes with the modes in it, and nothing gives way in series.
 
@@ -93,8 +93,8 @@ class PeriodicCode:
 
     Parameters
     ----------
-    fluid, numbers
-        As of `Kernel`.
+    fluid, found, flow
+        As of `Code`; the flow is simple shear.
 
     Raises
     ------
@@ -102,29 +102,22 @@ class PeriodicCode:
         If a law or an effect does what is not known in lanes.
     """
 
-    def __init__(self, fluid: AugmentedFluid, numbers: Numbers):
-        self.flags = Flags(fluid)
-        theta = jax.ShapeDtypeStruct((fluid.size,), float)
-        found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
-        self._of_mode, self._shared = (
-            Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True)
-        )
-        law = eqx.combine(found[0].law, found[1].law)
-        is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
-        self._step = PeriodicStep(fluid, eqx.filter(law, is_array, inverse=True), ())
-        self._back = mirror(law.variables - 4 * law.tensors, law.tensors)
-        self._size = 4 + law.variables
+    counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
+
+    def __init__(
+        self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None = None
+    ):
+        super().__init__(fluid, found, flow)
+        self._step = PeriodicStep(fluid, self._plain_law, ())
+        variables, tensors = self._law.variables, self._law.tensors
+        self._back = mirror(variables - 4 * tensors, tensors)
+        self._size = 4 + variables
         kinds = 1 if found[0].relaxations is None else 2 * found[0].relaxations.shape[1]
         self._weights = (kinds, WEIGHTS) if kinds > 1 else (WEIGHTS,)
         self._way_at = _WEIGHTS + kinds * WEIGHTS
         self._way_size = 3 * self._size + 3
         self._now_at = self._way_at + self._way_size
-        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
-        self._arithmetic = Arithmetic(self._w.builder)
-        self._write = Translation(self._arithmetic)
-        self._groups()
-        self._call = self._w.compiled()
-        del self._w, self._arithmetic, self._write
+        self._make(fluid, found)
 
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> np.ndarray:
         """Return G′ + iG″ of the modes in Pa, shape (groups, lanes).
@@ -149,10 +142,6 @@ class PeriodicCode:
         self._call(groups, modes, most, *(array.ctypes.data for array in laid))
         return storage + 1j * loss
 
-    def packed(self, tree: Any, of_mode: bool) -> jax.Array:
-        """Return a part of `laid_out` as one array, of modes with these first."""
-        return (self._of_mode if of_mode else self._shared).packed(tree)
-
     def _keep(self, values: Any, place: int) -> None:
         for i, value in enumerate(np.asarray(values, object).flat):
             self._w.store(self._arithmetic.lanes(value), "scratch", place + i)
@@ -167,7 +156,7 @@ class PeriodicCode:
         first = w.at((at, layout.size))
         return layout.tree([w.load(name, w.at((first, 1), (i, 1))) for i in range(layout.size)])
 
-    def _groups(self) -> None:
+    def _body(self) -> None:
         w, a = self._w, self._arithmetic
         on: dict[str, Any] = {
             name: w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))

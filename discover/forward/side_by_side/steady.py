@@ -4,13 +4,13 @@ from collections.abc import Callable
 
 import jax
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, SteadyFlows
 from discover.forward.side_by_side.steady_code import SteadyCode
-from discover.forward.side_by_side.step import laid_out
+from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
@@ -27,9 +27,9 @@ class SteadySideBySide:
     fluid, code
         The fluid with its effects, and its machine code.
     rates
-        Of a vector and a run, the felt rate without slip.
+        Of a vector, the effects that are present, and a run: the felt rate without slip.
     recorded
-        Of a vector, a run, the stress, the felt rate, what is recorded.
+        Of these, the stress and the felt rate, what is recorded.
     made_from
         What tells these from those of another structure.
     """
@@ -42,7 +42,7 @@ class SteadySideBySide:
         recorded: Callable,
         made_from: tuple,
     ):
-        self._code = code
+        self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         self._shaping = [
             fluid.slices[e.name].start for e in acting if isinstance(e, KinematicEffect)
@@ -51,52 +51,56 @@ class SteadySideBySide:
             fluid.slices[e.name].start for e in acting if isinstance(e, SignalEffect)
         ]
 
-        def packed(numbers: Numbers, thetas):
-            def one(theta):
-                of_mode, shared = laid_out(fluid, numbers, theta)
-                return code.packed(of_mode, True), code.packed(shared, False)
-
-            return jax.vmap(one)(thetas)
-
-        self._packed = compiled(packed, made_from=("packed states", *made_from))
-        of_runs = jax.vmap(rates, in_axes=(None, 0))
-        self._rates = compiled(jax.vmap(of_runs, in_axes=(0, None)), ("steady rates", *made_from))
-        of_runs = jax.vmap(recorded, in_axes=(None, 0, 0, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, 0, 0))
+        self._packed = code.packing(fluid, made_from, 0)
+        of_runs = jax.vmap(rates, in_axes=(None, None, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None))
+        self._rates = compiled(of_trials, ("steady rates", *made_from))
+        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0))
         self._recorded = compiled(of_trials, ("steady records", *made_from))
+
+    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
+        """Return which vectors are left to the other program: none."""
+        return np.zeros(len(thetas), bool)
 
     def predict(
         self,
         numbers: Numbers,
         thetas: Float[np.ndarray, "trials p"],
+        moduli: Float[np.ndarray, "trials c"],
+        limits: Float[np.ndarray, " trials"],
         part: SteadyFlows,
         judging: Records | None,
         runs: int,
-        limits: Float[np.ndarray, " trials"],
     ) -> Float[np.ndarray, "trials runs n"]:
-        """Return what is recorded; the last three are those of transients, and say nothing here."""
-        del judging, runs, limits
-        count = len(thetas)
+        """Return what is recorded; see `SideBySide.predict`.
+
+        Limits, what judges and how many runs are no padding say nothing here.
+        """
+        del limits, judging, runs
+        count, present = len(thetas), self._fluid.present(thetas)
         # so many as one program is compiled for
         padded = np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
         eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
-        of_eights = [self._packed(numbers, eight) for eight in eights]
+        own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
+        pairs = zip(eights, own, strict=True)
+        of_eights = [self._packed(numbers, eight, each) for eight, each in pairs]
         modes, shared = (np.concatenate(arrays) for arrays in zip(*of_eights, strict=True))
         rate = np.broadcast_to(np.asarray(part.rate), (len(padded), *part.rate.shape))
         if np.any(thetas[:, self._shaping]):
-            rate = np.concatenate([self._rates(eight, part) for eight in eights])
-        stress, felt = self._states(thetas, modes, shared, rate, part)
+            rate = np.concatenate([self._rates(eight, present, part) for eight in eights])
+        stress, felt = self._states(thetas, modes, len(numbers.modulus), shared, rate, part)
         if not np.any(thetas[:, self._distorting]):
             return stress
         found = [
             self._recorded(
-                eight, part, stress[padded[at : at + LANES]], felt[padded[at : at + LANES]]
+                eight, present, part, *(of[padded[at : at + LANES]] for of in (stress, felt))
             )
             for eight, at in zip(eights, range(0, len(padded), LANES), strict=True)
         ]
         return np.concatenate(found)[:count]
 
-    def _states(self, thetas, modes, shared, rate, part) -> np.ndarray:
+    def _states(self, thetas, modes, declared: int, shared, rate, part) -> np.ndarray:
         """Return stresses and felt rates, shape (2, trials, runs, n)."""
         own = np.asarray(part.rate)
         # behind the last there are copies of it
@@ -109,7 +113,7 @@ class SteadySideBySide:
         flows = (
             np.concatenate([leaf.reshape(len(own), -1) for leaf in leaves], 1) if leaves else None
         )
-        flags = self._code.flags.of(thetas)
+        flags = self._flags.of(thetas)
         patterns, which = np.unique(flags, axis=0, return_inverse=True)
         out = np.empty((2, len(thetas), *own.shape))
 
@@ -123,7 +127,9 @@ class SteadySideBySide:
                 return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
 
             of_mode = modes[trial]
+            # what effects add is left out where no lane has it
             present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
+            present[:declared] = True
             given = {
                 "rate": grouped(rate[trial, row, column]),
                 "shared": grouped(shared[trial]),

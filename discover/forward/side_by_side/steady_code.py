@@ -7,13 +7,13 @@ curve fill them as well as many vectors do. The way is that of `starts.approach`
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
+from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.layout import Layout, as_array
-from discover.forward.side_by_side.step import Flags, Mode, Shared, Step, _if, laid_out
+from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.starts.approach import (
     MOST_STEPS,
     Approach,
@@ -22,8 +22,7 @@ from discover.forward.starts.approach import (
     arrived,
     moves,
 )
-from discover.forward.structure import Numbers
-from discover.programs.lanes import LANES, Arithmetic, Translation, Writing
+from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
@@ -110,8 +109,8 @@ class SteadyStep(Step):
         return factor * of_modes + self.beside(shared, on, flow, felt)
 
 
-class SteadyCode:
-    """Machine code for steady states of one structure of law and effects.
+class SteadyCode(Code):
+    """Machine code for steady states.
 
     Attributes
     ----------
@@ -120,8 +119,8 @@ class SteadyCode:
 
     Parameters
     ----------
-    fluid, numbers, flow
-        As of `Kernel`.
+    fluid, found, flow
+        As of `Code`.
 
     Raises
     ------
@@ -129,28 +128,17 @@ class SteadyCode:
         If a law or an effect does what is not known in lanes.
     """
 
-    def __init__(self, fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None):
-        self.flags = Flags(fluid)
-        theta = jax.ShapeDtypeStruct((fluid.size,), float)
-        found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
-        self._of_mode, self._shared = (
-            Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True)
-        )
-        self._flow = Layout(flow, 0)
-        law = eqx.combine(found[0].law, found[1].law)
-        is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
+    counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
+
+    def __init__(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None):
+        super().__init__(fluid, found, flow)
         # of a mode, and the two numbers of its way
-        self._numbers = 4 + law.variables + 2
+        self._numbers = 4 + self._law.variables + 2
         states = [effect for effect in fluid.states if effect.acts_on_steady_states]
-        self._step = SteadyStep(fluid, eqx.filter(law, is_array, inverse=True), states)
+        self._step = SteadyStep(fluid, self._plain_law, states)
         self._levels = [(effect.levels, effect.rest) for effect in states]
         self._modes_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
-        self._arithmetic = Arithmetic(self._w.builder)
-        self._write = Translation(self._arithmetic)
-        self._groups()
-        self._call = self._w.compiled()
-        del self._w, self._arithmetic, self._write
+        self._make(fluid, found, flow)
 
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
         """Return the recorded stress before the signal and the felt rate, shape (groups, lanes).
@@ -173,10 +161,6 @@ class SteadyCode:
         self._call(groups, modes, *(array.ctypes.data for array in laid))
         return stress, felt
 
-    def packed(self, tree: Any, of_mode: bool) -> jax.Array:
-        """Return a part of `laid_out` as one array, of modes with these first."""
-        return (self._of_mode if of_mode else self._shared).packed(tree)
-
     def _keep(self, value: Any, place: Any) -> None:
         value = value[()] if isinstance(value, np.ndarray) else value
         self._w.store(self._arithmetic.lanes(value), "scratch", place)
@@ -189,7 +173,7 @@ class SteadyCode:
         first = w.at((at, layout.size))
         return layout.tree([w.load(name, w.at((first, 1), (i, 1))) for i in range(layout.size)])
 
-    def _groups(self) -> None:
+    def _body(self) -> None:
         w = self._w
         truths = [
             w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))

@@ -44,7 +44,6 @@ class Mode(NamedTuple):
 
     modulus: Any
     relaxation_time: Any
-    factor: Any
     amplitudes: dict[str, Any]
     law: Any
     relaxations: Any = None
@@ -52,7 +51,10 @@ class Mode(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """What all modes share: parameters, the law but for what differs, viscosity of the solvent."""
+    """What all modes share: parameters of effects, the law but for what differs, the solvent.
+
+    The former as the vector of a structure without constants of the law.
+    """
 
     theta: Any
     law: Any
@@ -62,14 +64,10 @@ class Shared(NamedTuple):
 def laid_out(fluid: AugmentedFluid, numbers: Numbers, theta) -> tuple[Mode, Shared]:
     """Return what a vector says of each mode, and what of all of them."""
     law, declared, extra, amplitudes = fluid.of_modes(numbers, theta)
-    factor = jnp.ones(len(declared.modulus))
-    if fluid.by_mode is not None:
-        factor = fluid.by_mode_factors(theta, declared)
     modulus, time = declared
     if extra is not None:
         modulus = jnp.append(modulus, extra.modulus)
         time = jnp.append(time, extra.relaxation_time)
-        factor = jnp.append(factor, jnp.ones(len(extra.modulus)))
     own, common = apart(law)
     of_rest = [
         of_each_mode(lambda law, name=name: getattr(law, name)(), law, len(modulus))
@@ -77,9 +75,10 @@ def laid_out(fluid: AugmentedFluid, numbers: Numbers, theta) -> tuple[Mode, Shar
         else None
         for name, has in (("relaxations", law.retracts), ("shares", law.tensors))
     ]
+    of_effects = jnp.concatenate([theta[:2], theta[fluid.of_effects]])
     return (
-        Mode(modulus, time, factor, amplitudes, own, *of_rest),
-        Shared(theta, common, numbers.solvent_viscosity),
+        Mode(modulus, time, amplitudes, own, *of_rest),
+        Shared(of_effects, common, numbers.solvent_viscosity),
     )
 
 
@@ -110,7 +109,6 @@ class Flags:
         setting["states"] = [first[e.name][0] for e in fluid.states]
         setting["times"] = [first[e.name][0] for e in fluid.states if e.changes_times]
         setting["series"] = [first[e.name][0] for e in fluid.series]
-        setting["by mode"] = [] if fluid.by_mode is None else first[fluid.by_mode.name]
         # the last is set by what is called, for weights of steps that are not those of the table
         self.names = [*setting, "own weights"]
         self._set_by = np.zeros((fluid.size, len(self.names)))
@@ -156,13 +154,6 @@ class Step:
         rate = rate_of_deformation(gradient)
         nothing = jnp.zeros(4)
         added = _if(on["terms"], lambda: self._added(shared, mode, on, stress[:4], rate), nothing)
-
-        def differing():
-            extra = law.extra_term(stress, rate)[:4] + added
-            return added + (mode.factor - 1.0) * extra
-
-        if self.fluid.by_mode is not None:
-            added = _if(on["by mode"], differing, added)
         return change - (added if len(change) == 4 else jnp.pad(added, (0, len(change) - 4)))
 
     def _added(self, shared: Shared, mode: Mode, on, stress, rate):

@@ -6,12 +6,13 @@ which is called only where a vector asks for it.
 """
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -19,7 +20,7 @@ from discover.forward.batches import Records, TransientFlows
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.with_effects import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.step import WEIGHTS, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Flags
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
@@ -30,7 +31,11 @@ _MANY = 8
 # Of the runs that were laid out for the kernel
 _KEPT = 8
 
-_OF_RUNS = ("last", "width", "jump", "flow", "weight", "recorded")
+# Steps of the grid from which on vectors choose their own, and as how many of them a step may
+# always be long: two halves, extrapolated, err no more than two steps of the grid
+_FEWEST, _ALWAYS = 8, 2.0
+
+_OF_RUNS = ("last", "held", "width", "whole", "least", "jump", "flow", "weight", "recorded")
 
 
 class _Runs(NamedTuple):
@@ -42,6 +47,9 @@ class _Runs(NamedTuple):
         How many steps of each are taken.
     width, jump
         Of the steps, and the width up to which one only marks a jump of the rate, in s.
+    held, whole, least
+        Of how many steps that follow the commanded rate may be a straight line, from each on, how
+        long these are together, in s, and how short a vector's own may become; see `OwnWidths`.
     flow
         Kinematics of each run.
     sample
@@ -55,7 +63,10 @@ class _Runs(NamedTuple):
     """
 
     last: np.ndarray
+    held: np.ndarray
     width: np.ndarray
+    whole: np.ndarray
+    least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray
     sample: np.ndarray
@@ -66,6 +77,47 @@ class _Runs(NamedTuple):
     in_lanes: np.ndarray
 
 
+def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of each step how many from it on are one interval, its length, and the least step.
+
+    An interval ends at a sample and where a rate jumps. One of few steps is left as it is, and so
+    is one in which the commanded rate is no straight line.
+    """
+    half, rates = np.asarray(part.times), np.asarray(part.commanded_rate)
+    times, sample, last = half[:, ::2], np.asarray(part.sample_index), np.asarray(part.last_step)
+    jump = JUMP * times[:, -1]
+    width = np.diff(times)
+    held = np.ones(width.shape, np.int64)
+    whole, least = width.copy(), width.copy()
+    for row, (own, at) in enumerate(zip(times, sample, strict=True)):
+        jumps = np.flatnonzero(width[row] <= jump[row])
+        starts = np.searchsorted(own, 0.0)
+        ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
+        ends = ends[ends <= last[row]]
+        for first, end in pairwise(ends):
+            own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
+            line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
+            is_straight = np.allclose(own_rates, line, rtol=1e-10, atol=0.0)
+            if end - first >= _FEWEST and is_straight:
+                length = own[end] - own[first]
+                held[row, first], whole[row, first] = end - first, length
+                least[row, first] = _ALWAYS * length / (end - first)
+    return held, whole, least
+
+
+def _between(
+    values: Float[np.ndarray, "runs n lanes"], part: TransientFlows
+) -> Float[np.ndarray, "runs s lanes"]:
+    """Return values at samples as straight lines between these, at all step ends."""
+    times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
+    return np.array(
+        [
+            np.stack([np.interp(own, own[at], one) for one in of_run.T], axis=-1)
+            for of_run, own, at in zip(values, times, sample, strict=False)
+        ]
+    )
+
+
 class SideBySide:
     """Predictions of transients for one structure of law and effects.
 
@@ -74,10 +126,10 @@ class SideBySide:
     fluid, kernel
         The fluid with its effects, and its machine code.
     rates
-        Of a vector and a run, the felt rate at ends and middles of steps, without what series
-        elements take, and the tool's rate at ends.
+        Of a vector, the effects that are present, and a run: the felt rate at ends and middles of
+        steps, without what series elements take, and the tool's rate at ends.
     recorded
-        Of a vector, a run, the stress, the felt rate and the tool's, what is recorded at samples.
+        Of these, the stress, the felt rate and the tool's, what is recorded at samples.
     made_from
         What tells these from those of another structure.
     """
@@ -90,56 +142,56 @@ class SideBySide:
         recorded: Callable,
         made_from: tuple,
     ):
-        self._kernel = kernel
+        self._fluid, self._kernel, self._flags = fluid, kernel, Flags(fluid)
         effects, at = fluid.structure.effects, fluid.slices
         still = KinematicEffect.felt_rate
         shaping = [
             e for e in effects if isinstance(e, KinematicEffect) and type(e).felt_rate is not still
         ]
         self._shaping = [at[e.name].start for e in shaping]
-        self._fits_instants = fluid.instants.stop > fluid.instants.start
         self._distorting = [at[e.name].start for e in effects if isinstance(e, SignalEffect)]
 
-        def packed(numbers: Numbers, thetas):
-            def one(theta):
-                of_mode, shared = laid_out(fluid, numbers, theta)
-                return kernel.packed(of_mode, True), kernel.packed(shared, False)
-
-            return jax.vmap(one, out_axes=-1)(thetas)
-
-        self._packed = compiled(packed, made_from=("packed", *made_from))
-        over_runs = jax.vmap(rates, in_axes=(None, 0))
-        self._rates = compiled(jax.vmap(over_runs, in_axes=(0, None)), ("rates", *made_from))
-        of_runs = jax.vmap(recorded, in_axes=(None, 0, 0, 0, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, 0, 0, 0))
+        self._packed = kernel.packing(fluid, made_from, -1)
+        over_runs = jax.vmap(rates, in_axes=(None, None, 0))
+        of_trials = jax.vmap(over_runs, in_axes=(0, None, None))
+        self._rates = compiled(of_trials, ("rates", *made_from))
+        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0, 0))
         self._recorded = compiled(of_trials, ("recorded", *made_from))
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
+
+    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
+        """Return which vectors are left to the other program: none."""
+        return np.zeros(len(thetas), bool)
 
     def predict(
         self,
         numbers: Numbers,
         thetas: Float[np.ndarray, "trials p"],
+        moduli: Float[np.ndarray, "trials c"],
+        limits: Float[np.ndarray, " trials"],
         part: TransientFlows,
         judging: Records,
         runs: int,
-        limits: Float[np.ndarray, " trials"],
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return what is recorded of the first runs.
 
         Parameters
         ----------
+        moduli
+            Of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
+        limits
+            Sums of squared residuals from which on a vector is of no use. Infinity follows it to
+            the end.
         part, judging
             Runs, and what was recorded of them.
         runs
             How many are asked for; those behind are padding.
-        limits
-            Sums of squared residuals from which on a vector is of no use. Infinity follows it to
-            the end.
         """
-        flags = self._kernel.flags.of(thetas)
+        flags = self._flags.of(thetas)
         order = np.lexsort([thetas[:, 1], *flags.T])
-        laid_out = self._runs(part, judging, thetas[0])
+        laid_out = self._runs(part, judging)
         times, counts = np.unique(thetas[:, 1], return_counts=True)
         table = self._table(numbers, part, float(times[np.argmax(counts)]), int(np.max(counts)))
         out = np.empty((len(thetas), runs, laid_out.sample.shape[1]))
@@ -148,7 +200,8 @@ class SideBySide:
             lanes = trials[np.minimum(np.arange(LANES), len(trials) - 1)]
             limit = np.where(np.arange(LANES) < len(trials), limits[lanes], -np.inf)
             used = np.any(flags[trials], axis=0)
-            found = self._eight(numbers, thetas[lanes], part, laid_out, runs, used, table, limit)
+            each = thetas[lanes], moduli[lanes], limit
+            found = self._eight(numbers, *each, part, laid_out, runs, used, table)
             out[trials] = np.moveaxis(found, -1, 0)[: len(trials)]
 
         # to compile is behind a lock, so that no first call is needed alone
@@ -159,64 +212,72 @@ class SideBySide:
         self,
         numbers: Numbers,
         thetas: np.ndarray,
+        moduli: np.ndarray,
+        limit: np.ndarray,
         part: TransientFlows,
         laid_out: _Runs,
         runs: int,
         used: np.ndarray,
         table: tuple[float, np.ndarray | None],
-        limit: np.ndarray,
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (runs, n, lanes)."""
-        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas))
+        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas, moduli))
         declared = len(numbers.modulus)
         if len(modes) > declared:
             # what effects add is left out where none of the eight has it
             absent = np.all(modes[:, 0] == 0.0, axis=-1) & (np.arange(len(modes)) >= declared)
             modes = np.ascontiguousarray(modes[~absent])
         rate, tool_rate, in_lanes = laid_out.rate, laid_out.tool_rate, laid_out.in_lanes
-        if self._fits_instants or np.any(thetas[:, self._shaping]):
-            rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, part))
+        present = self._fluid.present(thetas)
+        if part.steps is not None or np.any(thetas[:, self._shaping]):
+            rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, present, part))
             in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
-        stress, felt, goes_on = self._kernel(
-            runs,
-            declared,
-            used,
-            {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
-            | {name: getattr(laid_out, name) for name in _OF_RUNS},
-        )
+        given = {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
+        given |= {name: getattr(laid_out, name) for name in _OF_RUNS}
+        stress, felt, goes_on = self._kernel(runs, declared, used, given)
         if not goes_on:
             stress[:] = np.nan
         rows = np.arange(runs)[:, None]
+        at_samples = stress[rows, laid_out.sample[:runs]]
         if not np.any(thetas[:, self._distorting]):
-            return stress[rows, laid_out.sample[:runs]]
+            return at_samples
+        if np.any(laid_out.held > 1):
+            # what alters a signal looks beyond its samples, at all steps of the grid
+            given["held"] = np.ones_like(laid_out.held)
+            stress, felt, _ = self._kernel(runs, declared, used, given)
+            stress[:runs] += _between(at_samples - stress[rows, laid_out.sample[:runs]], part)
         beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
         felt = np.where(beyond, in_lanes[:, ::2], felt)
         stress = np.where(beyond, 0.0, stress)
         first = (np.moveaxis(array, -1, 0) for array in (stress, felt))
-        found = np.asarray(self._recorded(thetas, part, *first, tool_rate))
+        found = np.asarray(self._recorded(thetas, present, part, *first, tool_rate))
         return np.moveaxis(found, 0, -1)[:runs]
 
-    def _runs(self, part: TransientFlows, judging: Records, theta: np.ndarray) -> _Runs:
+    def _runs(self, part: TransientFlows, judging: Records) -> _Runs:
         """Return runs as the kernel takes them, laid out once."""
         for known, by, found in self._known_runs:
             if known is part and by is judging:
                 return found
-        plain = np.tile(theta, (LANES, 1))
-        plain[:, self._shaping] = 0.0
-        rate, tool_rate = (np.asarray(array) for array in self._rates(plain, part))
+        # as commanded, where no instant at which it steps is fitted
+        rate = np.tile(np.asarray(part.commanded_rate), (LANES, 1, 1))
+        tool_rate = np.ascontiguousarray(rate[:, :, ::2])
         times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
         weight, recorded = np.zeros(times.shape), np.zeros(times.shape)
         places = (np.arange(len(times))[:, None], sample)
         np.add.at(weight, places, np.asarray(judging.weight))
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
+        held, whole, least = intervals(part)
         found = _Runs(
             # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
+            held,
             np.diff(times),
+            whole,
+            least,
             JUMP * times[:, -1],
             self._kernel.flows(part.kinematics),
             sample,

@@ -20,6 +20,7 @@ from discover.protocols.protocol import (
     start_up,
     step_rates,
 )
+from discover.words import unknown_name
 
 Observed = Literal["sigma12", "N1", "N2"]
 OBSERVED: tuple[Observed, ...] = ("sigma12", "N1", "N2")
@@ -99,9 +100,7 @@ def candidate_experiments(
     """
     unknown = [name for name in classes if name not in FLOW_CLASSES]
     if unknown:
-        raise InputError(
-            f"Unknown class of experiment {unknown[0]!r}; known are {', '.join(FLOW_CLASSES)}."
-        )
+        raise InputError(unknown_name("class of experiment", unknown[0], FLOW_CLASSES))
     for label, values in (("Wi", weissenberg_numbers), ("De", deborah_numbers)):
         if not values or not all(np.isfinite(v) and v > 0 for v in values):
             raise InputError(f"{label} must be positive numbers; got {list(values)}.")

@@ -9,6 +9,7 @@ from math import gcd, lcm
 from typing import Any, Literal
 
 from discover.identify.exact.exact_terms import PRIME, exact_terms
+from tensor_library.law_terms import spell
 from tensor_library.library import TermLibrary
 
 _LARGEST_INTEGER = 10**6
@@ -50,18 +51,6 @@ class TermRelation:
     def to_json(self) -> dict[str, Any]:
         """Return the relation as JSON-able values."""
         return {**asdict(self), "text": self.text}
-
-
-def spell(coefficients: Mapping[str, float | int]) -> str:
-    """Return a sum of terms as text, such as ``tr(sigma)*sigma − 2 gammadot``."""
-    text = ""
-    for name, value in coefficients.items():
-        size = f"{abs(value):.4g}"
-        sign = "−" if value < 0 else "+"
-        tensor = f"({name})" if "+" in name and "*" not in name else name
-        text += f" {sign} " if text else ("−" if value < 0 else "")
-        text += tensor if size == "1" else f"{size} {tensor}"
-    return text or "0"
 
 
 MOST_SPELLED = 4

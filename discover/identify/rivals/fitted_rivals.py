@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from discover.identify.exact.relations import spell
 from discover.identify.rivals.evidence import LEVEL, Evidence, compare_residuals
 from discover.learners.tensor_sindy.refit import POLISHING, SCREENING, Fit, refit
 from discover.learners.tensor_sindy.search import BREADTH, SupportSearch
 from discover.notebook_view import SentenceAndTable, table_of
-from tensor_library.law_terms import LawTerms
+from tensor_library.law_terms import LawTerms, spell
 
 MOST_RIVALS = 8
 

@@ -19,7 +19,7 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from discover.identify.exact.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
-from discover.identify.exact.relations import feels_33, spell, term_relations
+from discover.identify.exact.relations import feels_33, term_relations
 from discover.identify.side_by_side.histories import SAME, Difference, differences
 from discover.identify.side_by_side.laws_side_by_side import joint_library
 from discover.identify.side_by_side.separation import Separation, separations
@@ -27,7 +27,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.notebook_view import NotebookView
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerms
+from tensor_library.law_terms import LawTerms, spell
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 

@@ -6,7 +6,7 @@ from jaxtyping import Bool, Float
 from discover.forward import AugmentedModel, Batch
 from discover.forward.by_mode import DEGREE
 from discover.inference.fit_uncertainty import uncertainty
-from discover.inference.least_squares import Fit, jacobians
+from discover.inference.least_squares import Fit
 
 _OPEN = float(np.log(0.95 / 0.05))
 """Half width of an interval, on the link's scale, from which on nothing is determined: about the
@@ -29,7 +29,7 @@ def half_widths_alone(
         Of the constant by mode.
     """
     at = model.varying(name)[DEGREE:]
-    columns = jacobians(model, batch, [fit.theta], fit.residual[None], [at])[0]
+    columns = model.linearise(fit.theta, batch, at).jacobian
     half = np.full(len(columns), np.inf)
     for i, column in enumerate(columns):
         if np.any(column) and np.all(np.isfinite(column)):

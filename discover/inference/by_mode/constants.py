@@ -49,32 +49,6 @@ class StageParameter:
 
 
 @dataclass(frozen=True)
-class ToldTogether:
-    """A product or a ratio that these data tell of two constants that they leave open.
-
-    Attributes
-    ----------
-    constants
-        Names of the two.
-    is_ratio
-        Whether it is the first over the second.
-    value, ci95, unit
-        As of a constant.
-    """
-
-    constants: tuple[str, str]
-    is_ratio: bool
-    value: float
-    ci95: tuple[float, float]
-    unit: str
-
-    @property
-    def name(self) -> str:
-        """The two names with what joins them."""
-        return (" / " if self.is_ratio else " × ").join(self.constants)
-
-
-@dataclass(frozen=True)
 class ModeConstant:
     """The constant of one mode.
 

@@ -60,12 +60,6 @@ class Degree:
         return [*range(self.coefficients), *(DEGREE + mode for mode in self.own)]
 
 
-def positions_of(model: AugmentedModel, degrees: Mapping[str, Degree]) -> list[int]:
-    """Return the positions of the coefficients and deviations that these degrees have."""
-    slices = model.declared.by_mode_slices
-    return [slices[n].start + i for n, found in degrees.items() for i in found.places]
-
-
 def one_degree_more(model: AugmentedModel, degrees: Mapping[str, Degree]) -> dict[str, int]:
     """Return the next rung of each constant by mode; empty where none has one.
 

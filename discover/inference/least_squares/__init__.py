@@ -8,7 +8,7 @@
   part of this door, since it loads a solver that many commands do without.
 """
 
-from discover.inference.least_squares.differences import fit_batch, jacobians, widths_of
+from discover.inference.least_squares.differences import fit_batch
 from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior, best_of
 from discover.inference.least_squares.steps import gauss_newton_step, room_of, stepped
 
@@ -19,8 +19,6 @@ __all__ = [
     "best_of",
     "fit_batch",
     "gauss_newton_step",
-    "jacobians",
     "room_of",
     "stepped",
-    "widths_of",
 ]

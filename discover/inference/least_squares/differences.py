@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float
 
-from discover.forward import AugmentedModel, Batch
+from discover.forward import AugmentedModel, Batch, Linearised, Point, linearised
 from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior
 from discover.inference.least_squares.steps import stepped
 
@@ -34,17 +33,19 @@ def fit_batch(
 ) -> list[Fit]:
     """Minimise the squared residuals from several starts, each in its own free parameters.
 
-    All problems advance together, so that each step is a few calls of one compiled function.
-    Derivatives are differences: a residual costs so little beside a compilation of its derivative
-    that this is several times faster here. A step taken corrects them as far as it tells about
-    them   [Broyden 1965, Math. Comput. 19, 577], and they are taken anew when a step so found is
-    rejected, gains far less than they foretold, or is so short that the problem would count as
-    finished: a step then costs one residual instead of one for each parameter. Damping falls as far
-    as what was foretold is gained, and rises ever faster while it is not   [Madsen, Nielsen &
-    Tingleff 2004, Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot
-    be integrated has no finite residual and is a rejected step. A step is the best that the
-    admissible range of the parameters holds, so the others go on where one is at its bound
-    [Kanzow, Yamashita & Fukushima 2004, J. Comput. Appl. Math. 172, 375].
+    All problems advance together, in one call for each step of all of them. Derivatives are
+    differences: a residual costs so little beside a compilation of its derivative that this is
+    several times faster here. As many vectors stand side by side in a call, what is left of them is
+    filled with those by which the steps that are tried are differentiated. (Filled with other
+    dampings of these steps, a fit ends in other minima, and no sooner.) Where there is no room, a
+    step taken corrects derivatives as far as it tells about them   [Broyden 1965, Math. Comput. 19,
+    577], and they are taken anew when a step so found is rejected, gains far less than they
+    foretold, or is so short that the problem would count as finished. Damping falls as far as what
+    was foretold is gained, and rises ever faster while it is not [Madsen, Nielsen & Tingleff 2004,
+    Methods for Non-Linear Least Squares Problems, section 3.2]. A trial that cannot be integrated
+    has no finite residual and is a rejected step. A step is the best that the admissible range of
+    the parameters holds, so the others go on where one is at its bound [Kanzow, Yamashita &
+    Fukushima 2004, J. Comput. Appl. Math. 172, 375].
 
     Parameters
     ----------
@@ -64,23 +65,36 @@ def fit_batch(
     known
         Cost of the best fit that the problems compete with beside one another.
     """
-    thetas = np.array(starts, dtype=float)
-    residuals = model.residuals(thetas, batch)
-    descents = [
-        _Descent(model, prior, list(positions), theta, residual)
-        for theta, positions, residual in zip(thetas, free, residuals, strict=True)
+    given = [
+        (np.array(start, dtype=float), list(at)) for start, at in zip(starts, free, strict=True)
     ]
+    begun = linearised(model, [Point(theta, at) for theta, at in given], batch)
+    descents = [
+        _Descent(model, prior, at, theta, found.residual, found.jacobian)
+        for (theta, at), found in zip(given, begun, strict=True)
+    ]
+    lanes = model.vectors_at_once(batch)
     for _ in range(max_steps):
         going = [one for one in descents if not one.done]
         if not going:
             break
-        _differentiate([one for one in going if one.derivatives is None], batch)
-        trials = np.array([one.trial() for one in going])
-        tried = model.residuals(trials, batch, np.array([one.cost for one in going]))
-        for one, trial, residual in zip(going, trials, tried, strict=True):
+        asked = _asked(going, lanes)
+        for one, point, found in zip(going, asked, linearised(model, asked, batch), strict=True):
             best = min(known, *(other.cost for other in descents)) if rivals else np.inf
-            one.judge(trial, residual, tolerance, best)
+            one.take(point, found, tolerance, best)
     return [one.ended(batch) for one in descents]
+
+
+def _asked(going: Sequence["_Descent"], lanes: int) -> list[Point]:
+    """Return what each problem asks about next, as many vectors as stand side by side."""
+    asked = [one.next_point() for one in going]
+    room = -sum(point.size for point in asked) % lanes
+    for i in sorted(range(len(going)), key=lambda i: len(going[i].free)):
+        free = going[i].free
+        if not asked[i].positions and len(free) <= room:
+            asked[i] = asked[i]._replace(positions=free)
+            room -= len(free)
+    return asked
 
 
 @dataclass
@@ -108,8 +122,8 @@ class _Descent:
     free: list[int]
     theta: np.ndarray
     residual: np.ndarray
-    derivatives: np.ndarray | None = None
-    fresh: bool = False
+    derivatives: np.ndarray | None
+    fresh: bool = True
     damping: float = 1e-2
     growth: float = _GROWTH
     done: bool = field(init=False)
@@ -124,11 +138,8 @@ class _Descent:
         at, free = self.theta, tuple(self.free)
         if self.fresh and self.derivatives is not None:
             return Fit(at, free, self.residual, self.derivatives)
-
-        def anew() -> np.ndarray:
-            return jacobians(self.model, batch, [at], self.residual[None], [free])[0]
-
-        return Fit(at, free, self.residual, anew)
+        point, model = Point(at, free, self.residual), self.model
+        return Fit(at, free, self.residual, lambda: linearised(model, [point], batch)[0].jacobian)
 
     def _cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
         """Return the sum of squares, what is known of parameters included; else infinite."""
@@ -136,18 +147,13 @@ class _Descent:
             cost = np.sum(residual**2) + np.sum(self.prior.rows(theta, self.free)[0] ** 2)
         return float(cost) if np.isfinite(cost) else np.inf
 
-    def trial(self) -> np.ndarray:
-        """Return the parameters after one more step."""
-        assert self.derivatives is not None  # they are taken before
-        return stepped(
-            self.model,
-            self.theta,
-            self.free,
-            self.residual,
-            self.derivatives,
-            self.damping,
-            self.prior,
-        )
+    def next_point(self) -> Point:
+        """Return the parameters after one more step, or where derivatives are to be taken."""
+        if self.derivatives is None:
+            return Point(self.theta, self.free, self.residual)
+        at, derivatives = (self.theta, self.free, self.residual), self.derivatives
+        theta = stepped(self.model, *at, derivatives, self.damping, self.prior)
+        return Point(theta, limit=self.cost)
 
     def _foretold(self, step: np.ndarray) -> float:
         """Return by how much a step lowers the cost if derivatives stay what they are."""
@@ -157,18 +163,22 @@ class _Descent:
         gain = np.sum(change * (2.0 * self.residual + change))
         return -float(gain + np.sum(of_known * (2.0 * known + of_known)))
 
-    def judge(self, theta: np.ndarray, residual: np.ndarray, tolerance: float, best: float):
-        """Take the step to a trial, or try a shorter one or other derivatives the next time.
+    def take(self, point: Point, found: Linearised, tolerance: float, best: float) -> None:
+        """Take the step that was tried, or try a shorter one or other derivatives next time.
 
         Parameters
         ----------
-        theta, residual
-            Of the trial.
+        point, found
+            What was asked about, and the answer.
         tolerance
             Share of the cost below which a step gains hardly anything.
         best
             Least cost of all problems; infinite where being behind it is no reason to end.
         """
+        if self.derivatives is None:
+            self.derivatives, self.fresh = found.jacobian, True
+            return
+        theta, residual = point.theta, found.residual
         cost = self._cost(theta, residual)
         if not cost < self.cost:
             if self.fresh:
@@ -188,52 +198,12 @@ class _Descent:
         less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
         self.damping, self.growth = max(self.damping * less, _LEAST_DAMPING), _GROWTH
         self.theta, self.residual, self.cost = theta, residual, cost
-        if not self.done:
-            anew = short or share < _FORETOLD
+        if point.positions and np.all(np.isfinite(found.jacobian)):
+            self.derivatives, self.fresh = found.jacobian, True
+        else:
+            anew = self.done or short or share < _FORETOLD
             self.derivatives = None if anew else _corrected(self.derivatives, step, change)
             self.fresh = False
-
-
-def _differentiate(descents: Sequence[_Descent], batch: Batch):
-    """Take derivatives anew, of all problems in one call."""
-    if not descents:
-        return
-    theta, residual = ([getattr(d, name) for d in descents] for name in ("theta", "residual"))
-    free = [one.free for one in descents]
-    found = jacobians(descents[0].model, batch, theta, np.array(residual), free)
-    for one, derivatives in zip(descents, found, strict=True):
-        one.derivatives, one.fresh = derivatives, True
-
-
-def jacobians(model, batch, thetas, residuals, free) -> list[np.ndarray]:
-    """Return derivatives of the residuals in the free parameters, (free, runs, n) each."""
-    trials, widths = [], []
-    for theta, positions in zip(thetas, free, strict=True):
-        for position, width in zip(positions, widths_of(model, theta, positions), strict=True):
-            moved = theta.copy()
-            moved[position] += width
-            trials.append(moved)
-            widths.append(width)
-    if not trials:
-        return [np.zeros((0, *residuals.shape[1:])) for _ in thetas]
-    moved_residuals = model.residuals(trials, batch)
-    out, row = [], 0
-    for base, positions in zip(residuals, free, strict=True):
-        n = len(positions)
-        with np.errstate(invalid="ignore", over="ignore"):  # a trial that ran away
-            difference = moved_residuals[row : row + n] - base
-        out.append(difference / np.asarray(widths[row : row + n])[:, None, None])
-        row += n
-    return out
-
-
-def widths_of(
-    model: AugmentedModel, theta: Float[np.ndarray, " p"], positions: Sequence[int]
-) -> Float[np.ndarray, " positions"]:
-    """Return by how much parameters are moved for a derivative, away from an upper bound."""
-    at = list(positions)
-    width = 1e-5 * np.maximum(np.abs(theta[at]), model.first_trial[at])
-    return np.where(theta[at] + width > model.high[at], -width, width)
 
 
 def _corrected(jacobian, step, change):

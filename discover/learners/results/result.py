@@ -12,6 +12,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.learners.results.term_tables import TermTables
 from discover.learners.results.weighted_laws import WeightedLaws
+from tensor_library.law_terms import spell
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ class LearnerResult(HasEquation, TermTables):
     weighted: WeightedLaws | None = None
 
     def __repr__(self) -> str:
-        terms = " ".join(f"{t.coefficient:+.4g} {t.term}" for t in self.terms) or "no term"
-        return f"<LearnerResult {self.learner}: {terms.removeprefix('+')}; {self.message}>"
+        terms = spell({t.term: t.coefficient for t in self.terms}) if self.terms else "no term"
+        return f"<LearnerResult {self.learner}: {terms}; {self.message}>"
 
     def equation(self) -> Equation:
         """Return the law term by term, a known law below it included, dimensionless.

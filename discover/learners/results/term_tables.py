@@ -1,12 +1,14 @@
 """What a learner found and how it chose, as tables."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.notebook_view import NotebookView
+from discover.statistics import LackOfFit
+from discover.summary_view import Estimate
 
 
 class TermTables(NotebookView):
@@ -71,6 +73,50 @@ class TermTables(NotebookView):
     def _shown(self) -> Iterable[Any]:
         yield f"{self.learner}: {self.message}"
         yield self.table()
+
+
+def estimates_of(
+    terms: Sequence[RecoveredTerm],
+    left: LackOfFit | None,
+    rivals: Iterable[Collection[str]],
+    key: tuple[str, ...] = (),
+) -> list[Estimate]:
+    """Return the coefficients of terms, and whether the data determine each.
+
+    Parameters
+    ----------
+    terms
+        Of the law.
+    left
+        What the law leaves of the runs; None where that is not known.
+    rivals
+        Terms of each law that the runs do not tell from it.
+    key
+        What stands before the term in the index of a summary.
+    """
+    rivals = list(rivals)
+    found = []
+    for term in terms:
+        notes = {"determined": _determined(term, left, rivals)}
+        found.append(Estimate((*key, term.term), term.coefficient, term.ci95, notes=notes))
+        for name, value in term.inner.items():
+            ends = term.inner_ci95.get(name)
+            found.append(Estimate((*key, f"{name} of {term.term}"), value, ends, notes=notes))
+    return found
+
+
+def _determined(
+    term: RecoveredTerm, left: LackOfFit | None, rivals: Iterable[Collection[str]]
+) -> str:
+    if term.ci95 is None:
+        return "no: without interval"
+    if left is not None and left.verdict != "explained":
+        return "no: the law misses the runs by more than noise"
+    if not term.is_told_from_zero:
+        return "no: may be zero"
+    if any(term.term not in rival for rival in rivals):
+        return "no: a law without it fits as well"
+    return "yes, if the law is in the library"
 
 
 def _support(member: Mapping[str, Any]) -> set[str]:

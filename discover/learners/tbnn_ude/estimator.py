@@ -27,7 +27,7 @@ from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart
 from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode
+from discover.learners.settings import PerMode, default_library
 from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays
 from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
 from discover.learners.tbnn_ude.evidence import surprises
@@ -46,7 +46,7 @@ from discover.learners.tbnn_ude.spread import (
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
 from tensor_library.integrity_basis import TENSOR_NAMES
-from tensor_library.library import TermLibrary, build_library
+from tensor_library.library import TermLibrary
 
 RECIPES = ("default", "thorough", "paper")
 
@@ -205,7 +205,7 @@ class TBNNUDE(RunPrediction):
                 self._learn(runs, known, shorten=False)
                 return
         cloud = sample_states(best.law, problem)
-        library = self.projection_library or build_library(degree=1)
+        library = self.projection_library or default_library()
         projection = project(best.law, cloud, library)
         self.terms_ = _terms(projection, best, cloud)
         losses = np.asarray(best.misfits)

@@ -69,7 +69,7 @@ class TrainingProblem(eqx.Module):
 
         Its derivative, in reverse mode through the steps with recursive checkpoints, was
         measured at half the cost of storing every step and at a ninth of the continuous adjoint
-        (``benchmarks/adjoints.py``: 51, 94 and 481 ms for the paper's network).
+        (51, 94 and 481 ms for the paper's network).
         """
         weight, total = self.records.weight, jnp.sum(self.modulus)
         unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))

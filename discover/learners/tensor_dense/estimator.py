@@ -22,7 +22,7 @@ from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart, known_part
 from discover.learners.results.weighted_laws import Limits, WeightedLaws
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode, check_library
+from discover.learners.settings import PerMode, check_library, default_library
 from discover.learners.tensor_dense.draws import DenseDraws
 from discover.learners.tensor_dense.mixture import Mixture, Optimum, explore
 from discover.learners.tensor_dense.reference_laws import (
@@ -35,7 +35,7 @@ from discover.learners.tensor_dense.term_sizes import term_sizes
 from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.progress import Progress, by_lines
-from tensor_library.library import TermLibrary, build_library
+from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
 
@@ -237,7 +237,7 @@ class TensorDense(RunPrediction):
         )
 
     def _problem(self, runs: list[Run], known: KnownPart) -> TrajectoryProblem:
-        library = build_library(degree=1) if self.library is None else self.library
+        library = default_library() if self.library is None else self.library
         base = UpperConvectedMaxwell(known.linear_relaxation) if known.law is None else known.law
         # every named law relaxes: where the known part does not, the reference brings −σ along
         lacking = jnp.asarray(0.0 if base.linear_relaxation else 1.0)

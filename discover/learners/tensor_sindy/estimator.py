@@ -18,7 +18,7 @@ from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files.provenance import Provenance
 from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode, check_library
+from discover.learners.settings import PerMode, check_library, default_library
 from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays
 from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.deviance import draws_of_fit
@@ -52,7 +52,7 @@ from discover.learners.trajectories.prediction import predict_runs
 from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
 from discover.progress import Progress, by_lines
 from discover.statistics import NoiseModel
-from tensor_library.library import TermLibrary, build_library
+from tensor_library.library import TermLibrary
 
 SCREENINGS = ("auto", "exact")
 SELECTIONS = ("bic", "held_out", "one_standard_error")
@@ -70,7 +70,8 @@ class TensorSINDy(RunPrediction):
     Parameters
     ----------
     library
-        Candidate terms; by default the eight tensors with constant coefficients.
+        Candidate terms; by default those of the commands: tensors with coefficients up to degree
+        one in the invariants.
     optimizer
         ``"stlsq"``, ``"sr3"``, ``"ssr"``, ``"frols"``, or a pysindy optimiser.
     modulus, relaxation_time
@@ -222,7 +223,7 @@ class TensorSINDy(RunPrediction):
 
     def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
         started = time.perf_counter()
-        library = build_library() if self.library is None else self.library
+        library = default_library() if self.library is None else self.library
 
         def make(runs: Sequence[Run], **limits: float) -> TrajectoryProblem:
             return make_problem(

@@ -11,6 +11,7 @@ from sklearn import config_context
 from sklearn.base import clone
 
 from discover.errors import InputError
+from discover.words import unknown_name
 
 OPTIMISERS = ("stlsq", "sr3", "ssr", "frols")
 """Optimisers that can be asked for by name; a pysindy optimiser may be given instead."""
@@ -40,8 +41,7 @@ def check_optimiser(optimizer) -> None:
     if isinstance(optimizer, str):
         if optimizer.lower() not in OPTIMISERS:
             raise InputError(
-                f"Unknown optimizer {optimizer!r}; write one of {', '.join(OPTIMISERS)}, or pass a "
-                "pysindy optimizer."
+                f"{unknown_name('optimizer', optimizer, OPTIMISERS)} Or pass a pysindy optimizer."
             )
     elif not isinstance(optimizer, pysindy.optimizers.BaseOptimizer):
         raise InputError(

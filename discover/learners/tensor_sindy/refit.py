@@ -198,5 +198,5 @@ def refit(
     keeps = [everything] * len(supports) if keeps is None else keeps
     jobs = list(zip(supports, starts, keeps, strict=True))
     # one support to a program: a batch of them by `vmap` takes as many steps as its slowest member,
-    # two to three times the work (`benchmarks/refits.py`)
+    # two to three times the work
     return in_threads(lambda job: one(*job), jobs)

@@ -1,14 +1,22 @@
 """Machine code of a function written for LLVM, with the loops that hold it."""
 
 import ctypes
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
 import llvmlite.ir as ir
 
+from discover.programs.fingerprint import NotDescribable, fingerprint
 from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
+from discover.programs.store import load_program, program_folder, save_program
+
+_LOGGER = logging.getLogger(__name__)
+
+_NAME = "predict"
 
 Place = Any
 """Where something lies: a whole number, known or of LLVM."""
@@ -36,7 +44,7 @@ class Writing:
         held = {name: DOUBLES if name in wide else DOUBLE for name in arrays}
         held |= dict.fromkeys(whole, INTEGER)
         kinds = [*(INTEGER for _ in counts), *(held[name].as_pointer() for name in arrays)]
-        function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), "predict")
+        function = ir.Function(self.module, ir.FunctionType(ir.VoidType(), kinds), _NAME)
         self.counts = dict(zip(counts, function.args, strict=False))
         self.arrays = dict(zip(arrays, function.args[len(counts) :], strict=True))
         for address in self.arrays.values():
@@ -90,33 +98,85 @@ class Writing:
         builder.branch(head)
         builder.position_at_end(after)
 
-    def compiled(self) -> Callable[..., None]:
-        """Return the function, which takes whole numbers and addresses."""
+    def compiled(self) -> bytes:
+        """Return the machine code of the function."""
         self.builder.ret_void()
-        llvm.initialize_native_target()
-        llvm.initialize_native_asmprinter()
-        module = llvm.parse_assembly(str(self.module))
+        module, machine = llvm.parse_assembly(str(self.module)), _machine()
         module.verify()
-        # registers as wide as there are: by default LLVM keeps to half of them
-        features = f"{llvm.get_host_cpu_features().flatten()},-prefer-256-bit"
-        machine = llvm.Target.from_default_triple().create_target_machine(
-            cpu=llvm.get_host_cpu_name(), features=features, opt=2
-        )
         tuning = llvm.create_pipeline_tuning_options(speed_level=2)
         # all is in lanes already, and the loops are long
         tuning.slp_vectorization = tuning.loop_vectorization = tuning.loop_unrolling = False
         passes = llvm.create_pass_builder(machine, tuning)
         passes.getModulePassManager().run(module, passes)
-        engine = llvm.create_mcjit_compiler(module, machine)
-        engine.finalize_object()
-        numbers = [ctypes.c_int64] * len(self.counts)
-        addresses = [ctypes.c_void_p] * len(self.arrays)
-        kind = ctypes.CFUNCTYPE(None, *numbers, *addresses)
-        function = kind(engine.get_function_address("predict"))
+        return machine.emit_object(module)
 
-        def call(*arguments: int) -> None:
-            # the engine owns the code, and lives as long as this does
-            assert engine is not None
-            function(*arguments)
 
-        return call
+def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
+    """Return the function of a machine code, which takes whole numbers and addresses.
+
+    Parameters
+    ----------
+    code
+        From `Writing.compiled`.
+    counts, arrays
+        How many of each it takes.
+    """
+    machine = _machine()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    kind = ctypes.CFUNCTYPE(None, *[ctypes.c_int64] * counts, *[ctypes.c_void_p] * arrays)
+    function = kind(engine.get_function_address(_NAME))
+
+    def call(*arguments: int) -> None:
+        # the engine owns the code, and lives as long as this does
+        assert engine is not None
+        function(*arguments)
+
+    return call
+
+
+def kept(made_from: Any, write: Callable[[], bytes]) -> bytes:
+    """Return machine code that an earlier start made of the same, or write and keep it.
+
+    It lies beside the programs, where nobody else can write; see `discover.programs.store`.
+
+    Parameters
+    ----------
+    made_from
+        What tells it from other code; what cannot be described, a user's own code, is not kept.
+    write
+        Makes it.
+    """
+    folder = program_folder()
+    if folder is None:
+        return write()
+    try:
+        name = fingerprint(("lanes", *_processor(), made_from), False).hex()
+    except (NotDescribable, TypeError, ValueError) as reason:
+        _LOGGER.debug("machine code is made at every start: %s", reason)
+        return write()
+    found = load_program(folder / name)
+    if found is not None:
+        return found[1]
+    code = write()
+    save_program(folder / name, None, code)
+    return code
+
+
+def _machine() -> llvm.TargetMachine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    cpu, features = _processor()
+    target = llvm.Target.from_default_triple()
+    return target.create_target_machine(cpu=cpu, features=features, opt=2)
+
+
+@cache
+def _processor() -> tuple[str, str]:
+    features = llvm.get_host_cpu_features().flatten()
+    if llvm.get_default_triple().startswith("x86_64"):
+        # registers as wide as there are: by default LLVM keeps to half of them. Of a feature that
+        # a processor has not, LLVM complains on standard error
+        features = f"{features},-prefer-256-bit"
+    return llvm.get_host_cpu_name(), features

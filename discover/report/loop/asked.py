@@ -2,8 +2,7 @@
 
 from collections.abc import Sequence
 
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.dataset.records.coarse_rates import CoarseRates, coarse_in
+from discover.loop.loop_result import LoopResult
 
 MOST_NAMES = 3
 
@@ -20,13 +19,8 @@ def several(names: Sequence[str], word: str) -> str:
     return f" {word} ".join(shown)
 
 
-def coarse_rates(result: LoopResult) -> CoarseRates | None:
-    """Return what rates read in too few samples leave open, if that is not small."""
-    return coarse_in(result.remaining.get("sampled_rate"))
-
-
 def untested_by(result: LoopResult) -> str:
-    """Return why nothing tested what explains the records, `Untested`; empty where it was."""
+    """Return why nothing tested what explains the records; empty where it was tested."""
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
 
 

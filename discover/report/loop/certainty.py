@@ -2,18 +2,16 @@
 
 from collections.abc import Iterator
 
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.inference.by_mode.other_law_of_a_mode import other_laws_said
+from discover.loop.loop_result import LoopResult
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.loop.asked import (
     EXPLAINED,
     MOST_NAMES,
-    coarse_rates,
     doubted,
     several,
     untested_by,
 )
-from discover.report.wording import effect_title, percent, sentence, significant
+from discover.report.wording import effect_title, percent, sentence
 from discover.words import listed
 
 _SETTLED = 0.95
@@ -22,17 +20,13 @@ _SLOW = 0.5  # correlation from which noise and a slow effect look alike for som
 
 def how_sure(result: LoopResult) -> str:
     """Return by how much the error fell, and after it what these data do not decide."""
-    sentences = [_errors(result)]
+    sentences = [_errors(result), *_what_is_missing(result)]
     if untested_by(result) == "states":
         sentences.append(ONLY_STATES)
-    if (coarse := coarse_rates(result)) is not None:
-        sentences.append(coarse.sentence)
-    if said := result.remaining.get("read_otherwise"):
-        sentences.append(said)
     if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
         sentences.append(
             f"This holds if each run is a loading of its own, {percent(deviation)}: its factor is "
-            "fitted along, that of a run held out to that run itself, whose error is told without."
+            "fitted along. Of a run held out it is not known."
         )
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
@@ -40,11 +34,21 @@ def how_sure(result: LoopResult) -> str:
             f"The rate of {runs} steps between two samples, which do not tell "
             "when: the instants are fitted along, those of a run held out to that run itself."
         )
-    if result.verdict in EXPLAINED:
-        told = [other_laws_said(one.other_laws).strip() for one in result.by_mode.values()]
-        sentences += [one for one in told if one]
     doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
+
+
+def _what_is_missing(result: LoopResult) -> Iterator[str]:
+    """Tell how large what no effect explains is, and where it is largest."""
+    left = result.discrepancy
+    if left is None or left["size"] == 0.0:
+        return
+    low, high = (percent(end) for end in left["ci95"])
+    worst = max(left["by_run"], key=left["by_run"].get)
+    yield (
+        f"What no effect explains is {percent(left['size'])} of the stress (95 %: {low} to {high}), "
+        f"most in {worst} ({percent(left['by_run'][worst])})."
+    )
 
 
 def _errors(result: LoopResult) -> str:
@@ -60,37 +64,19 @@ def _errors(result: LoopResult) -> str:
         if result.held_in_band is not None:
             share = percent(result.held_in_band)
             parts.append(f"the 95 % band of all explanations holds {share} of their samples")
-        parts += _without_band(result)
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
     return sentence([*parts, f"on the fitted runs {told}, {_share_of_noise(result)}"])
 
 
-def _without_band(result: LoopResult) -> Iterator[str]:
-    """Tell of the runs held out that have no band, since nothing that was fitted bears on them."""
-    drawn = {record.flow for record in result.records if record.band is not None}
-    others = dict.fromkeys(record.flow for record in result.records if record.flow not in drawn)
-    if others and drawn:
-        flows = listed([flow if flow == "shear" else f"{flow} extension" for flow in others])
-        yield (
-            f"no band is drawn in {flows}: none of it was fitted, and laws that do not explain the "
-            "fitted runs say nothing about it"
-        )
-
-
 def _share_of_noise(result: LoopResult) -> str:
     """Return how much of the error of the fitted runs is noise, as far as that is known."""
-    if not result.remaining.get("noise_known", True):
-        return "of which nobody knows how much is noise"
     floor = percent(result.noise_floor)
     linear = result.remaining.get("linear_error") or 0.0
     if linear > result.noise_floor:
         misfit = f"the misfit of the linear sweep by its modes {percent(linear)}"
         return f"where noise explains {floor} and {misfit}"
-    if result.verdict == "unexplained" and result.remaining.get("noise_unsure"):
-        # slow noise is not told from a misfit
-        return f"of which {floor} changes from sample to sample, as noise does"
     return f"where noise explains {floor}"
 
 
@@ -102,30 +88,21 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
             f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
             "for noise, and an effect that varies slowly would look the same"
         )
-    none = percent(result.explanations.unexplained_probability)
-    nothing = f"that something else is right has a probability of {none}"
     untested = untested_by(result)
     if untested == "flows":
         yield (
             "no run was held out, and no more flows were measured than what was fitted takes, so "
-            f"none tested it: {nothing}"
+            "none tested it"
         )
     elif result.error_before.held_out is None:
         yield "no run was held out to judge by"
-    if untested == "states" and result.stages:
-        yield nothing
-    elif not untested and doubted(result) is not None:
+    if doubted(result) is not None:
+        none = percent(result.explanations.unexplained_probability)
         yield f"that it is nothing that was tried has a probability of {none}"
 
 
 def _samples_that_count(result: LoopResult) -> Iterator[str]:
-    """Tell which runs and samples did not count, or not as much as others."""
-    if few := result.remaining.get("not_judging", ()):
-        verb = "have too few samples to judge" if len(few) > 1 else "has too few samples to judge"
-        yield f"{several(few, 'and')} {verb}"
-    if weights := result.remaining.get("weights"):
-        ratio = significant(max(weights.values()) / min(weights.values()), 2)
-        yield f"the noise of runs differs by up to a factor of {ratio}, and each weighs by its own"
+    """Tell how many samples did not count."""
     if count := result.remaining.get("outliers", 0):
         which = "samples are outliers" if count > 1 else "sample is an outlier"
         yield f"{count} {which} and did not count"
@@ -152,7 +129,6 @@ def _alternatives(result: LoopResult) -> str:
     if share > _SETTLED:
         return ""
     names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
-    names += " on a bench that is a little off" if others[0].bench else ""
     rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
     return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
 

@@ -2,13 +2,12 @@
 
 from collections.abc import Sequence
 
-from discover.closed_loop.results.law_fit import LawFit
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.results.stages import Stage
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
+from discover.loop.loop_result import LoopResult
+from discover.loop.parts import LawFit, Stage
 from discover.report.free_form_words import free_form_sentence
-from discover.report.loop.asked import coarse_rates, doubted, several, untested_by
+from discover.report.loop.asked import doubted, several, untested_by
 from discover.report.wording import (
     effect_title,
     estimate,
@@ -41,16 +40,13 @@ _UNTESTED = {
     "describes",
 }
 
+_ALIKE = 0.05
+"""Probability of a law from which on these runs do not tell it from the likeliest."""
+
 _MEASURED = {
     "flows": "what was measured",
     "states": "the states that were measured",
 }
-
-_UNKNOWN_NOISE = "The runs have too few samples to tell noise from a missing effect"
-
-_UNKNOWN_RATE = "What the rate did between its samples hides all that could tell what is missing"
-
-_NOT_CARRIED = "What explains the fitted runs does not carry over to the runs held out"
 
 
 def what_was_found(result: LoopResult) -> str:
@@ -63,11 +59,6 @@ def what_was_found(result: LoopResult) -> str:
             else "they hold hardly anything but noise, or do not follow what was imposed"
         )
         return f"{_LOOP['no_signal']}: {why}."
-    if result.verdict == "unexplained" and names and result.remaining.get("without_fluid"):
-        return (
-            f"No candidate explains the data: what comes nearest ({names}) leaves as much without "
-            "the fluid."
-        )
     parts = [
         f"{KINDS[stage.kind]}: {effect_title(stage.effect)}, {_values(stage)}"
         for stage in result.stages
@@ -80,27 +71,16 @@ def what_was_found(result: LoopResult) -> str:
         parts[0] = lead + parts[0]
     if result.verdict == "unexplained" and result.free_form:
         curve = result.free_form[0]
-        parts.append(f"{'but' if curve.explains else 'and'} {free_form_sentence(curve)}")
+        parts.append(f"and {free_form_sentence(curve)}")
     if result.laws:
         parts.append(_law_chosen(result.laws))
     return sentence([_how_it_stands(result), *parts])
 
 
 def _how_it_stands(result: LoopResult) -> str:
-    """Return the verdict in words, with what untested or unknown things make of it."""
+    """Return the verdict in words."""
     if untested := untested_by(result):
         return f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
-    if result.verdict == "unexplained":
-        if (coarse := coarse_rates(result)) is not None and coarse.hides:
-            return _UNKNOWN_RATE
-        if not result.remaining.get("noise_known", True):
-            return _UNKNOWN_NOISE
-        if not result.remaining.get("carries_over", True):
-            return _NOT_CARRIED
-        if read_as := result.remaining.get("read_as"):
-            return (
-                f"Nothing is explained, for the records follow this model clearly better {read_as}"
-            )
     return _LOOP[result.verdict] if doubted(result) is None else _OPEN
 
 
@@ -112,13 +92,9 @@ def _values(stage: Stage) -> str:
         for name, p in stage.parameters.items()
         if name not in stage.left_open
     ]
-    for one in stage.told_together:
-        value = f"{estimate(one.value, one.ci95)} {one.unit}".rstrip()
-        told.append(f"{_in_words(one.name)} = {value} (95 % {interval(one.ci95)})")
     if stage.left_open:
         names = listed([_in_words(name) for name in stage.left_open])
-        alone = " alone" if stage.told_together else ""
-        left = f"{names}{alone} not determined by these data"
+        left = f"{names} not determined by these data"
         return f"{', '.join(told)}, with {left}" if told else left
     return ", ".join(told)
 
@@ -131,7 +107,7 @@ def _in_words(name: str) -> str:
 def _law_chosen(laws: Sequence[LawFit]) -> str:
     """Return which law was taken of several, and from which these runs do not tell it."""
     best, *others = laws
-    alike = [LAWS[one.law].title for one in others if not one.is_told_apart]
+    alike = [LAWS[one.law].title for one in others if (one.probability or 0.0) > _ALIKE]
     told = f"; these runs do not tell it from {several(alike, 'and')}" if alike else ""
     ends = f" ({several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
     return f"of {len(laws)} laws {best.title}{ends} was taken{told}"

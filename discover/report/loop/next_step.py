@@ -4,10 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.results.stages import Stage
-from discover.dataset.records.coarse_rates import MORE_SAMPLES
-from discover.report.loop.asked import EXPLAINED, coarse_rates, several, untested_by
+from discover.loop.loop_result import LoopResult
+from discover.loop.parts import Stage
+from discover.report.loop.asked import EXPLAINED, several, untested_by
 from discover.report.wording import (
     A_TRANSIENT,
     FIGURE_SYMBOLS,
@@ -15,26 +14,20 @@ from discover.report.wording import (
     effect_title,
     effects_title,
     percent,
-    sentence,
     significant,
 )
-from discover.statistics.residual import FEWEST_TESTED
 
 
 def what_to_measure_next(result: LoopResult) -> str:
     """Return what would tell most: more samples, a check of an effect, another test."""
-    if coarse_rates(result) is not None:
-        return MORE_SAMPLES
     rates = [float(np.max(np.abs(record.rate))) for record in result.records]
     faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
-    if result.verdict == "no_signal" or result.remaining.get("without_fluid"):
+    if result.verdict == "no_signal":
         return (
             "See that the sensor is connected and the sample there, and measure where the stress "
             "stands out of the noise: with a larger sample, a more sensitive transducer, or "
             f"{faster}."
         )
-    if advised := result.remaining.get("advice"):
-        return sentence([advised])
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT
@@ -52,20 +45,12 @@ def what_to_measure_next(result: LoopResult) -> str:
             return f"To confirm {title}: {check}."
         others = several([*map(effect_title, doubtful.aliases)], "and")
         return f"To tell {title} from {others}: {check}."
-    if not result.remaining.get("noise_known", True):
-        return (
-            f"Record at least {FEWEST_TESTED} samples in each run, or repeat a run to learn its "
-            "noise and write it in the study ([loop] noise)."
-        )
     if result.verdict == "unexplained":
         return (
             "Repeat one run with another geometry or instrument: what changes is the instrument's, "
             f"what stays is the fluid's.{_loadings(result)}"
         )
-    hidden = max(
-        result.noise_floor,
-        *(float(result.remaining.get(name, 0.0)) for name in ("resolution", "linear_error")),
-    )
+    hidden = max(result.noise_floor, float(result.remaining.get("linear_error", 0.0)))
     return (
         f"What changes the stress by less than {percent(max(hidden, 1e-5))} may still hide; what "
         f"tests the model hardest is a faster flow: {faster}."

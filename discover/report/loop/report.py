@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from discover.closed_loop.results.loop_result import LoopResult
+from discover.loop.loop_result import LoopResult
 from discover.plain_json import json_text
 from discover.protocols.kinematics import in_words
 from discover.report.loop import tables
@@ -20,7 +20,6 @@ from discover.report.plots.loop.rivals import rivals_picture
 from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
-from discover.report.told_by import told_by_table
 from discover.report.wording import QUESTIONS, SMALL_FAULTS
 from discover.study.run_folder import RunFolder
 
@@ -95,7 +94,6 @@ def write_loop(
         declared_effects=tables.declared_effects(result),
         rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
         folds=[tables.fold_row(fold) for fold in result.folds],
-        told_by=told_by_table(result.told_by),
         is_unexplained=result.verdict == "unexplained",
         law=tables.law(result),
         remaining=tables.remaining_rows(result),

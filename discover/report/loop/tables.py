@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from discover.closed_loop.results.candidate_score import CandidateScore
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.results.stages import Fold, Stage
 from discover.effects import make_effect
 from discover.equations.spelling.mathml import law_element
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode
+from discover.loop.loop_result import LoopResult
+from discover.loop.parts import CandidateScore, Fold, Stage
 from discover.report.loop.found import KINDS, named
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay
@@ -139,7 +138,6 @@ def stage_row(stage: Stage, number: int) -> dict[str, Any]:
             }
             for name, p in stage.parameters.items()
         ],
-        "together": stage.told_together,
         "aliases": ", ".join(map(effect_title, stage.aliases)),
         "source": stage.source,
         "check": stage.check,
@@ -152,7 +150,7 @@ def explanations(result: LoopResult) -> list[dict[str, Any]]:
     chosen = result.explanations.holding([stage.effect for stage in result.stages])
     return [
         {
-            "effects": effects_title(one.effects, one.bench),
+            "effects": effects_title(one.effects),
             "twins": "; ".join(map(effects_title, one.twins)),
             "probability": one.probability,
             "error": one.error,
@@ -241,16 +239,14 @@ def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:
             "effect": effect_title(c.effect),
             "kind": KINDS[c.kind],
             "score": c.score,
-            "reduction": c.reduction,
+            "evidence": c.evidence,
             "error": c.error,
-            "left_out_error": c.left_out_error,
-            "aliases": ", ".join(map(effect_title, c.aliases)),
         }
         for c in ranking[:MOST_RANKED]
     ]
 
 
-_SHARES = ("error", "floor", "/ change", "/ left")
+_SHARES = ("error", "floor", "gain", "clock")
 """Last words of what is a share of the root-mean-square stress."""
 
 
@@ -259,24 +255,20 @@ _REMAINING = {
     "error": "error on the fitted runs",
     "noise floor": "noise",
     "linear error": "error of the linear sweep",
-    "autocorrelation": "correlation of neighbouring residuals",
+    "autocorrelation": "correlation of noise from sample to sample",
     "outliers": "outliers, which did not count",
     "outlier times s": "their times in s",
     "probability": "probability of such a residual, were it noise",
-    "resolution": "numerical error of the prediction, relative",
-    "sampled rate / change": "what another curve through the samples of the rate would change",
-    "sampled rate / left": "beside what is left",
-    "sampled rate / too coarse": "the rate is sampled too coarsely",
-    "sampled rate / hides the law": "so that no law can be told",
-    "sampled rate / said": "in words, of the rate",
-    "noise known": "noise can be told from structure",
-    "carries over": "runs held out are explained too",
+    "untested": "what leaves it untested",
     "without fluid": "records show nothing of the fluid",
-    "not judging": "runs held out that cannot judge",
     "worst run": "run missed most",
     "worst run error": "its error",
+    "bench / stress gain": "stress gain, fitted along",
+    "bench / clock": "relaxation times, fitted along: relative deviation",
+    "bench / rate gain": "rate gain, fitted along",
+    "bench / tool compliance": "compliance of the tool, fitted along, 1/Pa",
+    "bench / time delay": "delay, fitted along, s",
     "loading deviation": "loadings are taken to differ by, relative standard deviation",
-    "read otherwise": "how else the runs may have been read",
     "description": "in words",
 }
 """What is said of the residual, for those who do not read the JSON."""

@@ -104,7 +104,12 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     """Return what the data say of a constant by mode."""
     symbol = readable(effect_title(name))
     gains = [significant(gain, 2) for gain in constant.evidence[1:]]
-    tried = f" (evidence over one constant, {listed(_TRIED[: len(gains)])}: {listed(gains)})"
+    which = (
+        f", {listed(_TRIED[: len(gains)])}"
+        if len(gains) > 1 or constant.degree < len(_TRIED)
+        else ""
+    )
+    tried = f" (evidence over one constant{which}: {listed(gains)})"
     text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
     if constant.is_raised:
         text += ", since runs held out refute less, which the fitted ones would be content with"

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.patches import Patch
 
-from discover.closed_loop.results.loop_result import LoopResult
 from discover.comparison.comparison import Comparison
 from discover.dataset.run import sizes_of
 from discover.learners.registry import learner_title
+from discover.loop.loop_result import LoopResult
 from discover.report.plots.comparison.flows import units
 from discover.report.plots.loop.runs import along_in_common, models_of, shortened
 from discover.report.plots.style import (

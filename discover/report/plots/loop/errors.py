@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discover.closed_loop import LoopResult
+from discover.loop import LoopResult
 from discover.report.plots.loop.runs import FIT_COLOUR, HELD_COLOUR, shortened
 from discover.report.plots.style import (
     BEFORE,
@@ -80,22 +80,21 @@ def ranking_picture(result: LoopResult) -> Picture | None:
             chosen = result.stages[number].effect if number < len(result.stages) else None
             panel.barh(
                 [effect_title(c.effect) for c in best],
-                [100.0 * max(c.reduction, 0.0) for c in best],
+                [100.0 * max(c.score, 0.0) for c in best],
                 color=[GREEN if c.effect == chosen else BEFORE for c in best],
             )
             panel.set_xlim(0, 100)
             kept = any(c.effect == chosen for c in best)
             said = "" if kept else ": taken later" if chosen else ": none added"
             panel.set_title(f"stage {number + 1}{said}")
-            panel.set_xlabel("squared residual removed (%)")
+            panel.set_xlabel("squared residual explained (%)")
             panel.tick_params(axis="y", labelsize=7.5)
         return picture(
             drawing,
             "ranking",
-            "What each candidate, tried alone, would remove of the squared residual of the fitted "
-            "runs; in green the one that was added. It is chosen by evidence and by runs left out, "
-            "so it need not be the longest bar; at the end the effects are examined again, and "
-            "another may take the place of one.",
+            "What each candidate would explain of the squared residual of the fitted runs, to "
+            "first order and beside what is fitted already; in green the one that was added. "
+            "Evidence chooses among sets of effects, so it need not be the longest bar.",
         )
 
 

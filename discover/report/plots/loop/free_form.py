@@ -1,6 +1,6 @@
 """Free functions that explain what named effects leave."""
 
-from discover.closed_loop import LoopResult
+from discover.loop import LoopResult
 from discover.report.free_form_words import free_form_sentence
 from discover.report.plots.style import NETWORK, SHADE, Picture, figure, legend_above, picture
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discover.closed_loop.results.loop_result import LoopResult
-from discover.closed_loop.results.waves import oscillation
+from discover.loop.loop_result import LoopResult
+from discover.loop.waves import oscillation
 from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.loop.runs import draw_overlays, draw_run, short_title

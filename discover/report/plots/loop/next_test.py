@@ -1,6 +1,6 @@
 """What to measure next: what each explanation of a closed loop predicts in the test proposed."""
 
-from discover.closed_loop import LoopResult
+from discover.loop import LoopResult
 from discover.protocols.kinematics import MODULI
 from discover.report.plots.style import (
     CHOSEN_STYLE,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from discover.closed_loop import LoopResult
-from discover.closed_loop.results.reading import differences
+from discover.loop import LoopResult
+from discover.loop.reading import differences
 from discover.report.plots.loop.runs import (
     FIT_COLOUR,
     HELD_COLOUR,

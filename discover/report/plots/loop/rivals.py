@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discover.closed_loop import LoopResult
+from discover.loop import LoopResult
 from discover.report.plots.loop.runs import FIT_COLOUR, HELD_COLOUR
 from discover.report.plots.style import (
     INK,
@@ -44,7 +44,6 @@ def rivals_picture(result: LoopResult) -> Picture | None:
                 )  # fmt: skip
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
             names = "\n+ ".join(map(effect_title, one.effects)) or "the declared model alone"
-            names += "\n+ a bench a little off" if one.bench else ""
             found = ", found by the search" if one is chosen else ""
             panel.set_title(f"{names}\n({percent(one.probability)}{found})", fontsize=8)
             panel.axhline(0.0, color=INK, lw=0.6)

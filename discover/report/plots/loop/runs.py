@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import EngFormatter
 
-from discover.closed_loop import LoopResult, RunRecord
+from discover.loop import LoopResult, RunRecord
 from discover.protocols.kinematics import MODULI
 from discover.report.overlay import Overlay
 from discover.report.plots.cycles import shade_between

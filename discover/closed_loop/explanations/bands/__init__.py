@@ -1,1 +1,0 @@
-"""How far predictions and constants are known, over all explanations."""

@@ -1,1 +1,0 @@
-"""What a closed loop found, as data: for people, pictures and other programs."""

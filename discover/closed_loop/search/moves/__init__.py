@@ -1,1 +1,0 @@
-"""What a search does with the effects of its model but adding one: exchange, look ahead, drop."""

@@ -1,0 +1,6 @@
+"""One probabilistic engine: hypotheses, their evidence, what they leave, and their posterior."""
+
+from discover.inference.engine.posterior import Band, Explanation, Posterior, explain
+from discover.inference.engine.problem import Problem
+
+__all__ = ["Band", "Explanation", "Posterior", "Problem", "explain"]

@@ -1,0 +1,281 @@
+"""The next test: which one is expected to tell hypotheses apart.
+
+If hypothesis i is right, a test is expected to speak against j with a log likelihood ratio of
+
+    E_ij = ½ dᵀ (S + A_i A_iᵀ + A_j A_jᵀ)⁻¹ d,    d = y_i − y_j,
+
+S of the noise and A Aᵀ of what uncertain constants change: a difference that readjusting them
+within their intervals would remove is no evidence   [Box & Hill 1967, Technometrics 9, 57]. What it
+is expected to say of which one is right is at least
+
+    −Σ_i p_i ln Σ_j p_j exp(−E_ij/4)
+
+[lower bound of the entropy of a mixture, by the Bhattacharyya distance between normal distributions
+of one covariance: Kolchinsky & Tracey 2017, Entropy 19, 361].
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward import make_batch
+from discover.inference.engine.fits import Fit
+from discover.inference.engine.possible_tests import PossibleTest, possible_tests
+from discover.inference.engine.posterior import Posterior
+from discover.protocols.kinematics import RecordedQuantity
+from discover.statistics.projection import rms
+
+DECISIVE = 5.0
+"""Log odds from which on a test decides: one against 150."""
+
+_MOST = 6
+"""Hypotheses that are told apart, the likeliest."""
+
+_LEAST_LIKELY = 0.02
+_NOT_BELIEVED = 0.9
+"""Probability of none of them from which on it is idle to ask which one it is."""
+
+_MOST_EVIDENCE = 500.0
+
+_BY_GAP = ("wall_slip", "tool_compliance")
+"""What half the gap doubles: a velocity of slip, and a strain that the tool takes."""
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """One test, and what it is expected to decide.
+
+    Attributes
+    ----------
+    title
+        In words, with numbers.
+    quantity
+        What is recorded.
+    nats
+        Information that it is expected to give on which hypothesis is right.
+    evidence
+        Expected logarithm of the odds between each pair of hypotheses, shape (e, e).
+    samples, curves
+        Where each hypothesis predicts what, shapes (n,) and (e, n): times in s, of a flow curve
+        the rates in 1/s.
+    is_flow_curve
+        Whether it is one.
+    """
+
+    title: str
+    quantity: RecordedQuantity
+    nats: float
+    evidence: Float[np.ndarray, "e e"]
+    samples: Float[np.ndarray, " n"]
+    curves: Float[np.ndarray, "e n"]
+    is_flow_curve: bool = False
+
+    @property
+    def pairs(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of hypotheses between which it is expected to decide."""
+        decided = np.argwhere(np.triu(self.evidence, 1) >= DECISIVE)
+        return tuple((int(i), int(j)) for i, j in decided)
+
+
+@dataclass(frozen=True)
+class NextTests:
+    """The tests that were weighed, the most telling first.
+
+    Attributes
+    ----------
+    explanations
+        Sets of effects that are to be told apart, the likeliest first; twins each by itself.
+    probabilities
+        Of each, were it one of them.
+    noise
+        Relative, with what the likeliest leaves of the fitted runs.
+    tests
+        Among those that could be run.
+    """
+
+    explanations: tuple[tuple[str, ...], ...] = ()
+    probabilities: tuple[float, ...] = ()
+    noise: float = 0.0
+    tests: tuple[NextTest, ...] = field(default_factory=tuple)
+
+    @property
+    def open_nats(self) -> float:
+        """What is not known of which hypothesis is right: the most that a test can tell."""
+        p = np.array([one for one in self.probabilities if one > 0.0])
+        return float(-np.sum(p * np.log(p)))
+
+    @property
+    def best(self) -> NextTest | None:
+        """The test that tells most, if any decides between two of them."""
+        return next((one for one in self.tests if one.pairs), None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``loop.json`` holds of them."""
+        return {
+            "explanations": self.explanations,
+            "probabilities": self.probabilities,
+            "open_nats": self.open_nats,
+            "noise": self.noise,
+            "tests": [
+                {
+                    "test": one.title,
+                    "observe": one.quantity,
+                    "nats": one.nats,
+                    "separates": [
+                        [self.explanations[i], self.explanations[j]] for i, j in one.pairs
+                    ],
+                }
+                for one in self.tests
+            ],
+        }
+
+
+def design(posterior: Posterior) -> NextTests:
+    """Return the tests that could be run, the most telling first.
+
+    None for one hypothesis alone, or where it is hardly any of them.
+    """
+    weighed = _contenders(posterior)
+    if len(weighed) < 2 or posterior.unexplained > _NOT_BELIEVED:
+        return NextTests()
+    problem, share = posterior.problem, np.array([p for _, p in weighed])
+    share = share / np.sum(share)
+    varied = [_varied(fit) for fit, _ in weighed]
+    best, runs = weighed[0][0], problem.fitted.runs
+    rows = problem.fitted
+    off = (rows.recorded - posterior.search.fitter.record(best)) / rows.size
+    noise = max(best.noise.common, float(rms(off)))
+    fresh = (1.0 - best.noise.correlation) / (1.0 + best.noise.correlation)
+    longest = float(np.max(np.asarray(problem.declared.relaxation_time)))
+    tests = possible_tests(runs, longest)
+
+    def weigh(tests: Sequence[PossibleTest], thetas: Sequence[Sequence[np.ndarray]]):
+        for test, predicted in zip(tests, _predicted(posterior, thetas, tests), strict=True):
+            one = _expected_of(test, predicted, share, noise, fresh, problem.loading)
+            if one is not None:
+                yield one
+
+    found = list(weigh(tests, varied))
+    kept = [run for run in runs if run.protocol.control == "rate"]
+    if kept:
+        fastest = max(kept, key=lambda run: float(np.max(np.abs(run.rate))))
+        for title, changed in _elsewhere(posterior):
+            again = PossibleTest(f"{fastest.name} again, {title}", fastest)
+            found += weigh([again], [[changed(theta) for theta in some] for some in varied])
+    found.sort(key=lambda one: -round(one.nats, 2))  # the simplest first among equals
+    names = tuple(fit.names for fit, _ in weighed)
+    return NextTests(names, tuple(map(float, share)), noise, tuple(found))
+
+
+def _contenders(posterior: Posterior) -> list[tuple[Fit, float]]:
+    """Return what may be right, twins each by itself, and how probable each is."""
+    smallest = {names for one in posterior.explanations for names in one.members}
+    found = [(fit, p) for fit, p in posterior.fits if fit.names in smallest][:_MOST]
+    return [pair for pair in found if pair[1] >= _LEAST_LIKELY * found[0][1]]
+
+
+def _varied(fit: Fit) -> list[Float[np.ndarray, " p"]]:
+    """Return the constants of a fit, and each combination of them that varies by itself."""
+    assert fit.covariance is not None
+    n = len(fit.priors)
+    root = np.linalg.cholesky(fit.covariance[:n, :n])
+    return [fit.theta, *(fit.at(fit.coordinates + column) for column in root.T)]
+
+
+def _predicted(
+    posterior: Posterior, thetas: Sequence[Sequence[np.ndarray]], tests: Sequence[PossibleTest]
+) -> Iterator[list[Float[np.ndarray, "_ n"]]]:
+    """Return what each hypothesis predicts of each test, with its variations."""
+    if not tests:
+        return
+    flat = np.array([theta for some in thetas for theta in some])
+    ends = np.cumsum([len(some) for some in thetas])[:-1]
+    with np.errstate(all="ignore"):
+        found = posterior.problem.model.predictions(flat, make_batch([t.run for t in tests]))
+    for i, test in enumerate(tests):
+        yield np.split(found[:, i, : len(test.run)], ends)
+
+
+def _elsewhere(
+    posterior: Posterior,
+) -> Iterator[tuple[str, Callable[[np.ndarray], np.ndarray]]]:
+    """Yield what else may be changed of a run than its flow, and what that does to constants."""
+    problem = posterior.problem
+    model, zero = problem.model, problem.zero
+    names = {name for fit, _ in posterior.fits for name in fit.names}
+    by_gap = [model.positions(name)[0] for name in _BY_GAP if name in names]
+    outside = [
+        p for name in names if problem.effects[name].kind != "constitutive"
+        for p in model.positions(name)
+    ]  # fmt: skip
+
+    def half(theta: np.ndarray) -> np.ndarray:
+        changed = theta.copy()
+        changed[by_gap] *= 2.0
+        return changed
+
+    def other(theta: np.ndarray) -> np.ndarray:
+        changed = theta.copy()
+        changed[outside] = zero[outside]
+        return changed
+
+    if by_gap:
+        yield "with half the gap", half
+    if outside:
+        yield "on another instrument, without flaws of this one", other
+
+
+def _expected_of(
+    test: PossibleTest,
+    predicted: Sequence[Float[np.ndarray, "_ n"]],
+    share: Float[np.ndarray, " e"],
+    noise: float,
+    fresh: float,
+    loading: float,
+) -> NextTest | None:
+    """Return what a test is expected to tell; None if not every hypothesis can be followed.
+
+    Where loadings differ a factor between two hypotheses is no difference of these.
+    """
+    curves = np.stack([of[0] for of in predicted])
+    if not np.all(np.isfinite(curves)):
+        return None
+    is_flow_curve = test.run.protocol.control == "steady"
+    size = np.abs(curves[0]) if is_flow_curve else rms(curves[0])
+    scale = np.maximum(noise * size, np.finfo(float).tiny) / np.sqrt(fresh)
+    factors = [_factor(of / scale) for of in predicted]
+    count = len(curves)
+    evidence = np.zeros((count, count))
+    for i in range(count):
+        for j in range(i):
+            factor = np.concatenate([factors[i], factors[j]])
+            if loading:
+                factor = np.vstack([factor, loading * curves[i] / scale])
+            apart = 0.5 * squared_distance((curves[i] - curves[j]) / scale, factor)
+            evidence[i, j] = evidence[j, i] = min(apart, _MOST_EVIDENCE)
+    nats = float(-share @ np.log(np.exp(-0.25 * evidence) @ share))
+    samples = test.run.rate if is_flow_curve else test.run.time
+    return NextTest(test.title, test.run.quantity, nats, evidence, samples, curves, is_flow_curve)
+
+
+def _factor(group: Float[np.ndarray, "varied n"]) -> Float[np.ndarray, "k n"]:
+    """Return F with FᵀF the covariance of a prediction; the prediction itself comes first."""
+    varied = group[1:][np.all(np.isfinite(group[1:]), axis=1)]
+    return varied - group[0]
+
+
+def squared_distance(
+    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
+) -> float:
+    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
+
+    By singular values: what nearly runs away spreads so far that the k × k matrix of Woodbury's
+    identity is singular to rounding.
+    """
+    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
+    along = rows @ difference
+    beside = difference - along @ rows
+    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))

@@ -1,0 +1,326 @@
+"""Discrepancy: what no hypothesis holds, in the law and in the records, with a size.
+
+To first order about a fit the records are
+
+    y = m + J dθ + Σ_i c_i u_i + d_r + ε,    c_i ~ N(0, (τ w_i)²),    d_r = Σ_k b_rk cos(π k x),
+
+with u_i the signatures of all effects and terms that are not in the hypothesis, each a third of the
+record at τ = 1 (this is the dense library, and says something of any flow), and d_r a smooth curve
+along the samples of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the shear rate   [Kennedy
+& O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415, for τ by evidence].
+ρ, τ, the stiffness of S and the growth are summed over a grid.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.linalg import solve_triangular
+from scipy.special import logsumexp
+
+from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
+from discover.inference.engine.noise import Noise
+
+CURVES = (0.3, 0.7, 2.0, 6.0, 18.0, 60.0)
+"""Sizes of d over the noise."""
+
+STIFFNESS = (2.5, 8.0)
+"""Half swings of a run from which on S falls."""
+
+GROWTHS = (0.0, 1.0, 2.0)
+"""Powers of the largest shear rate of a run with which its d grows."""
+
+TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
+"""τ."""
+
+_MODES = 20
+_THIRD = 1.0 / 3.0
+
+_CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
+"""Ends of the cells of ρ of which `CURVES` are the middles."""
+
+_LIKELY = 7.0
+_MOST = 12
+
+
+@dataclass(frozen=True)
+class Member:
+    """One discrepancy of the grid.
+
+    Attributes
+    ----------
+    curve, stiffness, growth, terms
+        ρ over the noise, half swings, power of the rate, τ.
+    which, correlation
+        Its curve in the grid, zero for none, and the correlation of the noise beside it.
+    log_weight
+        Log of its probability among all of the hypothesis.
+    noise
+        Size of the noise over the records.
+    mean, root
+        Of the constants and terms, in units of their priors: the covariance is noise² root rootᵀ.
+    """
+
+    curve: float
+    stiffness: float
+    growth: float
+    terms: float
+    which: int
+    correlation: float
+    log_weight: float
+    noise: float
+    mean: Float[np.ndarray, " m"]
+    root: Float[np.ndarray, "m used"]
+
+
+class _Products(NamedTuple):
+    """Products of what was left and columns, curves being integrated out; and those with curves.
+
+    Attributes
+    ----------
+    gram
+        Shape (1 + grid, 1 + m, 1 + m), without a curve first.
+    log_determinant
+        Shape (1 + grid,).
+    cross, inner
+        Of curves with the others and with themselves, of each run.
+    """
+
+    gram: Float[np.ndarray, "grid n n"]
+    log_determinant: Float[np.ndarray, " grid"]
+    cross: Float[np.ndarray, "runs k n"]
+    inner: Float[np.ndarray, "runs k k"]
+
+
+class Discrepancy:
+    """What the records say beside a hypothesis that none of its constants does.
+
+    Parameters
+    ----------
+    fitter, fit
+        A hypothesis with derivatives, and what fitted it.
+    smallest
+        What the least effect of the hypothesis takes away over the noise: a discrepancy is as
+        likely of any size up to that.
+
+    Attributes
+    ----------
+    names, shares
+        Effects and terms that are not in the hypothesis, and the amplitude of each that changes
+        the records by a third.
+    log_factor
+        Log of how many times likelier the records are with a discrepancy than without.
+    members
+        The likeliest of the grid.
+    """
+
+    def __init__(self, fitter: Fitter, fit: Fit, smallest: float = np.inf):
+        assert fit.jacobian is not None
+        self.fitter, self.fit, self.smallest = fitter, fit, smallest
+        rows = fitter.rows
+        self.record = fitter.record(fit)
+        pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
+        self.widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths])
+        centres = np.array([p.centre for p in fit.priors.values()])
+        self.offset = np.concatenate([fit.coordinates - centres, fit.linear])
+        self.names, self._steps = self._others()
+        unused = self.signatures(fitter, fit.predicted)
+        size = np.sqrt(np.mean((unused / rows.size[:, None]) ** 2, axis=0))
+        self.shares = np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
+        self.columns = np.column_stack([fit.jacobian * self.widths, unused * self.shares])
+        self.left = rows.recorded - self.record + fit.jacobian @ self.offset
+        self.growth = np.log(rows.fastest / np.max(rows.fastest))
+        self._curves = _cosines(rows.run, len(rows.runs)) * rows.size[:, None]
+        self._grid = list(product(CURVES, STIFFNESS, GROWTHS))
+        self._kept: dict[float, _Products] = {}
+        self.members, self.log_factor = self._weighed()
+
+    def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
+        problem = self.fitter.problem
+        names = [e.name for e in problem.candidates if e.name not in self.fit.names]
+        return names, np.array([1e-2 * problem.priors((n,))[self._at(n)].width for n in names])
+
+    def _at(self, name: str) -> int:
+        return self.fitter.problem.model.positions(name)[0]
+
+    def signatures(
+        self, fitter: Fitter, predicted: Float[np.ndarray, " rows"]
+    ) -> Float[np.ndarray, "rows k"]:
+        """Return what one of each effect that is not there does to records, in Pa."""
+        thetas = []
+        for name, step in zip(self.names, self._steps, strict=True):
+            theta = self.fit.theta.copy()
+            theta[self._at(name)] += step
+            thetas.append(theta)
+        found = (fitter.predict(thetas) - predicted).T / self._steps
+        return np.where(np.all(np.isfinite(found), axis=0), found, 0.0)
+
+    # the grid ---------------------------------------------------------------------------------
+
+    def _scale(self, terms: float) -> Float[np.ndarray, " m"]:
+        """Return the prior deviations of constants and terms, over the noise."""
+        scale = np.full(self.columns.shape[1], 1.0 / self.fit.noise.common)
+        scale[len(self.widths) :] *= terms
+        return scale
+
+    def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
+        """Return the deviations of the curves of each run, for each curve of the grid."""
+        k = np.arange(_MODES)
+        found = []
+        for size, stiffness, growth in self._grid:
+            power = 1.0 / (1.0 + (k / stiffness) ** 4)
+            # a cosine has half of the square of its size, a constant all of it
+            power /= np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
+            found.append(size * power * np.exp(growth * self.growth)[:, None])
+        return np.array(found)
+
+    def _products(self, correlation: float) -> "_Products":
+        """Return products of what was left, columns and curves of each run, whitened."""
+        if correlation not in self._kept:
+            noise = Noise(self.sizes_of_noise, 1.0, correlation, self.fit.noise.share)
+            both = np.column_stack([self.left, self.columns, self._curves])
+            white = self.fitter.noise.whitened(both, self.record, noise)
+            run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
+            plain, cross, inner = [], [], []
+            for i in range(len(self.growth)):
+                own = white[run == i, :m]
+                curve = white[run == i, m + i * _MODES : m + (i + 1) * _MODES]
+                plain.append(own.T @ own)
+                cross.append(curve.T @ own)
+                inner.append(curve.T @ curve)
+            d = self._deviations()
+            scaled = d[..., :, None] * np.array(inner) * d[..., None, :]
+            chol = np.linalg.cholesky(np.eye(_MODES) + scaled)
+            along = np.linalg.solve(chol, d[..., None] * np.array(cross))
+            grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
+            logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
+            total = np.sum(np.concatenate([np.array(plain)[None], grams]), axis=1)
+            base = self.fitter.noise.log_determinant(self.record, noise)
+            self._kept[correlation] = _Products(
+                total, base - np.append(0.0, logs), np.array(cross), np.array(inner)
+            )
+        return self._kept[correlation]
+
+    @property
+    def sizes_of_noise(self) -> Float[np.ndarray, " runs"]:
+        """Noise of each run over that of all, as samples scatter about a smooth curve."""
+        rows = self.fitter.rows
+        left = (rows.recorded - self.record) / rows.size
+        own = [left[rows.run == i] for i in range(len(rows.runs))]
+        found = np.array([np.mean(np.diff(x, 2) ** 2) / 6.0 if len(x) > 4 else np.nan for x in own])
+        usual = np.nanmedian(found) if np.any(np.isfinite(found)) else 1.0
+        usual = max(float(usual), 1e-300)
+        count = np.array([len(x) for x in own], float)
+        shared = (4.0 * usual + count * np.where(np.isfinite(found), found, usual)) / (4.0 + count)
+        return np.sqrt(shared / np.mean(shared))
+
+    def _weighed(self) -> tuple[list[Member], float]:
+        n, own = len(self.fitter.noise.kept), self._priors()
+        some, plain = [], []
+        for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
+            total, logs, *_ = self._products(correlation)
+            known = np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
+            for terms in TERMS:
+                scale = self._scale(terms)
+                used = scale > 0
+                matrix = scale[used, None] * total[:, 1:, 1:][:, used][:, :, used] * scale[used]
+                chol = np.linalg.cholesky(np.eye(matrix.shape[1]) + matrix)
+                ahead = np.linalg.solve(chol, (scale * total[:, 0, 1:])[:, used, None])[..., 0]
+                squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 1e-300)
+                values = logs + known - np.sum(np.log(np.diagonal(chol, axis1=1, axis2=2)), axis=1)
+                values -= 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
+                prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
+                for which, (value, square) in enumerate(zip(values, squares, strict=True)):
+                    if which or terms:
+                        log = value + prior + (own[which - 1] if which else np.log(0.1))
+                        some.append((log, correlation, terms, which, np.sqrt(square / n)))
+                    else:
+                        plain.append(value)
+        none, weights = logsumexp(plain), np.array([one[0] for one in some])
+        total = logsumexp(weights)
+        members = []
+        for at in np.argsort(-weights)[:_MOST]:
+            weight, correlation, terms, which, noise = some[at]
+            if weight - total < -_LIKELY:
+                break
+            mean, root = _posterior(self._products(correlation).gram[which], self._scale(terms))
+            kind = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+            members.append(
+                Member(*kind, terms, which, correlation, weight - total, noise, mean, root)
+            )
+        return members, float(total - none)
+
+    def _priors(self) -> Float[np.ndarray, " grid"]:
+        """Return the log prior of each curve.
+
+        Sizes are uniform up to what the smallest effect takes away, and a fifth asks nothing of
+        them. What is too small to be seen is no discrepancy.
+        """
+        ends, limit = np.array(_CELLS), self.smallest
+        share = np.full(len(CURVES), 1.0 / len(CURVES))
+        if np.isfinite(limit):
+            inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
+            share = 0.8 * inside + 0.2 * share
+        per = len(STIFFNESS) * len(GROWTHS)
+        return np.log([share[CURVES.index(size)] / per for size, _, _ in self._grid])
+
+    def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:
+        """Return draws of the root mean square of the discrepancy of each run, over its size."""
+        rows, c = self.fitter.rows, len(self.widths)
+        weights = np.exp([member.log_weight for member in self.members])
+        chosen = lot.choice(len(weights), draws, p=weights / np.sum(weights))
+        found = np.zeros((draws, len(self.growth)))
+        for number, member in enumerate(self.members):
+            at = np.flatnonzero(chosen == number)
+            if not len(at):
+                continue
+            normal = lot.standard_normal((len(at), member.root.shape[1]))
+            own = member.mean + member.noise * normal @ member.root.T
+            off = own[:, c:] @ self.columns[:, c:].T
+            if member.which:
+                off = off + self._drawn_curves(member, own, lot)
+            for i in range(len(self.growth)):
+                part = off[:, rows.run == i] / rows.size[rows.run == i]
+                found[at, i] = np.sqrt(np.mean(part**2, axis=1))
+        return found
+
+    def _drawn_curves(self, member: Member, own: np.ndarray, lot: np.random.Generator):
+        """Return draws of the curves of all runs, given constants and terms, in Pa."""
+        products, out = self._products(member.correlation), np.zeros((len(own), len(self.left)))
+        deviations = self._deviations()[member.which - 1]
+        for i, d in enumerate(deviations):
+            inner = np.eye(_MODES) + d[:, None] * products.inner[i] * d
+            right = d[:, None] * (products.cross[i][:, :1] - products.cross[i][:, 1:] @ own.T)
+            middle = np.linalg.solve(inner, right).T
+            normal = lot.standard_normal(middle.shape)
+            spread = member.noise * np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
+            curves = self._curves[:, i * _MODES : (i + 1) * _MODES]
+            out += ((middle + spread) * d) @ curves.T
+        return out
+
+
+def _posterior(
+    gram: Float[np.ndarray, "one_more one_more"], scale: Float[np.ndarray, " m"]
+) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m used"]]:
+    """Return mean and root of the covariance of coefficients, for noise of size one."""
+    used = np.flatnonzero(scale > 0)
+    own = scale[used]
+    inner = own[:, None] * gram[1:, 1:][np.ix_(used, used)] * own
+    factor = np.linalg.cholesky(np.eye(len(used)) + inner)
+    inverse = solve_triangular(factor, np.eye(len(used)), lower=True).T
+    mean, root = np.zeros(len(scale)), np.zeros((len(scale), len(used)))
+    mean[used] = own * (inverse @ (inverse.T @ (own * gram[1:, 0][used])))
+    root[used] = own[:, None] * inverse
+    return mean, root
+
+
+def _cosines(run: np.ndarray, runs: int) -> Float[np.ndarray, "rows curves"]:
+    """Return cosines along the samples of each run, zero in the others."""
+    out = np.zeros((len(run), runs * _MODES))
+    for i in range(runs):
+        at = np.flatnonzero(run == i)
+        x = (np.arange(len(at)) + 0.5) / len(at)
+        out[at, i * _MODES : (i + 1) * _MODES] = np.cos(np.pi * np.outer(x, np.arange(_MODES)))
+    return out

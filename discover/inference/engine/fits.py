@@ -1,0 +1,328 @@
+"""Likeliest constants of hypotheses, by Gauss-Newton steps of many fits side by side."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.inference.engine.noise import Noise, NoiseModel
+from discover.inference.engine.priors import Prior
+from discover.inference.engine.problem import SOUND_GAIN, SOUND_ZERO, Problem
+from discover.inference.engine.rows import Rows
+
+_STEP = 1e-4
+"""Of the width of a prior: step of a difference."""
+
+_MOVED = 0.1
+"""Standard deviations by which moduli are moved; records at a given rate are linear in them."""
+
+_DAMPINGS = (0.1, 3.0, 100.0)
+"""Multiples of the last damping that are tried side by side."""
+
+_ENOUGH = 0.01
+"""Gain of log posterior of a step below which a fit has ended."""
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@dataclass(eq=False)
+class Fit:
+    """A hypothesis at its likeliest constants.
+
+    Attributes
+    ----------
+    names
+        Effects that are there, in alphabetical order.
+    theta
+        Constants of the model, shape (p,).
+    linear
+        What is linear in the records: gain, zeros, drifts, loadings, moduli, shape (q,).
+    priors
+        Of the constants that are free, by position.
+    predicted
+        Records as predicted, in Pa, shape (rows,).
+    log_likelihood, log_posterior
+        At these constants, over all noises.
+    noise
+        The likeliest noise.
+    jacobian
+        Derivatives of `predicted` with respect to the coordinates of the free constants, then of
+        what is linear, shape (rows, free + q).
+    covariance
+        Of these, shape (free + q, free + q).
+    log_evidence
+        Of the records given the hypothesis, by Laplace's method; minus infinity where an effect
+        ends at zero or the law runs away.
+    at_an_end
+        Effects whose amplitude ended at zero.
+    """
+
+    names: tuple[str, ...]
+    theta: Float[np.ndarray, " p"]
+    linear: Float[np.ndarray, " q"]
+    priors: Mapping[int, Prior]
+    predicted: Float[np.ndarray, " rows"]
+    log_likelihood: float
+    log_posterior: float
+    noise: Noise
+    jacobian: Float[np.ndarray, "rows n"] | None = None
+    covariance: Float[np.ndarray, "n n"] | None = None
+    log_evidence: float = -np.inf
+    at_an_end: tuple[str, ...] = ()
+    damping: float = 1e-2
+    memory: dict = field(default_factory=dict)
+
+    @property
+    def free(self) -> list[int]:
+        """Positions of the free constants."""
+        return list(self.priors)
+
+    @property
+    def coordinates(self) -> Float[np.ndarray, " free"]:
+        """Coordinates of the free constants."""
+        return np.array([p.to_coordinate(self.theta[at]) for at, p in self.priors.items()])
+
+    def at(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, " p"]:
+        """Return the constants at other coordinates of what is free, inside their ranges."""
+        theta = self.theta.copy()
+        for (at, prior), value in zip(self.priors.items(), coordinates, strict=True):
+            theta[at] = prior.to_value(np.clip(value, *prior.ends))
+        return theta
+
+
+class Fitter:
+    """Fits of hypotheses of a problem to some of its rows.
+
+    Parameters
+    ----------
+    problem, rows
+        The problem, and what is predicted of it.
+    without
+        A run that is predicted and not fitted; None for none.
+    """
+
+    def __init__(self, problem: Problem, rows: Rows, without: int | None = None):
+        self.problem, self.rows = problem, rows
+        self.noise = NoiseModel(rows, without, problem.noise)
+        self._shifts = self._modulus_shifts()
+        self.widths = self._widths()
+
+    # what is linear ---------------------------------------------------------------------------
+
+    def _modulus_shifts(self) -> Float[np.ndarray, "rows k"]:
+        """Return the change of predictions with each independent error of the moduli, in Pa."""
+        root, model, rows = self.problem.modulus_root, self.problem.model, self.rows
+        if root is None:
+            return np.zeros((len(rows), 0))
+        moves = np.zeros((root.shape[1], len(self.problem.moduli)))
+        moves[:, : len(root)] = _MOVED * root.T
+        moduli = self.problem.moduli + np.concatenate([moves, -moves])
+        zero = np.tile(self.problem.zero, (len(moduli), 1))
+        found = rows.flat(model.predictions(zero, rows.batch, moduli))
+        columns = (found[: len(moves)] - found[len(moves) :]) / (2.0 * _MOVED)
+        return np.nan_to_num(columns.T)
+
+    def _widths(self) -> Float[np.ndarray, " q"]:
+        """Return the prior deviations of what is linear, all about zero."""
+        runs, loading = len(self.rows.runs), self.problem.loading
+        loadings = [loading] * runs if loading else []
+        return np.array(
+            [SOUND_GAIN, *[SOUND_ZERO] * (2 * runs), *loadings, *[1.0] * self._shifts.shape[1]]
+        )
+
+    def linear_columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows q"]:
+        """Return what one of each does to the records, in Pa."""
+        rows = self.rows
+        own = rows.run[:, None] == np.arange(len(rows.runs))
+        level = own * rows.size[:, None]
+        drift = level * (rows.time - 0.5)[:, None]
+        loadings = own * predicted[:, None] if self.problem.loading else np.zeros((len(rows), 0))
+        return np.column_stack([predicted, level, drift, loadings, self._shifts])
+
+    # predictions ------------------------------------------------------------------------------
+
+    def predict(self, thetas: Sequence[np.ndarray]) -> Float[np.ndarray, "trials rows"]:
+        """Return the records of the model alone; not finite where the law runs away."""
+        if not len(thetas):
+            return np.zeros((0, len(self.rows)))
+        with np.errstate(all="ignore"):
+            moduli = np.broadcast_to(self.problem.moduli, (len(thetas), len(self.problem.moduli)))
+            model, batch = self.problem.model, self.rows.batch
+            return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
+
+    def start(
+        self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
+    ) -> Fit:
+        """Return a hypothesis before its first step."""
+        priors = self.problem.priors(names)
+        theta = theta.copy()
+        for at, prior in priors.items():
+            theta[at] = np.clip(theta[at], prior.low, prior.high)
+        linear = np.zeros(len(self.widths)) if linear is None else linear
+        nothing = np.full(len(self.rows), np.nan)
+        empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
+        return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
+
+    def _set(self, fit: Fit, predicted: np.ndarray) -> None:
+        """Set what a prediction of the model says of a hypothesis."""
+        record = predicted + self.linear_columns(predicted) @ fit.linear
+        fit.log_likelihood, fit.noise = self.noise.log_likelihood(
+            self.rows.recorded - record, record
+        )
+        fit.predicted = predicted
+        known = sum(
+            p.log_density(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)
+        )
+        known += float(-0.5 * np.sum((fit.linear / self.widths) ** 2))
+        fit.log_posterior = fit.log_likelihood + known
+
+    def _moved(self, fit: Fit) -> list[np.ndarray]:
+        """Return vectors whose differences from the fit are its derivatives."""
+        thetas = []
+        for at, prior in fit.priors.items():
+            moved, coordinate = fit.theta.copy(), prior.to_coordinate(fit.theta[at])
+            step = _STEP * prior.width
+            if coordinate + step > prior.ends[1]:
+                step = -step
+            moved[at] = prior.to_value(coordinate + step)
+            thetas.append(moved)
+        return thetas
+
+    def _columns(self, fit: Fit, moved: np.ndarray) -> Float[np.ndarray, "rows n"]:
+        """Return the derivatives of the records, of predictions at `_moved`."""
+        steps = []
+        for at, prior in fit.priors.items():
+            step = _STEP * prior.width
+            inside = prior.to_coordinate(fit.theta[at]) + step <= prior.ends[1]
+            steps.append(step if inside else -step)
+        own = (moved - fit.predicted).T / np.array(steps)
+        own = np.where(np.all(np.isfinite(own), axis=0), own, 0.0)
+        gain = (
+            1.0
+            + fit.linear[0]
+            + (
+                fit.linear[1 + 2 * len(self.rows.runs) :][self.rows.run]
+                if self.problem.loading
+                else np.zeros(len(self.rows))
+            )
+        )
+        return np.column_stack([own * gain[:, None], self.linear_columns(fit.predicted)])
+
+    def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
+        """Return the records as predicted, with what is linear."""
+        return fit.predicted + self.linear_columns(fit.predicted) @ fit.linear
+
+    # fits ---------------------------------------------------------------------------------------
+
+    def fit(self, starts: Sequence[Fit], rounds: int = 14, derivatives: bool = True) -> list[Fit]:
+        """Return hypotheses at their likeliest constants; all take their steps side by side."""
+        fits = list(starts)
+        for fit, predicted in zip(fits, self.predict([f.theta for f in fits]), strict=True):
+            self._set(fit, predicted)
+        active = [fit for fit in fits if np.isfinite(fit.log_posterior)]
+        for _ in range(rounds):
+            if not active:
+                break
+            self._linearise(active)
+            trials = [trial for fit in active for trial in self._trials(fit)]
+            found = self.predict([theta for theta, _ in trials])
+            still, place = [], 0
+            for fit in active:
+                if self._take(fit, trials[place : place + 3], found[place : place + 3]):
+                    still.append(fit)
+                place += 3
+            active = still
+        if derivatives:
+            usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
+            self._linearise(usable)
+            for fit in usable:
+                self._judge(fit)
+        return fits
+
+    def _linearise(self, fits: Sequence[Fit]) -> None:
+        moved = [self._moved(fit) for fit in fits]
+        found = self.predict([theta for some in moved for theta in some])
+        place = 0
+        for fit, some in zip(fits, moved, strict=True):
+            fit.jacobian = self._columns(fit, found[place : place + len(some)])
+            place += len(some)
+
+    def _normal_equations(self, fit: Fit):
+        """Return gradient and curvature of the log posterior in the coordinates."""
+        assert fit.jacobian is not None
+        record = self.record(fit)
+        both = np.column_stack([fit.jacobian, self.rows.recorded - record])
+        white = self.noise.whitened(both, record, fit.noise)
+        columns, left = white[:, :-1], white[:, -1]
+        curvature, gradient = columns.T @ columns, columns.T @ left
+        n = len(fit.priors)
+        pulls = [p.pull(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
+        own = np.array(pulls).reshape(n, 2)
+        gradient[:n] += own[:, 0]
+        curvature[np.arange(n), np.arange(n)] += own[:, 1]
+        at = np.arange(n, len(gradient))
+        gradient[n:] -= fit.linear / self.widths**2
+        curvature[at, at] += 1.0 / self.widths**2
+        return gradient, curvature
+
+    def _trials(self, fit: Fit) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return vectors to try, and what is linear in them."""
+        gradient, curvature = self._normal_equations(fit)
+        ends = np.array([prior.ends for prior in fit.priors.values()]).reshape(-1, 2)
+        now, n = fit.coordinates, len(fit.priors)
+        free = np.ones(len(gradient), bool)
+        free[:n] = ~(
+            ((now <= ends[:, 0]) & (gradient[:n] < 0)) | ((now >= ends[:, 1]) & (gradient[:n] > 0))
+        )
+        out = []
+        for multiple in _DAMPINGS:
+            step = np.zeros(len(gradient))
+            at = np.flatnonzero(free)
+            inner = curvature[np.ix_(at, at)]
+            damped = inner + multiple * fit.damping * np.diag(np.diag(inner))
+            step[at] = np.linalg.solve(damped, gradient[at])
+            theta = fit.theta.copy()
+            for i, (position, prior) in enumerate(fit.priors.items()):
+                theta[position] = prior.to_value(np.clip(now[i] + step[i], *ends[i]))
+            out.append((theta, fit.linear + step[n:]))
+        return out
+
+    def _take(self, fit: Fit, trials, found) -> bool:
+        """Take the best of some trials; return whether the fit is to go on."""
+        before = fit.log_posterior
+        saved = fit.theta, fit.linear, fit.predicted, fit.log_likelihood, fit.noise
+        best, best_value, chosen = saved, before, None
+        for multiple, (theta, linear), predicted in zip(_DAMPINGS, trials, found, strict=True):
+            fit.theta, fit.linear = theta, linear
+            self._set(fit, predicted)
+            if fit.log_posterior > best_value:
+                best_value, chosen = fit.log_posterior, multiple
+                best = theta, linear, predicted, fit.log_likelihood, fit.noise
+        fit.theta, fit.linear, fit.predicted, fit.log_likelihood, fit.noise = best
+        fit.log_posterior = best_value
+        if chosen is None:
+            fit.damping *= 1e3
+            return fit.damping < 1e4
+        fit.damping = max(fit.damping * chosen, 1e-7)
+        return best_value - before > _ENOUGH
+
+    def _judge(self, fit: Fit) -> None:
+        """Set covariance and evidence of a fit, by Laplace's method."""
+        _, curvature = self._normal_equations(fit)
+        sign, determinant = np.linalg.slogdet(curvature)
+        fit.covariance = np.linalg.inv(curvature)
+        ended = []
+        for name in fit.names:
+            at = self.problem.model.positions(name)[0]
+            prior = fit.priors[at]
+            if prior.low == 0.0 and fit.theta[at] <= 1e-6 * prior.width:
+                ended.append(name)
+        fit.at_an_end = tuple(ended)
+        n = len(curvature)
+        linear = float(-np.sum(np.log(self.widths)) - 0.5 * len(self.widths) * LOG_2PI)
+        fit.log_evidence = (
+            -np.inf
+            if ended or sign <= 0
+            else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
+        )

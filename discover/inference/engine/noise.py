@@ -1,0 +1,144 @@
+"""Noise of records: a size for each run, correlated in time, in proportion to the stress or not.
+
+The residual of a sample over its standard deviation is an AR(1) sequence in each run. The size of
+run r is s_r = a · rms, with 1/s_r² gamma distributed about one a of all runs, so that runs share
+what they can and a loud one speaks softly; it is integrated out   [Gelman et al. 2013, Bayesian
+Data Analysis, ch. 5 and 14]. The correlation and the share of noise in proportion to the stress are
+summed over a grid.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import gammaln, logsumexp
+
+from discover.inference.engine.rows import Rows
+
+CORRELATIONS = (0.0, 0.25, 0.45, 0.6, 0.75, 0.88, 0.95)
+SHARES = (0.0, 0.6, 0.9, 0.985)
+"""Of the variance, what is in proportion to the square of the stress."""
+
+_ALIKE = 4.0
+"""Degrees of freedom by which sizes of runs are alike: two of three within a factor of 1.5."""
+
+_KNOWN = 100.0
+"""The same where the noise is known: within a tenth."""
+
+LEAST = 1e-4
+"""Relative size below which no noise is taken to be: what a model of a fluid is not told to."""
+
+_SHARES = np.array(SHARES)
+
+_GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
+
+
+def _prior(count: int) -> np.ndarray:
+    """Return the log probability of each value: the first, which is none, as that of the others."""
+    return np.log(np.where(np.arange(count) == 0, 0.5, 0.5 / (count - 1)))
+
+
+@dataclass(frozen=True)
+class Noise:
+    """One noise: sizes of runs over their records, correlation, share in proportion."""
+
+    sizes: Float[np.ndarray, " runs"]
+    common: float
+    correlation: float
+    share: float
+
+
+class NoiseModel:
+    """The likelihood of residuals of rows, with noise integrated out.
+
+    Parameters
+    ----------
+    rows
+        The records.
+    without
+        A run that is left out; None for none.
+    known
+        Size over the records, where it is known.
+    """
+
+    def __init__(self, rows: Rows, without: int | None = None, known: float | None = None):
+        self.rows, self.known = rows, known
+        self._alike = _ALIKE if known is None else _KNOWN
+        self.kept = np.flatnonzero(rows.run != without)
+        self._run, self._gap = rows.run[self.kept], rows.gap[self.kept]
+        self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
+        decay = np.array([self._decay(c) for c in CORRELATIONS])
+        self._decays, self._left = decay, np.sqrt(1.0 - decay**2)
+        self._determinants = -np.sum(np.log(self._left), axis=1)
+        self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
+        self._there = np.flatnonzero(self._count)
+        self._starts = np.searchsorted(self._run, self._there)
+
+    def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
+        return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
+
+    def log_determinant(self, predicted: Float[np.ndarray, " rows"], noise: "Noise") -> float:
+        """Return the log determinant of what `whitened` multiplies by."""
+        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
+        decay = self._decay(noise.correlation)
+        return float(-0.5 * np.sum(np.log(1.0 - decay**2)) - np.sum(np.log(deviation)))
+
+    def deviation(self, predicted: Float[np.ndarray, " rows"], share: float):
+        """Return the standard deviation of each row over the size of its run's noise, in Pa."""
+        size = self.rows.size
+        return size * np.sqrt(1.0 - share + share * (predicted / size) ** 2)
+
+    def log_likelihood(
+        self, residual: Float[np.ndarray, " rows"], predicted: Float[np.ndarray, " rows"]
+    ) -> tuple[float, Noise]:
+        """Return the log likelihood over all noises, and the likeliest noise."""
+        if not (np.all(np.isfinite(residual)) and np.max(np.abs(residual / self.rows.size)) < 1e6):
+            return -np.inf, Noise(np.ones(len(self._count)), 1.0, 0.0, 0.0)
+        size = self.rows.size[self.kept]
+        relative = (predicted[self.kept] / size) ** 2
+        spread = size * np.sqrt(1.0 + _SHARES[:, None] * (relative - 1.0))
+        scaled = residual[self.kept] / spread
+        left = (scaled[:, None] - self._decays * scaled[:, None, self._before]) / self._left
+        square = np.full((len(SHARES), len(CORRELATIONS), len(self._count)), 0.0)
+        square[..., self._there] = np.add.reduceat(left**2, self._starts, axis=-1)
+        square = square.reshape(len(_GRID), -1) + LEAST**2 * self._count
+        logs = (self._determinants - np.sum(np.log(spread), axis=1)[:, None]).ravel()
+        values, common = self._marginal(square)
+        values = values + logs
+        values = values + (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
+        best = int(np.argmax(values))
+        share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
+        sizes = np.sqrt((self._alike * common[best] + square[best]) / (self._alike + self._count))
+        return float(logsumexp(values)), Noise(
+            sizes, float(np.sqrt(common[best])), correlation, share
+        )
+
+    def _marginal(self, square: Float[np.ndarray, "grid runs"]):
+        """Return the log density with sizes of runs integrated out, and the likeliest a²."""
+        n, total = self._count, np.sum(self._count)
+        common = np.sum(square, axis=1) / total
+        if self.known is not None:
+            common = np.full_like(common, max(self.known, LEAST) ** 2)
+        for _ in range(6 if self.known is None else 0):
+            weight = np.sum((self._alike + n) / (self._alike * common[:, None] + square), axis=1)
+            common = len(n) / weight
+        runs = (
+            gammaln(0.5 * (self._alike + n))
+            - gammaln(0.5 * self._alike)
+            + 0.5 * self._alike * np.log(self._alike * common[:, None])
+            - 0.5 * (self._alike + n) * np.log(self._alike * common[:, None] + square)
+        )
+        return np.sum(runs, axis=1) - 0.5 * total * np.log(np.pi), common
+
+    def whitened(
+        self,
+        values: Float[np.ndarray, "rows k"],
+        predicted: Float[np.ndarray, " rows"],
+        noise: Noise,
+    ) -> Float[np.ndarray, "rows k"]:
+        """Return columns of the rows that are kept, over independent noise of variance one."""
+        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
+        scaled = values[self.kept] / deviation[:, None]
+        decay = self._decay(noise.correlation)[:, None]
+        return (scaled - decay * scaled[self._before]) / np.sqrt(1.0 - decay**2)

@@ -1,0 +1,248 @@
+"""A model, the records that it is held against, and what is known of its constants beforehand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+from discover.effects import AbstractEffect, EffectParameter, make_effect
+from discover.effects.library_term import LibraryTerm
+from discover.forward import AugmentedModel, DeclaredModel
+from discover.forward.batches import data_scales
+from discover.forward.by_mode import LARGEST
+from discover.inference.engine.priors import Prior
+from discover.inference.engine.rows import Rows
+from discover.statistics import root_of
+
+_TYPICAL = 0.2
+"""Of a record, what an effect that is there changes it by: half are smaller, half larger."""
+
+_FIRST = 3.0
+"""First trials of an amplitude, which is the least width of its prior."""
+
+_SPREAD = 1.5
+"""Standard deviation of the logarithm of a time or a rate whose size alone is known."""
+
+_FEW = 30.0
+"""Ratio of the ends of a range from which on only the order of a constant is known."""
+
+_STARTS = (1.0, 0.2, 5.0)
+"""Multiples of the first trial of an inner time from which fits start."""
+
+TERM_ODDS = 0.15
+"""Prior odds of a term that no law is known by, over those of an effect with a name."""
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """What every sound instrument has a little of, as an effect with a narrow prior.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect whose amplitude it is; empty for the clock.
+    sound
+        Standard deviation in a sound instrument, in the scale of the effect's first trial.
+    source
+        Where that comes from.
+    """
+
+    effect: str
+    sound: float
+    source: str
+
+
+NUISANCES = (
+    Nuisance("rate_gain", 1.0, "gap and angle of a cone are made to 1 % (ISO 3219-2:2021)"),
+    Nuisance("tool_compliance", 0.5, "half of a strain of 1 % at the typical stress"),
+    Nuisance("time_delay", 0.05, "a fortieth of the sampling interval"),
+)
+"""Effects that a sound instrument has a little of; `first_trial` of a gain is 1 %."""
+
+SOUND_GAIN = 0.01
+"""Relative deviation of the calibration of a torque transducer   [ISO 6721-10:2015]."""
+
+SOUND_CLOCK = 0.01
+"""Relative deviation of relaxation times: temperature is held to 0.1 to 0.2 K, and a melt's times
+change by 5 % in 1 K (Ferry 1980, ch. 11)."""
+
+BY_MODE = (1.0, 0.5)
+"""Standard deviations of slope and curvature over a decade of relaxation time, by which a constant
+differs from mode to mode; in e-foldings."""
+
+OWN_OF_A_MODE = 0.3
+"""Standard deviation by which the constant of one mode deviates from that."""
+
+SOUND_ZERO = 0.001
+"""Zero and drift of a record, over its root mean square."""
+
+
+class Problem:
+    """Records of runs under one model with all its candidates.
+
+    Parameters
+    ----------
+    declared
+        The model to start from.
+    candidates
+        Effects that may be there.
+    runs
+        All runs that are fitted, and those that are predicted.
+    loading
+        Relative deviation by which loadings of the sample differ, if each run is its own.
+    noise
+        Of the records, relative to their size, where it is known.
+    """
+
+    def __init__(
+        self,
+        declared: DeclaredModel,
+        candidates: Sequence[AbstractEffect],
+        fitted: Sequence[Run],
+        predicted: Sequence[Run] = (),
+        loading: float = 0.0,
+        noise: float | None = None,
+    ):
+        names = {e.name for e in candidates} | {e.name for e in declared.effects}
+        beside = [make_effect(n.effect) for n in NUISANCES if n.effect not in names]
+        self.declared, self.candidates = declared, tuple(candidates)
+        self.loading, self.noise = loading, noise
+        self.scales = data_scales(fitted)
+        self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
+        effects = [*candidates, *beside]
+        self.model = AugmentedModel(declared, effects, self.scales, self.fitted.batch)
+        self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
+        self.zero, self.moduli = self.model.zero(), self.model.moduli
+        self._priors = self._known()
+        self.always = tuple(sorted(self._priors))
+        self._widths = self._signatures()
+        root = (
+            root_of(declared.modulus_covariance)
+            if declared.modulus_covariance is not None
+            else None
+        )
+        self.modulus_root = None if root is None else np.asarray(root)
+
+    # what is known ---------------------------------------------------------------------------
+
+    def _known(self) -> dict[int, Prior]:
+        """Return priors of what is always free: the declared constants, and the bench."""
+        model, found = self.model, {}
+        for position in model.free_positions:
+            low, high = float(model.low[position]), float(model.high[position])
+            if low > 0.0 and high > _FEW * low:
+                start = float(np.clip(self.zero[position], low, high))
+                found[position] = Prior("logarithm", start, 3.0, low, high)
+            else:
+                width = min(high - low, 10.0)
+                middle = float(self.zero[position])
+                found[position] = Prior("normal", middle, width, low, high)
+        declared = {known.name for known in model.declared.effects}
+        for name in (*declared, *(p.name for p in model.declared.free_parameters)):
+            found |= self._by_mode(name)
+        found.setdefault(1, Prior("normal", 0.0, SOUND_CLOCK))
+        for nuisance in NUISANCES:
+            effect = self.effects[nuisance.effect]
+            first = effect.parameters[0]
+            unit = ({"one": 1.0} | self.scales)[first.scale]
+            position = model.positions(effect.name)[0]
+            if position in found or effect.name in declared:
+                continue
+            found[position] = Prior(
+                "normal", 0.0, nuisance.sound * first.first_trial * unit,
+                float(model.low[position]), float(model.high[position]),
+            )  # fmt: skip
+        for position in range(model.instants.start, model.instants.stop):
+            found[position] = Prior("normal", 0.5, 0.29, 0.0, 1.0)
+        return found
+
+    def _by_mode(self, name: str) -> dict[int, Prior]:
+        """Return the priors of what varies a constant from mode to mode, on its link's scale."""
+        varying = self.model.varying(name)
+        widths = [*BY_MODE, *[OWN_OF_A_MODE] * (len(varying) - len(BY_MODE))]
+        ends = -LARGEST, LARGEST
+        return {at: Prior("normal", 0.0, w, *ends) for at, w in zip(varying, widths, strict=False)}
+
+    def _signatures(self) -> dict[str, float]:
+        """Return the amplitude of each effect that changes the records as much as is typical."""
+        rows, model = self.fitted, self.model
+        names = [e.name for e in self.candidates]
+        at = [model.positions(name)[0] for name in names]
+        steps = 1e-3 * np.abs(model.first_trial[at])
+        thetas = np.tile(self.zero, (len(at) + 1, 1))
+        thetas[np.arange(len(at)), at] += steps
+        found = rows.flat(model.predictions(thetas, rows.batch))
+        change = (found[:-1] - found[-1]) / rows.size / steps[:, None]
+        size = np.sqrt(np.mean(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0) ** 2, axis=1))
+        # where the declared model is far off, little of an effect changes much
+        first = _FIRST * np.abs(model.first_trial[at])
+        widths = np.where(size > 0, _TYPICAL / np.maximum(size, 1e-300), first)
+        widths = np.maximum(widths, first)
+        ends = np.maximum(np.abs(model.low[at]), np.abs(model.high[at]))
+        return dict(zip(names, np.minimum(widths, ends), strict=True))
+
+    def priors(self, names: Sequence[str]) -> dict[int, Prior]:
+        """Return the priors of all that is free where some effects are there."""
+        found = dict(self._priors)
+        for name in names:
+            positions, effect = self.model.positions(name), self.effects[name]
+            low, high = self.model.low, self.model.high
+            found[positions[0]] = Prior(
+                "amplitude", 0.0, self._widths[name], float(low[positions[0]]),
+                float(high[positions[0]]),
+            )  # fmt: skip
+            for position, parameter in zip(positions[1:], effect.parameters[1:], strict=True):
+                found[position] = self._inner(position, parameter)
+            found |= self._by_mode(name)
+        return found
+
+    def _inner(self, position: int, parameter: EffectParameter) -> Prior:
+        low, high = float(self.model.low[position]), float(self.model.high[position])
+        start = float(np.clip(self.zero[position], low, high))
+        if _is_of_unknown_order(parameter) and start > 0.0:
+            return Prior("logarithm", start, _SPREAD, max(low, 1e-6 * start), high)
+        return Prior("normal", start, 0.4 * (high - low), low, high)
+
+    def starts(self, name: str) -> list[dict[int, float]]:
+        """Return inner constants to start an effect from."""
+        positions, effect = self.model.positions(name)[1:], self.effects[name]
+        priors = [
+            self._inner(at, p) for at, p in zip(positions, effect.parameters[1:], strict=True)
+        ]
+        if not any(prior.is_logarithm for prior in priors):
+            return [{at: prior.middle for at, prior in zip(positions, priors, strict=True)}]
+        return [
+            {
+                at: float(np.clip(stretch * prior.middle, prior.low, prior.high))
+                if prior.is_logarithm
+                else prior.middle
+                for at, prior in zip(positions, priors, strict=True)
+            }
+            for stretch in _STARTS
+        ]
+
+    def odds(self, name: str) -> float:
+        """Return the prior odds of an effect over those of one with a name."""
+        return TERM_ODDS if isinstance(self.effects[name], LibraryTerm) else 1.0
+
+    def log_prior(self, names: Sequence[str]) -> float:
+        """Return the log prior of a set: one effect of all is expected."""
+        total = sum(self.odds(effect.name) for effect in self.candidates)
+        return float(sum(np.log(self.odds(name) / total) for name in names))
+
+    def without(self, theta: Float[np.ndarray, " p"], *names: str) -> Float[np.ndarray, " p"]:
+        """Return a vector without some effects."""
+        out = theta.copy()
+        for name in names:
+            positions = [*self.model.positions(name), *self.model.varying(name)]
+            out[positions] = self.zero[positions]
+        return out
+
+
+def _is_of_unknown_order(parameter: EffectParameter) -> bool:
+    """Return whether only the order of an inner constant is known."""
+    return (parameter.low <= 0.0 and parameter.scale != "one") or (
+        parameter.low > 0.0 and parameter.high > _FEW * parameter.low
+    )

@@ -1,0 +1,104 @@
+"""Records of runs as one sequence of rows: what was recorded, when, in which run, of what size."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from discover.dataset import Run
+from discover.forward import Batch, make_batch
+
+_CURVES = ("steady", "oscillation")
+"""Controls of which each value is an experiment of its own, without a neighbour in time."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What was recorded in runs, the samples of one after those of the other.
+
+    Attributes
+    ----------
+    runs, batch
+        The runs, and their layout for prediction.
+    seen
+        Where the rows stand among the padded records, shape (runs, n).
+    recorded
+        In Pa, or of creep a strain, shape (rows,).
+    size
+        Of each value: the root mean square of its record, or the value itself in a curve.
+    time
+        Over the duration of the run.
+    run
+        Which run each row belongs to.
+    gap
+        Samples since the one before in the same run; zero where there is none.
+    fastest
+        Largest shear rate of each run, in 1/s, shape (runs,).
+    """
+
+    runs: tuple[Run, ...]
+    batch: Batch
+    seen: Bool[np.ndarray, "runs n"]
+    recorded: Float[np.ndarray, " rows"]
+    size: Float[np.ndarray, " rows"]
+    time: Float[np.ndarray, " rows"]
+    run: Int[np.ndarray, " rows"]
+    gap: Int[np.ndarray, " rows"]
+    fastest: Float[np.ndarray, " runs"]
+
+    @classmethod
+    def of(cls, runs: Sequence[Run]) -> "Rows":
+        """Return the rows of runs."""
+        batch = make_batch(runs)
+        n = batch.recorded.shape[1]
+        seen = np.arange(n) < np.array([[len(run)] for run in runs])
+        recorded, size, time, gap = [], [], [], []
+        for run in runs:
+            values = np.asarray(run.recorded, dtype=float)
+            sizes = np.broadcast_to(run.sizes(values), values.shape)
+            recorded.append(values)
+            size.append(sizes)
+            alone = run.protocol.control in _CURVES
+            last = max(float(run.time[-1]), np.finfo(float).tiny)
+            time.append(np.arange(len(run)) / len(run) if alone else run.time / last)
+            own = np.zeros(len(run), int) if alone else _gaps(run.time)
+            gap.append(own)
+        count = [len(run) for run in runs]
+        return cls(
+            tuple(runs),
+            batch,
+            seen,
+            *(np.concatenate(part) for part in (recorded, size, time)),
+            np.repeat(np.arange(len(runs)), count),
+            np.concatenate(gap),
+            np.array([max(float(np.max(np.abs(run.rate))), 1e-300) for run in runs]),
+        )
+
+    def __len__(self) -> int:
+        return len(self.recorded)
+
+    def only(self, keep: Sequence[int]) -> "Rows":
+        """Return the rows of some runs."""
+        return Rows.of([self.runs[i] for i in keep])
+
+    def flat(
+        self, predicted: Float[np.ndarray, "trials runs n"]
+    ) -> Float[np.ndarray, "trials rows"]:
+        """Return predictions row by row."""
+        return predicted[:, self.seen]
+
+    def rms_by_run(self, values: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " runs"]:
+        """Return the root mean square over the rows of each run."""
+        count = np.bincount(self.run, minlength=len(self.runs))
+        return np.sqrt(np.bincount(self.run, values**2, minlength=len(self.runs)) / count)
+
+
+def _gaps(time: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+    """Return how many typical spacings lie between samples, at least one; zero for the first."""
+    spacing = np.diff(time)
+    if not len(spacing):
+        return np.zeros(len(time), int)
+    typical = np.median(spacing)
+    found = np.clip(np.rint(spacing / max(typical, 1e-300)), 1, 1000).astype(int)
+    return np.concatenate([[0], found])

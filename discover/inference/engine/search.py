@@ -1,0 +1,195 @@
+"""Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from discover.inference.engine.fits import Fit, Fitter
+
+_BEAM = 3
+_REFITTED = 8
+"""Candidates of each set in the beam that are refitted, of all that are scored."""
+
+_EXCHANGED = 6
+_BEST = 4
+_FALLEN = 15.0
+"""Log likelihood within which a set with an effect at zero shows that another set is as likely."""
+
+_ROUNDS = 3
+_HEADROOM = 1.0
+"""Log evidence by which a larger set may fall behind for the search to go on."""
+
+_PROBES = (1e-3, 1.0)
+"""Of its prior width: amplitudes at which the signature of an effect is taken. What a filter or a
+structure does is not in proportion to its amplitude."""
+
+Key = frozenset[str]
+
+
+class Search:
+    """Hypotheses that were fitted, by the set of their effects."""
+
+    def __init__(self, fitter: Fitter, most: int = 3):
+        self.fitter, self.problem, self.most = fitter, fitter.problem, most
+        self.found: dict[Key, Fit] = {}
+
+    def rank(self, fit: Fit) -> float:
+        """Return the log of evidence times prior."""
+        return fit.log_evidence + self.problem.log_prior(fit.names)
+
+    def alive(self) -> list[Fit]:
+        """Return hypotheses that are possible, the likeliest first."""
+        usable = (fit for fit in self.found.values() if np.isfinite(fit.log_evidence))
+        return sorted(usable, key=self.rank, reverse=True)
+
+    def add(self, starts: Iterable[Fit]) -> list[Fit]:
+        """Fit hypotheses side by side and keep them; of one set the likeliest."""
+        fits = self.fitter.fit(list(starts))
+        for fit in fits:
+            key = frozenset(fit.names)
+            known = self.found.get(key)
+            if known is None or self.rank(fit) > self.rank(known):
+                self.found[key] = fit
+        return fits
+
+    def run(self) -> "Search":
+        """Find hypotheses from the empty set on."""
+        level = self.add([self.fitter.start((), self.problem.zero)])
+        for depth in range(self.most):
+            usable = [fit for fit in level if np.isfinite(fit.log_posterior)]
+            starts, new = [], set()
+            for parent in usable:
+                top = _REFITTED if depth else None  # far from the minimum a score says little
+                for start in self.scored(parent)[:top]:
+                    key = frozenset(start.names)
+                    if key not in self.found and key not in new:
+                        new.add(key)
+                        starts.append(start)
+            if not starts:
+                break
+            best = max(map(self.rank, self.found.values()))
+            fresh = self.add(starts)
+            level = sorted(fresh, key=self.rank, reverse=True)[:_BEAM]
+            level = [fit for fit in level if np.isfinite(self.rank(fit))]
+            if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
+                break
+        self.backwards()
+        self.exchange()
+        return self.backwards()
+
+    def scored(self, fit: Fit) -> list[Fit]:
+        """Return hypotheses with one effect more, ready to be fitted, the likeliest first.
+
+        Each is scored from one linearisation at amplitude zero, inner constants at several starts:
+        the gain of log likelihood with noise sizes free, less the Laplace price of its prior. Both
+        the share of the squared residual that this is and the score stand in `memory["scored"]`.
+        """
+        problem, fitter = self.problem, self.fitter
+        if fit.covariance is None or fit.jacobian is None:
+            return []
+        asked = [
+            (effect.name, inner, probe)
+            for effect in problem.candidates
+            if effect.name not in fit.names
+            for inner in problem.starts(effect.name)
+            for probe in _PROBES
+        ]
+        if not asked:
+            return []
+        thetas, steps, priors = [], [], []
+        for name, inner, probe in asked:
+            theta, at = fit.theta.copy(), problem.model.positions(name)[0]
+            for position, value in inner.items():
+                theta[position] = value
+            prior = problem.priors((name,))[at]
+            centre = theta[at] if at in fit.priors else 0.0  # a nuisance that may be at fault
+            step = probe * prior.width
+            step = -step if centre + step > prior.high else step
+            theta[at] = centre + step
+            thetas.append(theta)
+            steps.append(step)
+            priors.append(prior)
+        columns = (fitter.predict(thetas) - fit.predicted).T / np.array(steps)
+        usable = np.all(np.isfinite(columns), axis=0)
+        columns = np.where(usable, columns, 0.0)
+        record = fitter.record(fit)
+        both = np.column_stack([fit.jacobian, fitter.rows.recorded - record, columns])
+        white = fitter.noise.whitened(both, record, fit.noise)
+        n = fit.jacobian.shape[1]
+        known, left, new = white[:, :n], white[:, n], white[:, n + 1 :]
+        shared = (known @ np.linalg.cholesky(fit.covariance)).T @ new
+        slope = left @ new
+        curvature = np.sum(new**2, axis=0) - np.sum(shared**2, axis=0)
+        total, count = float(left @ left), len(left)
+        best: dict[str, tuple[float, Fit]] = {}
+        for i, ((name, inner, _), prior) in enumerate(zip(asked, priors, strict=True)):
+            at = problem.model.positions(name)[0]
+            stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
+            size = float(np.clip(slope[i] / stiff, prior.low, prior.high))
+            if not usable[i] or (prior.low == 0.0 and size <= 0.0):
+                continue
+            # within the range, and never so far that the first order means nothing
+            gain = slope[i] * size - 0.5 * stiff * size**2
+            gain = -0.5 * count * np.log(max(1.0 - 2.0 * gain / max(total, 1e-300), 1e-4))
+            score = gain - 0.5 * np.log(stiff * prior.width**2) + np.log(problem.odds(name))
+            if name in best and best[name][0] >= score:
+                continue
+            theta = fit.theta.copy()
+            for position, value in inner.items():
+                theta[position] = value
+            theta[at] = np.clip(
+                theta[at] + size if at in fit.priors else size, prior.low, prior.high
+            )
+            best[name] = score, fitter.start((*fit.names, name), theta, fit.linear)
+            share = -np.expm1(-2.0 * gain / count)
+            best[name][1].memory["scored"] = float(share), float(score)
+        return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
+
+    def exchange(self) -> None:
+        """Put another effect in the place of each of the best set, until nothing is better."""
+        seen: set[Key] = set()
+        while self.alive():
+            best = self.alive()[0]
+            if not best.names or frozenset(best.names) in seen:
+                return
+            seen.add(frozenset(best.names))
+            starts: dict[Key, Fit] = {}
+            for name in best.names:
+                rest = self.found.get(frozenset(best.names) - {name})
+                if rest is None or not np.isfinite(rest.log_posterior):
+                    continue
+                for start in self.scored(rest)[:_EXCHANGED]:
+                    if frozenset(start.names) not in self.found:
+                        starts.setdefault(frozenset(start.names), start)
+            self.add(starts.values())
+
+    def backwards(self) -> "Search":
+        """Take effects out of the best sets again, and those that a fit put to zero."""
+        for _ in range(_ROUNDS):
+            alive = self.alive()
+            top = alive[0].log_likelihood if alive else -np.inf
+            fallen = [
+                fit
+                for fit in self.found.values()
+                if fit.at_an_end and fit.log_likelihood > top - _FALLEN
+            ]
+            fallen = sorted(fallen, key=lambda fit: -fit.log_likelihood)[:_BEST]
+            starts: dict[Key, Fit] = {}
+            for fit in [*alive[:_BEST], *fallen]:
+                for name in fit.at_an_end or fit.names:
+                    less = frozenset(fit.names) - {name}
+                    if less in self.found or less in starts:
+                        continue
+                    theta = self.problem.without(fit.theta, name)
+                    starts[less] = self.fitter.start(tuple(less), theta, fit.linear)
+            if not starts:
+                break
+            self.add(starts.values())
+        return self
+
+
+def refitted(fits: Sequence[Fit], fitter: Fitter) -> Search:
+    """Return hypotheses fitted to other rows, from the constants that they have."""
+    search = Search(fitter)
+    search.add([fitter.start(fit.names, fit.theta) for fit in fits])
+    return search

@@ -1,0 +1,163 @@
+"""The final model: its constants in their units, its law, its fluid."""
+
+from collections.abc import Mapping, Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
+from discover.equations import AugmentedLaw, Equation, NamedPart, StatePart, law_parts
+from discover.errors import InputError
+from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
+from discover.laws import LAWS, Fluid
+from discover.laws.each_mode import with_modes
+from discover.loop.parts import DeclaredEffect, KnownParameter
+
+Bounds = Mapping[int, tuple[float, float]]
+"""Ends of the 95 % interval of what is fitted, by its position."""
+
+Theta = Float[np.ndarray, " p"]
+"""Constants of the model; the clock at zero where relaxation times are not fitted."""
+
+
+def declared_parameters(
+    declared: DeclaredModel, theta: Theta, bounds: Bounds
+) -> dict[str, StageParameter]:
+    """Return the fitted constants of the declared model, in their units."""
+    named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
+    # of several modes only a common factor is fitted, which has no unit
+    single = len(declared.modulus) == 1
+    constants = {
+        0: (MODULUS, declared.modulus[0], "Pa") if single else ("modulus_factor", 1.0, ""),
+        1: (RELAXATION_TIME, declared.relaxation_time[0], "s")
+        if single
+        else ("relaxation_time_factor", 1.0, ""),
+    }
+    out: dict[str, StageParameter] = {}
+    for at in declared.free_positions:
+        values = np.array([theta[at], *bounds[at]])
+        name, scale, unit = constants.get(at) or (named[at], 1.0, "")
+        if at in constants:
+            # fitted as the logarithm of a factor
+            values = scale * np.exp(values)
+        value, low, high = map(float, values)
+        out[name] = StageParameter(value, (low, high), unit)
+    return out
+
+
+def declared_effects(
+    model: AugmentedModel, theta: Theta, bounds: Bounds, by_mode: Mapping[str, ConstantByMode]
+) -> tuple[DeclaredEffect, ...]:
+    """Return the known effects with their values in the final model."""
+    found = []
+    for known in model.declared.effects:
+        parameters: dict[str, KnownParameter | ConstantByMode] = {
+            p.name: KnownParameter(float(theta[at]), bounds.get(at), p.unit)
+            for p, at in zip(known.effect.parameters, model.positions(known.name), strict=True)
+        }
+        if known.name in by_mode:
+            parameters[known.effect.parameters[0].name] = by_mode[known.name]
+        found.append(DeclaredEffect(known.name, known.effect.kind, parameters))
+    return tuple(found)
+
+
+def declared_law(
+    declared: DeclaredModel, theta: Theta, by_mode: Mapping[str, ConstantByMode]
+) -> Equation | None:
+    """Return the declared law with its modes as fitted; None where it cannot be written out.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+    theta
+        Its constants.
+    by_mode
+        Constants of the law that differ from mode to mode.
+    """
+    law = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
+    if by_mode and declared.added_modes:
+        return None  # one of the modes is that of an effect
+    try:
+        named, terms = law_parts(law)
+        if by_mode:
+            named, terms = _named_by_mode(declared, theta, by_mode), ()
+    except InputError:
+        return None
+    return Equation(
+        terms,
+        tuple(map(float, declared.modulus * np.exp(theta[0]))),
+        tuple(map(float, declared.relaxation_time * np.exp(theta[1]))),
+        law.linear_relaxation,
+        float(declared.solvent_viscosity),
+        named=named,
+    )
+
+
+def _named_by_mode(
+    declared: DeclaredModel, theta: Theta, by_mode: Mapping[str, ConstantByMode]
+) -> NamedPart:
+    ranges = LAWS[declared.law_name].parameters
+    known = dict(declared.parameters)
+    for i, parameter in enumerate(declared.free_parameters):
+        known[parameter.name] = float(theta[2 + i])
+    of_modes = []
+    for number in range(len(declared.modulus)):
+        own = known | {name: one.modes[number].value for name, one in by_mode.items()}
+        # at an end of its range a constant may be beyond it by a rounding
+        of_modes.append({n: float(np.clip(value, *ranges[n])) for n, value in own.items()})
+    return NamedPart(declared.law_name, tuple(of_modes))
+
+
+def states_of(
+    model: AugmentedModel, theta: Theta, active: Sequence[str]
+) -> tuple[StatePart, ...] | None:
+    """Return the states of the whole fluid; None where one of them cannot be written out."""
+    parts = []
+    for effect in model.effects:
+        if effect.name not in active or not isinstance(effect, StateEffect):
+            continue
+        at = model.positions(effect.name)
+        # at an end of its range a constant may be beyond it by a rounding
+        values = np.clip(theta[at], model.low[at], model.high[at])
+        names = (parameter.name for parameter in effect.parameters)
+        try:
+            parts.append(StatePart(effect.name, dict(zip(names, map(float, values), strict=True))))
+        except InputError:
+            return None
+    return tuple(parts)
+
+
+def augmented_fluid(model: AugmentedModel, theta: Theta, active: Sequence[str]) -> Fluid:
+    """Return the augmented fluid, without states that no law of one mode can carry."""
+    declared = model.declared
+    added = [
+        (effect, jnp.asarray(theta[model.positions(effect.name)]))
+        for effect in model.effects
+        if effect.name in active
+        and isinstance(effect, ConstitutiveEffect)
+        and not isinstance(effect, StateEffect)
+    ]
+    base = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
+    law = AugmentedLaw(
+        base=base,
+        values=tuple(values for _, values in added),
+        effects=tuple(effect for effect, _ in added),
+        linear_relaxation=base.linear_relaxation,
+    )
+    one = jnp.ones(1)
+    viscosity = declared.solvent_viscosity + sum(
+        float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
+    )
+    modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
+    modulus = declared.modulus * np.exp(theta[0])
+    relaxation_time = declared.relaxation_time * np.exp(theta[1])
+    every_time = np.append(relaxation_time, [float(pair[1]) for pair in modes])
+    return Fluid(
+        with_modes(law, relaxation_time, every_time),
+        np.append(modulus, [float(pair[0]) for pair in modes]),
+        every_time,
+        viscosity,
+    )

@@ -1,0 +1,320 @@
+"""A posterior as the result of a closed loop: everything that is reported, in one object."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward.by_mode import DEGREE, constants_of_modes
+from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.engine.design import NextTests, design
+from discover.inference.engine.problem import NUISANCES
+from discover.inference.engine.rows import Rows
+from discover.inference.step_instants import instants_found
+from discover.loop.final_model import (
+    Bounds,
+    augmented_fluid,
+    declared_effects,
+    declared_law,
+    declared_parameters,
+    states_of,
+)
+from discover.loop.loop_result import LoopResult
+from discover.loop.parts import (
+    CandidateScore,
+    LawFit,
+    Stage,
+)
+from discover.loop.path import Path
+from discover.loop.run_record import errors_of
+from discover.loop.runs import why_untested
+from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
+from discover.words import percent_of
+
+_DRAWS = 2000
+_FREE = 3
+"""Degree of constants that are free in each mode."""
+
+_FEWEST_TOLD = 0.5
+"""Half width of an interval over the prior's, from which on the runs tell nothing of a mode."""
+
+
+@dataclass(frozen=True)
+class Ended(Path):
+    """What is reported of a posterior: constants, stages, rankings, what is left."""
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """95 % intervals of all that is free in the likeliest hypothesis, by position."""
+        found = {}
+        for at in self.fit.free:
+            ends, value = self.posterior.interval(at), float(self.fit.theta[at])
+            low, high = (value, value) if ends is None else ends
+            found[at] = min(low, value), max(high, value)
+        return found
+
+    @cached_property
+    def theta(self) -> Float[np.ndarray, " p"]:
+        """Constants of the final fluid: those of the likeliest hypothesis, the bench ideal."""
+        theta = self.fit.theta.copy()
+        if 1 not in self.posterior.problem.declared.free_positions:
+            theta[1] = 0.0  # the clock of the bench
+        return theta
+
+    @cached_property
+    def by_mode(self) -> dict[str, ConstantByMode]:
+        """Constants that may differ from mode to mode, by name."""
+        declared = self.posterior.problem.declared
+        free = {p.name for p in declared.free_parameters} | {e.name for e in declared.effects}
+        there = [name for name in declared.by_mode if name in free or name in self.fit.names]
+        return {name: self._by_mode(name) for name in there}
+
+    def _by_mode(self, name: str) -> ConstantByMode:
+        fit, model = self.fit, self.posterior.problem.model
+        constant, at = model.constant(name)
+        places = model.mode_places(self.theta)
+        every = [at, *model.varying(name)]
+        lot = np.random.default_rng(0).standard_normal((_DRAWS, len(every)))
+        chosen = [fit.free.index(one) for one in every]
+        assert fit.covariance is not None
+        root = np.linalg.cholesky(fit.covariance[np.ix_(chosen, chosen)])
+        drawn = fit.coordinates[chosen] + lot @ root.T
+        first = fit.priors[at]
+        mean = np.array([first.to_value(np.clip(one, *first.ends)) for one in drawn[:, 0]])
+
+        @jax.vmap
+        def of_modes(mean, varying):
+            shape, own = varying[:DEGREE], varying[DEGREE:]
+            low, high = constant.low, constant.high
+            return constants_of_modes(mean, low, high, shape, own, jnp.asarray(places))
+
+        spread = np.asarray(of_modes(jnp.asarray(mean), jnp.asarray(drawn[:, 1:])))
+        low, high = np.quantile(spread, (0.025, 0.975), axis=0)
+        own = jnp.asarray(fit.theta[every])[None]
+        values = np.asarray(of_modes(own[:, 0], own[:, 1:]))[0]
+        width = constant.high - constant.low
+        told = high - low < (_FEWEST_TOLD * width if np.isfinite(width) else 4.0 * np.abs(values))
+        times = model.mode_times(self.theta)
+        modes = tuple(
+            ModeConstant(float(t), float(v), (float(a), float(b)) if k else None, not k)
+            for t, v, a, b, k in zip(times, values, low, high, told, strict=True)
+        )
+        ends = self.bounds[at]
+        mean_time = float(times[0] / 10.0 ** places[0])
+        evidence = 0.0, float(self.posterior.memory.get("by_mode", 0.0))
+        return ConstantByMode(float(fit.theta[at]), ends, "", mean_time, _FREE, evidence, modes)
+
+    def stages(self) -> tuple[Stage, ...]:
+        """Return the effects of the likeliest hypothesis, in order."""
+        search, found = self.posterior.search, []
+        for i, (before, after) in enumerate(zip(self.path[:-1], self.path[1:], strict=True), 1):
+            (name,) = set(after.names) - set(before.names)
+            effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
+            at = dict(zip((p.name for p in effect.parameters), model.positions(name), strict=True))
+            parameters = {
+                p.name: StageParameter(
+                    float(self.fit.theta[at[p.name]]), self.bounds[at[p.name]], p.unit
+                )
+                for p in effect.parameters
+            }
+            left_open = tuple(
+                key
+                for key, one in parameters.items()
+                if one.is_open_up_to(float(model.high[at[key]]))
+            )
+            if name in self.by_mode:
+                parameters[effect.parameters[0].name] = self.by_mode[name]
+            gained = 2.0 * (search.rank(after) - search.rank(before))
+            found.append(
+                Stage(
+                    name, effect.kind, parameters, self._aliases(name), errors_of(self.records, i),
+                    float(gained), effect.equation, effect.source, effect.check,
+                    left_open=left_open,
+                )
+            )  # fmt: skip
+        return tuple(found)
+
+    def _aliases(self, name: str) -> tuple[str, ...]:
+        """Return the effects that take the place of one in twins of the likeliest hypothesis."""
+        told = self.posterior.explanations
+        own, found = set(self.fit.names), []
+        for member in told[0].members[1:] if told else ():
+            instead = set(member) - own
+            if own - set(member) == {name} and len(instead) == 1:
+                found += instead
+        return tuple(found)
+
+    def rankings(self) -> tuple[tuple[CandidateScore, ...], ...]:
+        """Return the candidates beside each part of the likeliest hypothesis, the best first."""
+        search, fitter, found = self.posterior.search, self.posterior.search.fitter, []
+        effects = self.posterior.problem.effects
+        for fit in self.path:
+            scores = []
+            for start in search.scored(fit):
+                (name,) = set(start.names) - set(fit.names)
+                share, _ = start.memory["scored"]
+                evidence = error = None
+                refitted = search.found.get(frozenset(start.names))
+                if refitted is not None and np.isfinite(refitted.log_evidence):
+                    evidence = float(2.0 * (search.rank(refitted) - search.rank(fit)))
+                    off = (fitter.record(refitted) - fitter.rows.recorded) / fitter.rows.size
+                    error = float(np.mean(fitter.rows.rms_by_run(off)))
+                scores.append(CandidateScore(name, effects[name].kind, share, evidence, error))
+            found.append(tuple(scores))
+        return tuple(found)
+
+    def remaining(self, spikes: Mapping[str, Sequence[float]], of_rates: str) -> dict[str, Any]:
+        """Return what is left, as the contract names it."""
+        problem, fit = self.posterior.problem, self.fit
+        rows = problem.fitted
+        fitter = self.posterior.search.fitter
+        left = np.zeros(rows.batch.recorded.shape)
+        left[rows.seen] = (fitter.record(fit) - rows.recorded) / rows.size
+        probability = noise_probability(left, rows.seen.astype(float), _padded(rows))
+        worst = max(self.records, key=lambda record: float(record.errors[-1]))
+        bounds = self.bounds
+        held = () if problem.predicted is None else problem.predicted.runs
+        first = problem.model.instants.start
+        told = {first + s.place for run in rows.runs for s in run.rate_steps if s.place is not None}
+        instants = {at: ends for at, ends in bounds.items() if at in told}
+        structured = self.verdict == "unexplained"
+        said = f"{of_rates}. " * bool(of_rates)
+        return {
+            "structured": structured,
+            "error": errors_of(self.records, -1).fit,
+            "noise_floor": self.noise,
+            "outliers": sum(map(len, spikes.values())),
+            "outlier_times_s": spikes,
+            "probability": probability,
+            "without_fluid": self.without_fluid,
+            "untested": why_untested(self._constants, rows.runs, held),
+            "linear_error": problem.declared.linear_error,
+            "autocorrelation": fit.noise.correlation,
+            "worst_run": worst.name,
+            "worst_run_error": float(worst.errors[-1]),
+            "bench": self._bench(),
+            "description": said + self._in_words(probability),
+            "step_instants": {}
+            if not problem.declared.step_instants
+            else instants_found(problem.model, self.theta_ahead(fit), instants, rows.runs, held),
+            **self._loadings(),
+        }
+
+    @property
+    def _constants(self) -> int:
+        """How many constants were fitted, those of the declared model counted as one."""
+        model = self.posterior.problem.model
+        added = sum(len(model.positions(name)) for name in self.fit.names)
+        return max(added, int(bool(model.declared.free_constants)))
+
+    @property
+    def noise(self) -> float:
+        """Relative noise, mean over the fitted runs."""
+        known = self.posterior.problem.noise
+        return float(np.mean(self.fit.noise.sizes)) if known is None else known
+
+    def _in_words(self, probability: float | None) -> str:
+        none = percent_of(self.posterior.unexplained)
+        if self.without_fluid:
+            return "Records of noise and the bench alone, without any fluid, are as likely."
+        text = f"That something is there which has no name has a probability of {none}."
+        if self.verdict == "unexplained":
+            text = f"Some effect is still missing, or has another form. {text}"
+        if probability is not None and probability < SIGNIFICANCE:
+            text += f" Were it noise, a residual like this has a probability of {probability:.2g}."
+        return text
+
+    def _bench(self) -> dict[str, float]:
+        """Return by how much a sound bench is off here, as fitted along: its nuisances."""
+        problem, fit = self.posterior.problem, self.fit
+        found = {"stress_gain": float(fit.linear[0])}
+        if 1 not in problem.declared.free_positions:
+            found["clock"] = float(fit.theta[1])
+        for nuisance in NUISANCES:
+            at = problem.model.positions(nuisance.effect)[0]
+            if at in fit.priors and nuisance.effect not in fit.names:
+                found[nuisance.effect] = float(fit.theta[at])
+        return found
+
+    def _loadings(self) -> dict[str, Any]:
+        """Return the factors of loadings by run, where each run is a loading of its own."""
+        problem, fit = self.posterior.problem, self.fit
+        if not problem.loading:
+            return {}
+        runs, first = problem.fitted.runs, 1 + 2 * len(problem.fitted.runs)
+        assert fit.covariance is not None
+        spread = np.sqrt(np.diag(fit.covariance))[len(fit.priors) :]
+        found = {}
+        for i, run in enumerate(runs):
+            factor, half = 1.0 + float(fit.linear[first + i]), 1.96 * float(spread[first + i])
+            found[run.name] = {
+                "factor": factor, "ci95": [factor - half, factor + half], "held_out": False,
+            }  # fmt: skip
+        return {"loading_deviation": problem.loading, "loading": found}
+
+
+def result_of(
+    ended: Ended,
+    laws: tuple[LawFit, ...],
+    spikes: Mapping[str, Sequence[float]],
+    of_rates: str,
+    seconds: float,
+) -> LoopResult:
+    """Return the result of a loop.
+
+    Parameters
+    ----------
+    ended
+        The posterior that it ended with.
+    laws
+        Those that the declared one was chosen from.
+    spikes
+        Times of samples set aside as outliers, by run.
+    of_rates
+        That rates were read with noise which the fluid did not feel, in words; empty where not.
+    seconds
+        Time taken.
+    """
+    problem, theta = ended.posterior.problem, ended.theta
+    declared, model, by_mode = problem.declared, problem.model, ended.by_mode
+    present = [*ended.fit.names, *(known.name for known in declared.effects)]
+    fluid = augmented_fluid(model, theta, present)
+    states = states_of(model, theta, present)
+    whole = bool(by_mode) or states != ()
+    own = declared_parameters(declared, theta, ended.bounds)
+    of_law = {name: one for name, one in by_mode.items() if name in own}
+    # only what is fitted of a known effect has an interval
+    free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
+    stages = ended.stages()
+    return LoopResult(
+        verdict=ended.verdict,
+        error_before=errors_of(ended.records, 0),
+        error_after=errors_of(ended.records, -1),
+        noise_floor=ended.noise,
+        stages=stages,
+        remaining=ended.remaining(spikes, of_rates),
+        rankings=ended.rankings(),
+        records=tuple(ended.records),
+        declared_parameters=own | of_law,
+        declared_effects=declared_effects(model, theta, free, by_mode),
+        declared_law=declared_law(declared, theta, of_law),
+        explanations=ended.explanations,
+        next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
+        laws=laws,
+        discrepancy=ended.discrepancy,
+        fluid=None if whole else fluid,
+        fluid_at_mean=fluid if whole else None,
+        states=states or (),
+        seconds=seconds,
+    )
+
+
+def _padded(rows: Rows) -> Float[np.ndarray, "runs n"]:
+    out = np.zeros(rows.batch.recorded.shape)
+    out[rows.seen] = rows.recorded
+    return out

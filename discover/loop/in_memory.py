@@ -1,0 +1,110 @@
+"""A closed loop on data that a program holds."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from discover.dataset import Dataset
+from discover.errors import InputError
+from discover.laws.multimode import Fluid
+from discover.loop.each_run import run_loop_on
+from discover.loop.loop_result import LoopResult
+from discover.progress import Progress, checked
+from discover.study.declared_model import forward_model
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
+from discover.study.schema import Loop
+from discover.validation import validated
+from discover.words import counted, unknown_name
+
+_OPTIONS = {
+    "effects", "max_effects", "strain", "noise", "most_samples", "explanations", "laws", "loading",
+}  # fmt: skip
+
+
+def close_loop(
+    data: Dataset,
+    base: Fluid | None = None,
+    *,
+    held_out: HeldOut = (),
+    free: Sequence[str] = (),
+    by_mode: Sequence[str] = (),
+    known_effects: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+    **options: Any,
+) -> LoopResult:
+    """Find what a fluid lacks on these data, add it, and judge it on runs that no fit saw.
+
+    Parameters
+    ----------
+    data
+        The runs to fit.
+    base
+        The declared fluid; by default upper convected Maxwell with G = 1 Pa and λ = 1 s.
+    held_out
+        Runs that only judge: a data set of their own, names of runs of `data`, or ``"each"`` to
+        hold each run out in turn.
+    free
+        What of the base is fitted along: parameters of its law, which must be one with a name, and
+        ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
+    by_mode
+        What may differ from mode to mode, as a smooth function of the relaxation time: parameters
+        of the law, of those in `free`, and effects by the size of their term. How smooth is for the
+        data to say.
+    known_effects
+        Effects that are known beside the base, as ``[model] effects`` in a study, such as
+        ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
+        model and not proposed again.
+    progress
+        Called now and then with a line of text and about what fraction is done.
+    **options
+        `effects`, `max_effects`, `strain`, `noise`, `most_samples`, `explanations`, `laws` and
+        `loading` of `discover.loop.run_loop`.
+
+    Returns
+    -------
+    The result, with ``to_html``, ``to_dataframe`` and ``equation``.
+
+    Raises
+    ------
+    InputError
+        If data, base or an option is not as it should be.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01)
+    >>> loop = dc.close_loop(data, held_out=["laos_2_1"], max_effects=1)  # doctest: +SKIP
+    >>> loop.verdict, loop.to_dataframe()  # doctest: +SKIP
+    """
+    unknown = sorted(set(options) - _OPTIONS)
+    if unknown:
+        raise InputError(f"close_loop: {unknown_name('option', unknown[0], sorted(_OPTIONS))}")
+    asked = _checked(options)
+    divided = data_in_memory(data, held_out)
+    fluid = declared_fluid(base, data)
+    declared = forward_model(with_known(fluid, known_effects, free, by_mode))
+    options["max_effects"] = asked.max_effects
+    result = run_loop_on(divided, declared, checked(progress), **options)
+    judged = "each held out in turn" if divided.each else f"{len(divided.held_out)} held out"
+    summary = (
+        f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
+        f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
+    ).strip()
+    return replace(result, title=data.name, described=summary)
+
+
+def _checked(options: Mapping[str, Any]) -> Loop:
+    """Return the options as a study would hold them."""
+    content = dict(options)
+    laws, effects = content.pop("laws", ()), content.get("effects")
+    if isinstance(laws, str):
+        raise InputError(f"laws must be a list of names; got {laws!r}. Write [{laws!r}].")
+    if not (effects is None or isinstance(effects, str | Iterable)):
+        raise InputError(f"effects must be 'named' or a list of effects; got {effects!r}.")
+    if effects is not None and not isinstance(effects, str):
+        content["effects"] = [getattr(effect, "name", effect) for effect in effects]
+    if isinstance(content.get("strain"), np.ndarray):
+        content["strain"] = content["strain"].tolist()
+    return validated(Loop, content, "close_loop()")

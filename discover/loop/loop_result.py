@@ -1,0 +1,384 @@
+"""What a closed loop found, for people, pictures and other programs."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from discover.equations import (
+    AugmentedLaw,
+    Equation,
+    HasEquation,
+    NamedPart,
+    StatePart,
+    Tested,
+    equation_to_json,
+    law_parts,
+)
+from discover.equations.box import box_of, flow_numbers
+from discover.equations.equation import mean_relaxation_time
+from discover.errors import InputError
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
+from discover.inference.engine.design import NextTests
+from discover.laws import LAWS, Fluid
+from discover.laws.registry import name_of
+from discover.loop.parts import (
+    CandidateScore,
+    DeclaredEffect,
+    ErrorPair,
+    Explanations,
+    Fold,
+    FreeForm,
+    LawFit,
+    Stage,
+    Verdict,
+)
+from discover.loop.reading import Reading, read_residual
+from discover.loop.run_record import RunRecord
+from discover.notebook_view import table_of
+from discover.page_view import PageView
+from discover.plain_json import json_text, plain
+from discover.summary_view import Estimate, SummaryView
+from discover.words import percent_of
+from tensor_library.law_terms import LawTerm
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class LoopResult(PageView, HasEquation, SummaryView):
+    """The outcome of a closed loop.
+
+    Attributes
+    ----------
+    verdict
+        What is to be believed.
+    error_before, error_after
+        Of the declared and of the augmented model.
+    noise_floor
+        Relative noise, mean over the fitted runs.
+    stages
+        Effects added, in order.
+    remaining
+        What is left, and whether it has structure.
+    rankings
+        Candidates at each stage, and those that earned nothing at the last.
+    records
+        Every run with its predictions.
+    declared_parameters
+        What was fitted of the declared model: modulus in Pa and relaxation time in s, or for
+        several modes a common factor on each, and parameters of the law; those that may differ
+        from mode to mode are a `ConstantByMode`.
+    declared_effects
+        Effects that were part of the declared model, and so are no finding.
+    declared_law
+        The declared law with its modes as finally fitted, without effects; None where it cannot be
+        written out.
+    fluid
+        The augmented fluid, without instrument effects; None where an effect gives it a state that
+        no law of stress and rate can carry, or where its constants differ from mode to mode.
+    fluid_at_mean
+        The same with constants that differ from mode to mode at the mean relaxation time, and
+        without states; None where `fluid` is there, or a state cannot be written out.
+    states
+        States of the whole fluid beside it.
+    explanations
+        What explains the fitted runs about as well as what was found, and how probable each is.
+    next_tests
+        The tests that were weighed by how well they would tell these apart.
+    laws
+        The laws that the declared one was chosen from, the best first; none where one was declared.
+    free_form
+        Free functions of one variable that explain what named effects leave, the likeliest first.
+    discrepancy, adequate
+        Size of what no hypothesis holds, as the contract writes it, and whether that is good
+        enough; None where nothing is said of it.
+    folds
+        The loops that left each run out in turn, where they were asked for; the held-out errors
+        are then their means.
+    seconds
+        Time taken.
+    title, described
+        Name of the data, and data and declared model in words, for the page.
+    """
+
+    verdict: Verdict
+    error_before: ErrorPair
+    error_after: ErrorPair
+    noise_floor: float
+    stages: tuple[Stage, ...]
+    remaining: dict[str, Any]
+    rankings: tuple[tuple[CandidateScore, ...], ...] = field(repr=False, default=())
+    records: tuple[RunRecord, ...] = field(repr=False, default=())
+    declared_parameters: dict[str, StageParameter] = field(default_factory=dict)
+    declared_effects: tuple[DeclaredEffect, ...] = ()
+    declared_law: Equation | None = field(repr=False, default=None)
+    fluid: Fluid | None = field(repr=False, default=None)
+    fluid_at_mean: Fluid | None = field(repr=False, default=None)
+    states: tuple[StatePart, ...] = field(repr=False, default=())
+    explanations: Explanations = field(default_factory=Explanations)
+    next_tests: NextTests = field(repr=False, default_factory=NextTests)
+    laws: tuple[LawFit, ...] = ()
+    free_form: tuple[FreeForm, ...] = ()
+    discrepancy: Mapping[str, Any] | None = None
+    adequate: bool | None = None
+    folds: tuple[Fold, ...] = ()
+    seconds: float = 0.0
+    title: str = field(repr=False, default="")
+    described: str = field(repr=False, default="")
+
+    _page = "discover.report.in_memory:loop_page"
+
+    def __repr__(self) -> str:
+        added = ", ".join(stage.effect for stage in self.stages) or "no effect"
+        fit, held = self.error_after.fit, self.error_after.held_out
+        judged = "" if held is None else f", held out {percent_of(held)}"
+        return f"<LoopResult: {self.verdict}; {added}; error {percent_of(fit)}{judged}>"
+
+    @property
+    def by_mode(self) -> dict[str, ConstantByMode]:
+        """Constants that might differ from mode to mode: by their name, or by their effect's."""
+        of_law = self.declared_parameters.items()
+        found = {name: one for name, one in of_law if isinstance(one, ConstantByMode)}
+        for effect in (*self.declared_effects, *self.stages):
+            for one in effect.parameters.values():
+                if isinstance(one, ConstantByMode):
+                    found[effect.effect] = one
+        return found
+
+    @property
+    def differing_by_mode(self) -> tuple[str, ...]:
+        """Names of those of them that do."""
+        return tuple(name for name, one in self.by_mode.items() if one.degree)
+
+    def equation(self) -> Equation:
+        """Return the augmented fluid as an equation, with the box in which it was tested.
+
+        Raises
+        ------
+        InputError
+            If an effect gives the fluid a state that nobody wrote out, or adds what is no sum of
+            library terms, or if what it adds differs from mode to mode.
+        """
+        fluid = self.fluid_at_mean if self.fluid is None else self.fluid
+        if fluid is None:
+            states = [s.effect for s in self.stages if s.kind == "constitutive"]
+            raise InputError(
+                f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
+                "state of which nobody said how it is written, so it cannot be written out. Give "
+                "the effect's class the method `written`."
+            )
+        modulus = tuple(float(g) for g in fluid.modulus)
+        relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
+        time = mean_relaxation_time(modulus, relaxation_time)
+        learned_in = box_of(_numbers(r, time) for r in self.records if not r.held_out)
+        judged_in = box_of(_numbers(r, time) for r in self.records if r.held_out)
+        notes = [f"Verdict of the loop: {self.verdict}."]
+        outside = [s.effect for s in self.stages if s.kind != "constitutive"]
+        added = len(outside) < len(self.stages)
+        if outside:
+            notes.append(
+                f"The record also holds {', '.join(outside)}, which is no part of the fluid and is "
+                "not in this equation."
+            )
+        held_out = self.error_after.held_out
+        errors = {} if held_out is None else {"sigma12 (mean over runs)": held_out}
+        named, terms = self._parts(fluid)
+        return Equation(
+            terms,
+            modulus,
+            relaxation_time,
+            fluid.law.linear_relaxation,
+            float(fluid.solvent_viscosity),
+            title=f"Declared law{' with the constitutive effects' * added} of a closed loop.",
+            notes=tuple(notes),
+            tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
+            named=named,
+            states=self.states,
+        )
+
+    def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[LawTerm, ...]]:
+        """Return the law of the fluid with a name, if it needs one, and its terms."""
+        differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
+        if not differing:
+            return law_parts(fluid.law)
+        law = fluid.law
+        for name in [*differing]:
+            moved = law.with_named(name) if isinstance(law, AugmentedLaw) else None
+            if moved is not None:
+                law, constant = moved
+                differing[constant] = differing.pop(name)
+        core, added = law.split()
+        named = name_of(core)
+        known = {} if named is None else named[1]
+        # what an effect adds is the same sum in all modes; of a mode beside the declared ones
+        # nothing was said
+        if (
+            named is None
+            or set(differing) - set(known)
+            or fluid.n_modes != len(next(iter(differing.values())))
+        ):
+            raise InputError(
+                f"{', '.join(differing)} differs from one relaxation mode to the next, and the law "
+                "with it cannot be written out: only constants of a law with a name can, without "
+                "an added mode. loop.json has the constants of each mode."
+            )
+        ranges = LAWS[named[0]].parameters
+        constants = tuple(
+            # at an end of its range a constant may be beyond it by a rounding
+            known | {n: float(np.clip(m[k].value, *ranges[n])) for n, m in differing.items()}
+            for k in range(fluid.n_modes)
+        )
+        return NamedPart(named[0], constants), added
+
+    @cached_property
+    def readings(self) -> tuple[Reading, Reading]:
+        """On what the residuals of the declared and of the augmented model depend."""
+        return read_residual(self.records, 0), read_residual(self.records, -1)
+
+    @property
+    def held_in_band(self) -> float | None:
+        """Share of the samples held out that lie in the band of all explanations, if any judge."""
+        inside = [
+            (record.band[0] <= record.measured) & (record.measured <= record.band[1])
+            for record in self.records
+            if record.held_out and record.band is not None
+        ]
+        return float(np.mean(np.concatenate(inside))) if inside else None
+
+    def table(self) -> pd.DataFrame:
+        """Return the effects that were added, one line for each of their parameters."""
+        lines = []
+        for number, stage in enumerate(self.stages, 1):
+            for name, p in stage.parameters.items():
+                line = {"stage": number, "effect": stage.effect, "kind": stage.kind}
+                line |= {"parameter": name, "value": p.value, "unit": p.unit}
+                line |= {"low": p.ci95[0], "high": p.ci95[1]}
+                line |= {"error_fit": stage.error.fit, "error_held_out": stage.error.held_out}
+                lines.append({**line, "aliases": ", ".join(stage.aliases)})
+        columns = ["stage", "effect", "kind", "parameter", "value", "unit", "low", "high"]
+        return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
+
+    def _estimates(self) -> list[Estimate]:
+        found = [
+            Estimate((name,), p.value, p.ci95, p.unit, notes={"from": "fitted"})
+            for name, p in self.declared_parameters.items()
+        ]
+        parts = [(one, "declared", ()) for one in self.declared_effects]
+        parts += [(stage, "added", stage.aliases) for stage in self.stages]
+        for effect, origin, aliases in parts:
+            for name, p in effect.parameters.items():
+                if p.ci95 is None:
+                    continue  # declared with a value, so nothing was estimated
+                notes = {"from": origin, "indistinguishable_from": ", ".join(aliases)}
+                key = (f"{effect.effect}.{name}",)
+                found.append(Estimate(key, p.value, p.ci95, p.unit or "1", notes=notes))
+        return found
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return `table`: the effects that were added, one line for each of their parameters."""
+        return self.table()
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return explanations, constants and predictions with named dimensions, for xarray.
+
+        Along ``explanation``, the likeliest first and ``unexplained`` last: ``probability``,
+        ``error_fit``, ``error_held_out``, ``constant_by_explanation`` and ``predicted``. Along
+        ``effect``: ``inclusion``. Along ``constant``, spelled ``effect.parameter``: the model that
+        was found, ``constant_found`` with ``constant_low95`` and ``constant_high95``, in the units
+        of the coordinate ``unit``. Along ``sample``, with ``run``, ``role``, ``quantity``,
+        ``time_s``, ``strain`` and ``rate_1_s``: ``measured``, ``declared``, ``found``, and the
+        band of all explanations, ``low95`` to ``high95``, in Pa, or strains where the strain was
+        recorded. What is unknown is NaN. Explanations are no draws from a posterior: weigh them by
+        their probability.
+
+        Raises
+        ------
+        InputError
+            If xarray is not installed (extra ``xarray``).
+        """
+        from discover.loop.labelled import labelled_loop
+
+        return labelled_loop(self)
+
+    def ranking_table(self, stage: int = 0) -> pd.DataFrame:
+        """Return the candidates at one stage, counted from 0, the best first.
+
+        Parameters
+        ----------
+        stage
+            From 0; the last one holds those that earned nothing.
+        """
+        lines = [asdict(candidate) for candidate in self.rankings[stage]]
+        return pd.DataFrame(lines, columns=["effect", "kind", "score", "evidence", "error"])
+
+    def runs_table(self) -> pd.DataFrame:
+        """Return the relative error of every run, by the declared model and after each stage."""
+        return table_of(self.records).set_index("run")
+
+    def errors_table(self) -> pd.DataFrame:
+        """Return the mean relative errors before and after, on fitted and on held-out runs."""
+        pairs = {"before": asdict(self.error_before), "after": asdict(self.error_after)}
+        return pd.DataFrame(pairs, dtype=float).T.rename_axis("error")
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.verdict}, noise {self.noise_floor:.2g}"
+        yield self.errors_table()
+        yield self.table()
+        try:
+            yield self.equation()
+        except InputError as error:
+            yield str(error)
+
+    def _law(self) -> dict[str, Any]:
+        try:
+            return {"law": equation_to_json(self.equation())}
+        except InputError as error:
+            return {"law": None, "law_missing": str(error)}
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the contents of ``loop.json``."""
+        contents = {
+            "verdict": self.verdict,
+            "error_before": self.error_before,
+            "error_after": self.error_after,
+            "noise_floor": self.noise_floor,
+            "stages": self.stages,
+            "remaining": self.remaining,
+            "residual": dict(zip(("declared", "augmented"), self.readings, strict=True)),
+            "declared": {
+                "law": None if self.declared_law is None else equation_to_json(self.declared_law),
+                "effects": self.declared_effects,
+                "by_mode": self.differing_by_mode,
+            },
+            "declared_parameters": self.declared_parameters,
+            "ranking": self.rankings,
+            "runs": {
+                record.name: {"held_out": record.held_out, "errors": record.errors}
+                for record in self.records
+            },
+            **self.explanations.to_json(),
+            "next_tests": self.next_tests,
+            "held_out_in_band": self.held_in_band,
+            "laws": self.laws,
+            "free_form": self.free_form,
+            "discrepancy": self.discrepancy,
+            "adequate": self.adequate,
+            "folds": self.folds,
+            "seconds": self.seconds,
+            **self._law(),
+        }
+        return plain(contents)
+
+    def write_json(self, path: str | Path) -> None:
+        """Write ``loop.json``."""
+        Path(path).write_text(json_text(self.to_json()), encoding="utf-8")
+
+
+def _numbers(record: RunRecord, time: float) -> tuple[float, float]:
+    return flow_numbers(record.time, record.rate, time)

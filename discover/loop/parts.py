@@ -1,0 +1,251 @@
+"""Parts of the result of a closed loop: errors, effects that were added, explanations, laws."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
+from discover.laws import LAWS
+
+Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
+
+
+@dataclass(frozen=True)
+class ErrorPair:
+    """Relative errors, mean over runs: on the fitted runs and on those held out, if any."""
+
+    fit: float
+    held_out: float | None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """An effect that was added.
+
+    Attributes
+    ----------
+    effect, kind
+        Its name and kind.
+    parameters
+        Its parameters in the final model.
+    aliases
+        Effects that these data cannot tell from it.
+    error
+        Errors after this stage.
+    evidence
+        Twice the log of the posterior odds that it adds.
+    equation, source, check
+        What it adds, where that comes from, and how to confirm it in the laboratory.
+    left_open
+        Names of constants that the runs do not determine.
+    """
+
+    effect: str
+    kind: str
+    parameters: dict[str, StageParameter]
+    aliases: tuple[str, ...]
+    error: ErrorPair
+    evidence: float
+    equation: str
+    source: str
+    check: str
+    left_open: tuple[str, ...] = field(default=(), kw_only=True)
+
+
+@dataclass(frozen=True)
+class KnownParameter:
+    """A parameter of an effect that was declared; its 95 % interval, where it was fitted."""
+
+    value: float
+    ci95: tuple[float, float] | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class DeclaredEffect:
+    """An effect that was part of the declared model, with its parameters in the final model."""
+
+    effect: str
+    kind: str
+    parameters: dict[str, KnownParameter | ConstantByMode]
+
+
+@dataclass(frozen=True)
+class CandidateScore:
+    """A candidate effect at one stage.
+
+    Attributes
+    ----------
+    effect, kind
+        Its name and kind.
+    score
+        Share of the squared residual that it explains to first order, 0 to 1, beside what is
+        fitted already.
+    evidence
+        Twice the log of the posterior odds that it adds, where it was refitted.
+    error
+        Mean relative error on the fitted runs after that.
+    """
+
+    effect: str
+    kind: str
+    score: float
+    evidence: float | None = None
+    error: float | None = None
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of effects that may be what the declared model lacks; empty where it lacks nothing.
+
+    Attributes
+    ----------
+    effects
+        Their names.
+    probability
+        Of this set and its twins together.
+    error
+        Mean relative errors of the runs fitted and held out.
+    parameters
+        Values of the parameters of each effect.
+    twins
+        Other sets that predict these records alike.
+    """
+
+    effects: tuple[str, ...]
+    probability: float
+    error: ErrorPair
+    parameters: Mapping[str, Mapping[str, float]]
+    twins: tuple[tuple[str, ...], ...] = ()
+
+    @property
+    def members(self) -> tuple[tuple[str, ...], ...]:
+        """The set itself and its twins."""
+        return (self.effects, *self.twins)
+
+
+@dataclass(frozen=True)
+class Explanations:
+    """The posterior over sets of effects.
+
+    Attributes
+    ----------
+    likeliest_first
+        Their probabilities add up to 1 with `unexplained_probability`.
+    unexplained_probability
+        That it is none of them.
+    inclusion, inclusion_by_kind
+        Probability that an effect, or some effect of a kind, is in the explanation. Twins share
+        that of their class in equal parts.
+    """
+
+    likeliest_first: tuple[Explanation, ...] = ()
+    unexplained_probability: float = 1.0
+    inclusion: Mapping[str, float] = field(default_factory=dict)
+    inclusion_by_kind: Mapping[str, float] = field(default_factory=dict)
+
+    def holding(self, effects: Collection[str]) -> Explanation | None:
+        """Return the explanation of which these effects, in any order, are a member."""
+        asked = set(effects)
+        found = (e for e in self.likeliest_first if any(set(m) == asked for m in e.members))
+        return next(found, None)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what ``loop.json`` holds of them."""
+        return {
+            "explanations": self.likeliest_first,
+            "unexplained_probability": self.unexplained_probability,
+            "inclusion": self.inclusion,
+            "inclusion_by_kind": self.inclusion_by_kind,
+        }
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A named law with the effects likeliest beside it, among others of which one is chosen.
+
+    Attributes
+    ----------
+    law
+        Key of `LAWS`.
+    parameters
+        Its constants.
+    at_end
+        Those of them at an end of their range, where they are no finding.
+    error
+        Mean relative errors of the runs fitted and held out; None where it cannot be integrated
+        through the fitted ones.
+    probability
+        Of the law among these, by the fitted runs; None likewise.
+    effects
+        Those that are likeliest beside it.
+    """
+
+    law: str
+    parameters: Mapping[str, float]
+    at_end: tuple[str, ...] = ()
+    error: ErrorPair | None = None
+    probability: float | None = None
+    effects: tuple[str, ...] = ()
+
+    @property
+    def title(self) -> str:
+        """Name as a rheologist writes it, with the constants."""
+        return LAWS[self.law].described(self.parameters)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fit as ``loop.json`` holds it."""
+        return {**asdict(self), "title": LAWS[self.law].title}
+
+
+@dataclass(frozen=True)
+class FreeForm:
+    """A smooth function of one variable that explains what named effects leave.
+
+    Attributes
+    ----------
+    slot
+        Where it acts, such as ``relaxation`` or ``slip``.
+    variable, unit
+        Of what it is a function, and its unit.
+    beside
+        Effects in the model with it.
+    grid, value, low95, high95
+        The curve with its 95 % band, shape (n,).
+    nearest
+        Name of a closed form that is it within its uncertainty; None if none is.
+    """
+
+    slot: str
+    variable: str
+    unit: str
+    beside: tuple[str, ...]
+    grid: Float[np.ndarray, " n"]
+    value: Float[np.ndarray, " n"]
+    low95: Float[np.ndarray, " n"]
+    high95: Float[np.ndarray, " n"]
+    nearest: str | None
+
+
+@dataclass(frozen=True)
+class Fold:
+    """A loop that left one run out, where each run is held out in turn.
+
+    Attributes
+    ----------
+    run
+        The run left out.
+    verdict, effects
+        What the loop said of the other runs, and what it added.
+    error_before, error_after
+        Relative error of the run left out.
+    """
+
+    run: str
+    verdict: Verdict
+    effects: tuple[str, ...]
+    error_before: float
+    error_after: float

@@ -1,0 +1,235 @@
+"""The way to the likeliest hypothesis: predictions of every run on it, bands, explanations."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import get_args
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from discover.effects import AbstractEffect
+from discover.inference.engine import Explanation as Told
+from discover.inference.engine import Posterior
+from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.posterior import quantiles
+from discover.inference.engine.rows import Rows
+from discover.inference.engine.search import Search
+from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict
+from discover.loop.run_record import RunRecord, record_runs
+
+_NEGLIGIBLE = 1e-4
+"""Probability below which an explanation is not listed."""
+
+
+def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
+    """Return what a hypothesis predicts of runs, with what the bench does.
+
+    Of runs that no fit saw, with what all runs share: zero, drift and loading are of each run.
+    """
+    problem, linear, fitter = search.problem, fit.linear, search.fitter
+    found = problem.model.predictions([fit.theta], rows.batch)[0]
+    if held_out:
+        fitter = Fitter(problem, rows)
+        each = 2 + bool(problem.loading)
+        nothing, shared = np.zeros(each * len(rows.runs)), 1 + each * len(problem.fitted.runs)
+        linear = np.concatenate([linear[:1], nothing, linear[shared:]])
+    flat = rows.flat(found[None])[0]
+    found[rows.seen] = flat + fitter.linear_columns(flat) @ linear
+    return found
+
+
+@dataclass(frozen=True)
+class Path:
+    """A posterior, the likeliest hypothesis of it, and the way there.
+
+    Attributes
+    ----------
+    posterior
+        What the runs say.
+    without_fluid
+        Whether a record without any fluid is as likely.
+    order
+        Names of the runs of the data set, in its order.
+    most
+        Explanations that are listed.
+    """
+
+    posterior: Posterior
+    without_fluid: bool
+    order: Sequence[str]
+    most: int
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What is to be believed."""
+        if self.without_fluid:
+            return "no_signal"
+        found = self.posterior.verdict
+        known = {one: one for one in get_args(Verdict)}
+        return known[found]
+
+    @cached_property
+    def fit(self) -> Fit:
+        """The likeliest hypothesis, fitted to the fitted runs."""
+        told = self.posterior.explanations
+        return self.fitted(told[0].members[0] if told and not self.without_fluid else ())
+
+    @cached_property
+    def path(self) -> list[Fit]:
+        """The way to it: of each size the likeliest part that holds the one before."""
+        path, whole = [self.fitted(())], frozenset(self.fit.names)
+        while (left := whole - set(path[-1].names)):  # fmt: skip
+            larger = [self.fitted({*path[-1].names, name}) for name in sorted(left)]
+            path.append(max(larger, key=lambda fit: (fit.log_evidence, fit.log_likelihood)))
+        return path
+
+    def fitted(self, names) -> Fit:
+        """Return a hypothesis fitted to the fitted runs, from the likeliest with more effects."""
+        search, key = self.posterior.search, frozenset(names)
+        if key not in search.found:
+            holding = [fit for fit in search.found.values() if set(fit.names) > key]
+            near = max(holding, key=search.rank) if holding else search.found[frozenset()]
+            problem = self.posterior.problem
+            theta = problem.without(near.theta, *(set(near.names) - key))
+            search.add([search.fitter.start(tuple(key), theta, near.linear)])
+        return search.found[key]
+
+    @cached_property
+    def _own_instants(self) -> Float[np.ndarray, " p"] | None:
+        """When rates step in the runs held out, by these themselves."""
+        if self.posterior.problem.predicted is None:
+            return None
+        whole, *_ = self.posterior.memory["whole"]
+        found = whole.found.get(frozenset(self.fit.names))
+        return None if found is None else found.theta
+
+    def theta_ahead(self, fit: Fit) -> Float[np.ndarray, " p"]:
+        """Return the constants for runs that no fit saw, which tell their own instants of steps."""
+        theta, own = fit.theta.copy(), self._own_instants
+        if own is not None:
+            used = {s.place for run in self.posterior.problem.fitted.runs for s in run.rate_steps}
+            instants = self.posterior.problem.model.instants
+            for place, at in enumerate(range(instants.start, instants.stop)):
+                if place not in used:
+                    theta[at] = own[at]
+        return theta
+
+    def predicted(self, fit: Fit, rows: Rows, held_out: bool) -> Float[np.ndarray, "runs n"]:
+        """Return what a hypothesis predicts of runs, held out or fitted."""
+        theta = self.theta_ahead(fit) if held_out else fit.theta
+        return predicted(self.posterior.search, replace(fit, theta=theta), rows, held_out)
+
+    def declared_predicted(self, rows: Rows) -> Float[np.ndarray, "runs n"]:
+        """Return what the declared model predicts, its constants as fitted and the bench ideal."""
+        problem, theta = self.posterior.problem, self.posterior.problem.zero.copy()
+        own = [*problem.model.free_positions, *self._varying]
+        theta[own] = self.path[0].theta[own]
+        with np.errstate(all="ignore"):
+            return problem.model.predictions([theta], rows.batch)[0]
+
+    @property
+    def _varying(self) -> list[int]:
+        model = self.posterior.problem.model
+        return [at for name in model.declared.by_mode_slices for at in model.varying(name)]
+
+    @cached_property
+    def records(self) -> list[RunRecord]:
+        """All runs with the predictions of every stage, bands, and those of each explanation."""
+        problem, found = self.posterior.problem, []
+        fits = [self.fitted(one.members[0]) for one in self._listed]
+        bands = self.posterior.bands() or []
+        for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
+            if rows is None:
+                continue
+            stages = [self.predicted(fit, rows, held_out) for fit in self.path[1:]]
+            models = np.stack([self.declared_predicted(rows), *stages])
+            records = record_runs(rows.runs, models, held_out, self.order)
+            each = [self.predicted(fit, rows, held_out) for fit in fits]
+            for i, record in enumerate(records):
+                n = len(record.time)
+                if held_out:
+                    band = np.stack([bands[i].low, bands[i].high]) if bands else None
+                else:
+                    band = self._fitted_bands[:, rows.run == i]
+                own = np.stack([one[i, :n] for one in each]) if each else None
+                found.append(replace(record, band=band, by_explanation=own))
+        return found
+
+    @cached_property
+    def _fitted_bands(self) -> Float[np.ndarray, "2 rows"]:
+        """Where 95 % of repeated measurements of the fitted runs should lie."""
+        fitter = self.posterior.search.fitter
+        weights, middles, variances = [], [], []
+        for fit, weight in self.posterior.fits or ((self.fit, 1.0),):
+            record = fitter.record(fit)
+            assert fit.jacobian is not None
+            assert fit.covariance is not None
+            noise = fit.noise.sizes[fitter.rows.run] * fitter.noise.deviation(
+                record, fit.noise.share
+            )
+            spread = np.einsum("ij,jk,ik->i", fit.jacobian, fit.covariance, fit.jacobian)
+            weights.append(weight)
+            middles.append(record)
+            variances.append(spread + noise**2)
+        ends = quantiles(
+            np.array(weights), np.array(middles), np.array(variances), (0.025, 0.975)
+        )  # fmt: skip
+        return np.stack(ends)
+
+    @cached_property
+    def _listed(self) -> tuple[Told, ...]:
+        first, *others = self.posterior.explanations[: self.most] or (None,)
+        if first is None:
+            return ()
+        return (first, *(one for one in others if one.probability > _NEGLIGIBLE))
+
+    @cached_property
+    def explanations(self) -> Explanations:
+        """The posterior over sets of effects, as the result holds it."""
+        effects, found = self.posterior.problem.effects, []
+        inclusion: dict[str, float] = {}
+        kinds: dict[str, float] = {}
+        for i, one in enumerate(self._listed):
+            first, *others = one.members
+            pair = ErrorPair(self._error(i, False) or 0.0, self._error(i, True))
+            fit = self.fitted(first)
+            parameters = {name: self._values(fit, effects[name]) for name in fit.names}
+            # more effects that change nothing are no other explanation
+            twins = tuple(other for other in others if not set(other) > set(first))
+            found.append(Explanation(first, one.probability, pair, parameters, twins))
+            for member, share in zip(one.members, self._shares(one), strict=True):
+                for name in member:
+                    inclusion[name] = inclusion.get(name, 0.0) + float(share)
+                for kind in {effects[name].kind for name in member}:
+                    kinds[kind] = kinds.get(kind, 0.0) + float(share)
+        none = 1.0 - sum(one.probability for one in found)
+        return Explanations(
+            tuple(found),
+            float(np.clip(none, 0.0, 1.0)),
+            _largest_first(inclusion),
+            _largest_first(kinds),
+        )
+
+    def _shares(self, one: Told) -> Float[np.ndarray, " members"]:
+        """Return the probability of each member of an explanation."""
+        judged, *_ = self.posterior.memory["whole"]
+        ranks = np.array([judged.rank(judged.found[frozenset(names)]) for names in one.members])
+        return one.probability * np.exp(ranks - logsumexp(ranks))
+
+    def _error(self, number: int, held_out: bool) -> float | None:
+        errors = []
+        for record in self.records:
+            if record.held_out is held_out and record.by_explanation is not None:
+                off = record.by_explanation[number] - record.measured
+                errors.append(np.sqrt(np.mean(off**2) / (np.mean(record.measured**2) or 1.0)))
+        return float(np.mean(errors)) if errors else None
+
+    def _values(self, fit: Fit, effect: AbstractEffect) -> dict[str, float]:
+        at = self.posterior.problem.model.positions(effect.name)
+        return {p.name: float(fit.theta[i]) for p, i in zip(effect.parameters, at, strict=True)}
+
+
+def _largest_first(found: dict[str, float]) -> dict[str, float]:
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

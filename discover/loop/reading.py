@@ -1,0 +1,310 @@
+"""A residual read as a rheologist would: on what it depends, and of which waves it is made."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import permutation_test, rankdata
+
+from discover.loop.run_record import RunRecord
+from discover.loop.waves import Wave, oscillation, read_wave
+from discover.words import percent_of
+
+_BINS = 24
+_DECADES = 30.0
+_SHARED = 0.3
+"""Share of the squared residual that runs must have in common along a coordinate."""
+_AHEAD = 0.1
+"""By how much a coordinate must lead the next to be named alone."""
+
+_FEWEST_RUNS = 5  # with fewer no order of runs is improbable enough
+_PROBABILITY = 0.05
+_PERMUTATIONS = 9999
+
+_ABOVE_NOISE = 4.0  # in a run of its own a drift of chance reaches three
+
+
+@dataclass(frozen=True)
+class Collapse:
+    """How much of the residual the runs share along a coordinate.
+
+    Attributes
+    ----------
+    coordinate
+        What the residuals of all runs were drawn against.
+    share
+        Of the squared residual, that a function of this coordinate alone explains.
+    """
+
+    coordinate: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Trend:
+    """How the residual changes from run to run.
+
+    Attributes
+    ----------
+    quantity
+        What differs between runs.
+    of
+        ``"size"`` of the relative residual, or ``"sign"``: the excess of the prediction.
+    correlation
+        Rank correlation with the quantity.
+    probability
+        Of one as strong among as many unrelated quantities   [Bonferroni].
+    """
+
+    quantity: str
+    of: str
+    correlation: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A residual, read.
+
+    Attributes
+    ----------
+    collapses
+        Coordinates, the one that explains most first.
+    trends
+        From run to run, the least probable first; only those beyond chance.
+    waves
+        One for each oscillating run.
+    """
+
+    collapses: tuple[Collapse, ...]
+    trends: tuple[Trend, ...]
+    waves: tuple[Wave, ...]
+
+    @property
+    def sentences(self) -> list[str]:
+        """What the reading says, each in a sentence; empty where nothing stands out."""
+        return [*self._along(), *self._from_run_to_run(), *self._oscillating()]
+
+    def _along(self) -> list[str]:
+        if not self.collapses or self.collapses[0].share < _SHARED:
+            return []
+        best = self.collapses[0]
+        alike = [c.coordinate for c in self.collapses if best.share - c.share < _AHEAD]
+        if len(alike) > 1:
+            return [
+                f"The residuals of the runs share a pattern ({100 * best.share:.0f} % of their "
+                f"square), along {', '.join(alike[:-1])} and {alike[-1]} alike."
+            ]
+        return [
+            f"Drawn against {best.coordinate} the residuals of the runs fall together: "
+            f"{100 * best.share:.0f} % of their square is one curve. {_HINTS[best.coordinate]}"
+        ]
+
+    def _from_run_to_run(self) -> list[str]:
+        sentences = []
+        for of, what in (
+            ("size", "The relative residual"),
+            ("sign", "What the model predicts too much"),
+        ):
+            trends = [trend for trend in self.trends if trend.of == of]
+            if not trends:
+                continue
+            first = trends[0]
+            text = (
+                f"{what} {'grows' if first.correlation > 0 else 'falls'} from run to run with "
+                f"{_plain(first.quantity)} (rank correlation {first.correlation:.2f}, probability "
+                f"by chance {first.probability:.2g})"
+            )
+            if len(trends) > 1:
+                others = ", ".join(_plain(trend.quantity) for trend in trends[1:])
+                text += f", and follows {others} too: these runs do not tell which of them matters"
+            sentences.append(f"{text}.".replace("-", "−"))
+        return sentences
+
+    def _oscillating(self) -> list[str]:
+        if not self.waves:
+            return []
+        parts = {
+            "in phase with the strain (elastic)": [abs(w.elastic) for w in self.waves],
+            "in phase with the rate (viscous)": [abs(w.viscous) for w in self.waves],
+            "in higher odd harmonics, as of a nonlinear fluid": [w.odd for w in self.waves],
+            "in even harmonics, which a fluid alone does not make": [w.even for w in self.waves],
+            "in a drift": [abs(w.drift) for w in self.waves],
+        }
+        sizes = {name: float(np.mean(values)) for name, values in parts.items()}
+        largest = max(sizes, key=lambda name: sizes[name])
+        if sizes[largest] < _ABOVE_NOISE * float(np.mean([w.noise for w in self.waves])):
+            return []
+        return [
+            f"Over the oscillating runs the residual is mostly {largest}: "
+            f"{percent_of(sizes[largest])} of the fundamental of the stress."
+        ]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the reading as JSON-able values."""
+        return {"sentences": self.sentences, **asdict(self)}
+
+
+_HINTS = {
+    "time": "Look for what needs time and not strain: a slow mode, an offset, a drift.",
+    "time on the instrument's clock": "The instrument answers on its own clock: look at its "
+    "motor, its transducer and its drift.",
+    "strain": "Look at the fluid's nonlinear response, or at a fracture of the edge.",
+    "shear rate": "Look at what depends on rate: slip, heating, a solvent, a missing relaxation.",
+    "stress": "Look at what gives way under stress: compliance, slip, a gain.",
+    "phase of the oscillation": "The same happens in every cycle: look at harmonics below.",
+}
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
+    """Return what the residuals of some runs depend on.
+
+    Parameters
+    ----------
+    records
+        Runs with their predictions.
+    model
+        Which prediction: 0 for the declared model, −1 for the augmented one.
+    """
+    # strains, rates and stresses of a shear and of an extension have no scale in common
+    # only records of one kind fall together; a steady state knows neither time nor strain
+    kinds = [(r.flow, r.quantity) for r in records if r.is_transient]
+    if not kinds:
+        return Reading((), (), ())
+    commonest = max(kinds, key=kinds.count)
+    records = [r for r in records if r.is_transient and (r.flow, r.quantity) == commonest]
+    waves = tuple(w for r in records if (w := read_wave(r, model)) is not None)
+    return Reading(_collapses(records, model), _trends(records, model), waves)
+
+
+def coordinates(records: Sequence[RunRecord]) -> dict[str, list[np.ndarray]]:
+    """Return what the samples of all runs can be drawn against, by name."""
+    found = {
+        "time": [r.time for r in records],
+        "strain": [np.abs(r.strain) for r in records],
+        "shear rate": [r.rate for r in records],
+    }
+    if all(r.quantity != "strain" for r in records):
+        found["stress"] = [r.measured for r in records]
+    if any(np.ptp(r.time - r.instrument_time) > 0 for r in records):
+        found["time on the instrument's clock"] = [r.instrument_time for r in records]
+    frequencies = [oscillation(r) for r in records]
+    if all(w is not None for w in frequencies):
+        found["phase of the oscillation"] = [
+            np.mod(r.time * w / (2.0 * np.pi), 1.0)
+            for r, w in zip(records, frequencies, strict=True)
+            if w is not None
+        ]
+    return found
+
+
+def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]:
+    """Return the share of the squared residual that runs have in common along each coordinate.
+
+    Samples are sorted into bins along the coordinate, logarithmic where it runs over decades. What
+    the others have in a bin on average predicts each run: a run on its own explains nothing.
+    """
+    if len(records) < 2:
+        return ()
+    residual = [r.relative_residual[model] for r in records]
+    total = sum(float(np.mean(row**2)) for row in residual)
+    if total == 0.0:
+        return ()
+    found = []
+    for name, values in coordinates(records).items():
+        every = np.concatenate(values)
+        if np.ptp(every) == 0.0:
+            continue
+        edges = _edges(every)
+        means = np.full((len(records), _BINS), np.nan)
+        places = [
+            np.clip(np.searchsorted(edges, v, side="right") - 1, 0, _BINS - 1) for v in values
+        ]
+        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
+            counts = np.bincount(place, minlength=_BINS)
+            sums = np.bincount(place, row, minlength=_BINS)
+            means[i, counts > 0] = sums[counts > 0] / counts[counts > 0]
+        left = 0.0
+        for i, (place, row) in enumerate(zip(places, residual, strict=True)):
+            others = np.delete(means, i, axis=0)
+            seen = np.any(np.isfinite(others), axis=0)
+            predicted = np.zeros(_BINS)
+            predicted[seen] = np.nanmean(others[:, seen], axis=0)
+            left += float(np.mean((row - predicted[place]) ** 2))
+        found.append(Collapse(name, max(0.0, 1.0 - left / total)))
+    return tuple(sorted(found, key=lambda c: -c.share))
+
+
+def _edges(values: np.ndarray) -> Float[np.ndarray, " bins"]:
+    """Return the lower edges of the bins: equal ratios where the values run over decades."""
+    low, middle, high = np.percentile(values, [1.0, 10.0, 100.0])
+    if low > 0 and high > _DECADES * middle:
+        return np.geomspace(low, high, _BINS, endpoint=False)
+    return np.linspace(low, high, _BINS, endpoint=False)
+
+
+def differences(records: Sequence[RunRecord]) -> dict[str, Float[np.ndarray, " runs"]]:
+    """Return what differs from run to run, by name: of the flow, and what the source says."""
+    found = {
+        "the largest shear rate": [float(np.max(np.abs(r.rate))) for r in records],
+        "the largest strain": [float(np.max(np.abs(r.strain))) for r in records],
+        "the largest stress": [float(np.max(np.abs(r.measured))) for r in records],
+        "the duration": [float(r.time[-1]) for r in records],
+    }
+    names = [n for n in records[0].conditions if all(n in r.conditions for r in records)]
+    found |= {name: [r.conditions[name] for r in records] for name in names}
+    return {
+        name: np.array(values)
+        for name, values in found.items()
+        if np.ptp(values) > 1e-6 * np.max(np.abs(values))
+    }
+
+
+def _trends(records: Sequence[RunRecord], model: int) -> tuple[Trend, ...]:
+    if len(records) < _FEWEST_RUNS:
+        return ()
+    size = np.array([r.errors[model] for r in records])
+    sign = np.array([
+        float(np.sum(r.residual[model] * r.measured)) / max(float(np.sum(r.measured**2)), 1e-300)
+        for r in records
+    ])  # fmt: skip
+    tried = differences(records)
+    found = []
+    for name, values in tried.items():
+        for of, outcome in (("size", size), ("sign", sign)):
+            correlation, probability = _rank_correlation(values, outcome)
+            probability *= 2 * len(tried)
+            if probability < _PROBABILITY:
+                found.append(Trend(name, of, correlation, probability))
+    return tuple(sorted(found, key=lambda t: t.probability))
+
+
+def _rank_correlation(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
+    """Return Spearman's correlation, and its probability by chance from permutations.
+
+    With a handful of runs the usual approximation by a t distribution is far off.
+    """
+    x, y = (rankdata(v) - 0.5 * (len(v) + 1.0) for v in (first, second))
+    scale = float(np.linalg.norm(x) * np.linalg.norm(y))
+    if scale == 0.0:
+        return 0.0, 1.0
+
+    def correlation(ranks, axis=-1):
+        return np.sum(ranks * y, axis=axis) / scale
+
+    # of up to seven runs every permutation is tried, of more a fixed sample
+    test = permutation_test(
+        (x,),
+        correlation,
+        permutation_type="pairings",
+        vectorized=True,
+        n_resamples=_PERMUTATIONS,
+        rng=np.random.default_rng(0),
+    )
+    return float(test.statistic), float(test.pvalue)

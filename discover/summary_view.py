@@ -1,0 +1,136 @@
+"""Results that are constants with intervals: as a table, as intervals, as a figure."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import pandas as pd
+from scipy.stats import norm
+
+from discover.errors import InputError
+from discover.notebook_view import NotebookView
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_HALF_95 = float(norm.ppf(0.975))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A constant that a fit gave.
+
+    Attributes
+    ----------
+    key
+        Its names in the index of a summary, one for each level.
+    value
+        In its unit.
+    ci95
+        95 % interval, in the same unit; None where there is none.
+    unit
+        ``"1"`` for a dimensionless one.
+    error
+        Standard error; None for that of a normal distribution with this interval.
+    notes
+        Further columns of a summary.
+    """
+
+    key: tuple[str, ...]
+    value: float
+    ci95: tuple[float, float] | None
+    unit: str = "1"
+    error: float | None = None
+    notes: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def standard_error(self) -> float | None:
+        """Standard error in its unit; None without an interval."""
+        if self.error is not None or self.ci95 is None:
+            return self.error
+        return 0.5 * (self.ci95[1] - self.ci95[0]) / _HALF_95
+
+    def interval(self, level: float) -> tuple[float, float] | tuple[None, None]:
+        """Return the interval of another probability: each side as far as a normal one's.
+
+        Parameters
+        ----------
+        level
+            Probability, between 0 and 1.
+        """
+        if self.ci95 is None:
+            return None, None
+        share = float(norm.ppf(0.5 + 0.5 * level)) / _HALF_95
+        low, high = (self.value + share * (end - self.value) for end in self.ci95)
+        return low, high
+
+
+class SummaryView(NotebookView):
+    """A result with constants; a class says with `_estimates` which, and with `_figure` who draws.
+
+    Of an estimator these are the terms of its law.
+    """
+
+    _index: ClassVar[tuple[str, ...]] = ("constant",)
+    """Names of the levels of the index."""
+
+    _figure: ClassVar[str] = "discover.report.curves:curves_figure"
+    """Module and function, with a colon between: from the result to a figure."""
+
+    def _estimates(self) -> Sequence[Estimate]:
+        """Return the constants, in the order of the table."""
+        raise NotImplementedError
+
+    def _interval(self, estimate: Estimate, level: float) -> tuple[Any, Any]:
+        return estimate.interval(level)
+
+    def summary(self) -> pd.DataFrame:
+        """Return the constants, one line each: value, standard error, 95 % interval, unit, notes.
+
+        Returns
+        -------
+        Columns ``value``, ``standard_error``, ``low``, ``high``, ``unit``, and what there is to say
+        of each, such as whether it is ``determined``.
+        """
+        estimates = self._estimates()
+        index = self._index_of(estimates)
+        values = [(one.value, one.standard_error) for one in estimates]
+        numbers = pd.DataFrame(values, index=index, columns=["value", "standard_error"])
+        notes = pd.DataFrame([{"unit": one.unit, **one.notes} for one in estimates], index=index)
+        return pd.concat([numbers.astype(float), self.conf_int(), notes], axis=1)
+
+    def conf_int(self, level: float = 0.95) -> pd.DataFrame:
+        """Return confidence intervals of the constants, columns ``low`` and ``high``.
+
+        They hold if the law is right: see ``summary`` for how well it describes the runs.
+
+        Parameters
+        ----------
+        level
+            Probability, between 0 and 1.
+
+        Raises
+        ------
+        InputError
+            If `level` is none.
+        """
+        if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
+            raise InputError(f"level must be a number between 0 and 1; got {level!r}. Try 0.95.")
+        estimates = self._estimates()
+        ends = [self._interval(one, level) for one in estimates]
+        index = self._index_of(estimates)
+        return pd.DataFrame(ends, index=index, columns=["low", "high"], dtype=float)
+
+    def plot(self) -> "Figure":
+        """Return a matplotlib figure of every run, measured and as the result has it."""
+        # the report stands above the results that it shows, and brings matplotlib with it
+        module, _, function = self._figure.partition(":")
+        return getattr(import_module(module), function)(self)
+
+    def _index_of(self, estimates: Sequence[Estimate]) -> pd.Index:
+        if len(self._index) == 1:
+            return pd.Index([one.key[0] for one in estimates], name=self._index[0], dtype=object)
+        keys = [one.key for one in estimates]
+        arrays = list(zip(*keys, strict=True)) or [[] for _ in self._index]
+        return pd.MultiIndex.from_arrays(arrays, names=self._index)

@@ -1,0 +1,157 @@
+"""Every result has ``summary``, ``conf_int``, ``plot`` and a view, and says how well it fits."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm
+
+import discover as dc
+from discover.comparison.comparison import Comparison
+from discover.fitting import NamedLawFit
+from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.results.term_tables import estimates_of
+from discover.learners.run_prediction import RunPrediction
+from discover.learners.settings import default_library
+from discover.loop.loop_result import LoopResult
+from discover.statistics import LackOfFit
+from discover.study import parse_study
+from discover.summary_view import Estimate, SummaryView
+
+COLUMNS = ["value", "standard_error", "low", "high", "unit"]
+FEW = {"n_stability": 0, "n_folds": 0, "max_terms": 3}
+
+
+def sparse_law_of(law, parameters):
+    data = dc.synthetic_dataset(law, parameters, noise=0.01, n_samples=51)
+    # none of these three terms is one of the PTT law
+    library = dc.build_library(["sigma", "gammadot", "sigma.sigma"], degree=0)
+    return dc.TensorSINDy(library, **FEW).fit(data)
+
+
+@pytest.fixture(scope="module")
+def wrong():
+    return sparse_law_of("ptt_exponential", {"epsilon": 0.4})
+
+
+@pytest.fixture(scope="module")
+def right():
+    return sparse_law_of("giesekus", {"alpha": 0.2})
+
+
+def test_a_library_without_the_law_says_at_first_glance_that_its_terms_are_no_finding(wrong):
+    for said in (repr(wrong), wrong._repr_html_(), wrong._repr_mimebundle_()["text/html"]):
+        assert "the rest is systematic" in said
+        assert "No term is determined" in said
+    assert wrong.score(wrong.runs_) > 0.9  # which came without a word
+    assert len(wrong.terms_) == 3
+    assert not wrong.summary()["determined"].str.startswith("yes").any()
+    assert wrong.lack_of_fit_.verdict == "unexplained"
+
+
+def test_a_law_in_the_library_is_said_to_fit_and_its_term_to_be_determined(right):
+    """Negative control of the test above."""
+    assert "Fits to the noise" in repr(right)
+    table = right.summary()
+    assert list(table.columns) == [*COLUMNS, "determined"]
+    assert table.loc["sigma.sigma", "determined"].startswith("yes")
+    # the noise of 1 % leaves a few parts in a thousand of α
+    assert table.loc["sigma.sigma", "value"] == pytest.approx(0.2, abs=0.01)
+
+
+def test_the_verdict_goes_along_in_a_file(wrong, tmp_path):
+    again = dc.load(wrong.save(tmp_path / "law.discover"))
+    assert repr(again) == repr(wrong)
+    pd.testing.assert_frame_equal(again.summary(), wrong.summary())
+    with pytest.raises(dc.InputError, match="holds no data"):
+        again.plot()
+
+
+def test_an_estimator_that_is_not_fitted_shows_its_parameters():
+    sparse = dc.TensorSINDy(max_terms=3)
+    assert repr(sparse) == "TensorSINDy(max_terms=3)"
+    assert "max_terms=3" in sparse._repr_html_()
+
+
+def test_a_law_is_drawn_with_every_run(right):
+    drawing = right.plot()
+    titles = [panel.get_title() for panel in drawing.axes if panel.get_visible()]
+    assert len(titles) == len(right.runs_)
+    assert titles[0].splitlines()[0] == right.runs_[0].name
+
+
+def test_equation_table_and_json_give_a_term_one_sign(wrong):
+    term = min(wrong.terms_, key=lambda one: one.coefficient)
+    assert term.coefficient < 0.0  # the control: a sign that could be lost
+    assert wrong.summary().loc[term.term, "value"] == term.coefficient
+    assert f"− {abs(term.coefficient):.4g} {term.term}" in repr(wrong)
+    latex = wrong.equation_.latex()
+    assert f"- {abs(term.coefficient):.5g}" in latex
+    _, _, right = latex.partition(" = ")
+    assert right == r"\dot{\boldsymbol{\gamma}}"
+    assert wrong.equation_.terms[[t.term for t in wrong.terms_].index(term.term)] == term.in_law
+
+
+@pytest.mark.parametrize("result", [NamedLawFit, LoopResult, Comparison, RunPrediction])
+def test_all_results_have_them_by_one_mechanism(result):
+    assert issubclass(result, SummaryView)
+    for name in ("summary", "conf_int", "plot"):
+        assert getattr(result, name) is getattr(SummaryView, name)
+
+
+def test_intervals_of_other_levels_are_those_of_a_normal_distribution():
+    class Result(SummaryView):
+        def _estimates(self):
+            return [Estimate(("a",), 2.0, (2.0 - norm.ppf(0.975), 2.0 + 2.0 * norm.ppf(0.975)))]
+
+    low, high = Result().conf_int(0.5).loc["a"]
+    assert (2.0 - low, high - 2.0) == pytest.approx((norm.ppf(0.75), 2.0 * norm.ppf(0.75)))
+    assert Result().summary().loc["a", "standard_error"] == pytest.approx(1.5)
+    with pytest.raises(dc.InputError, match="between 0 and 1"):
+        Result().conf_int(95.0)
+
+
+def test_a_result_without_constants_has_an_empty_table():
+    class Result(SummaryView):
+        def _estimates(self):
+            return []
+
+    assert Result().summary().empty
+    assert list(Result().conf_int().columns) == ["low", "high"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "ends", "rivals", "said"),
+    [
+        ("explained", (0.1, 0.3), [], "yes"),
+        ("explained", (0.1, 0.3), [{"sigma.sigma", "sigma"}], "yes"),
+        ("explained", (0.1, 0.3), [{"sigma"}], "no: a law without it"),
+        ("explained", (-0.1, 0.3), [], "no: may be zero"),
+        ("unexplained", (0.1, 0.3), [], "no: the law misses"),
+        ("explained", None, [], "no: without interval"),
+    ],
+)
+def test_a_term_is_determined_if_nothing_speaks_against_it(verdict, ends, rivals, said):
+    left = LackOfFit(verdict, 0.01, 0.01, 0.0, 0.5)
+    (one,) = estimates_of((RecoveredTerm("sigma.sigma", 0.2, ci95=ends),), left, rivals)
+    assert one.notes["determined"].startswith(said)
+
+
+def test_python_and_a_study_search_the_same_library():
+    from discover.comparison.fitting.training import study_library
+
+    study = parse_study({"data": {"folder": "a"}})
+    assert study_library(study) == default_library()
+    assert len(default_library()) > 8  # the control: tensors alone are another library
+
+
+def test_runs_fluids_and_data_sets_have_views():
+    times = np.linspace(0.0, 5.0, 11)
+    stress = 50.0 * (1 - np.exp(-times))
+    run = dc.Run("<slow>.csv", times, dc.start_up(0.5), np.full(11, 0.5), stress)
+    assert "&lt;slow&gt;.csv" in run._repr_html_()
+    assert "<slow>" not in run._repr_html_()
+    fluid = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), [100.0, 10.0], [0.1, 1.0], 2.0)
+    view = fluid._repr_html_()
+    assert "Giesekus" in view
+    assert "22 Pa s" in view  # Σ Gλ + η_s
+    assert "<slow>" not in dc.from_dataframe(run.to_dataframe())._repr_html_()

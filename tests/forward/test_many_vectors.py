@@ -1,0 +1,197 @@
+"""Many vectors at once are predicted as each is by the program that takes them one by one."""
+
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.dataset import Run
+from discover.effects import ConstitutiveEffect, EffectParameter, make_effect
+from discover.effects.library_term import library_effects
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.declared import DeclaredModel
+from discover.forward.program import Program
+from discover.forward.side_by_side import code
+from discover.programs.program_cache import Compiled
+from discover.protocols import oscillatory_shear, start_up
+from discover.protocols.protocol import in_flow
+
+NAMES = (
+    "giesekus_mobility", "ptt_exponential", "thixotropy", "viscous_heating", "tool_compliance",
+    "wall_slip", "rate_rise_time", "transducer_lag", "relaxation_mode",
+)  # fmt: skip
+TERMS = "tr(sigma.sigma)*sigma.sigma", "tr(sigma.gammadot)*I"
+
+
+def runs():
+    times = np.linspace(0.02, 6.0, 60)
+    record = np.full(60, 50.0)
+    return [
+        Run("start-up", times, start_up(0.5), np.full(60, 0.5), record),
+        Run("waves", times[:50], oscillatory_shear(2.0, 1.5), np.zeros(50), record[:50]),
+        Run("extension", 0.3 * times, in_flow(start_up(0.5), "uniaxial"), np.full(60, 0.5), record),
+    ]
+
+
+@pytest.fixture(scope="module")
+def asked():
+    """Return a model, runs, and vectors with each effect and with two of them."""
+    terms = [term for term in library_effects() if term.name in TERMS]
+    assert len(terms) == len(TERMS)
+    effects = [*map(make_effect, NAMES), *terms]
+    declared = DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0], solvent_viscosity=1.0)
+    model = AugmentedModel(declared, effects)
+    names = [effect.name for effect in effects]
+    vectors = [model.zero()]
+    for one, other in zip(names, names[1:] + names[:1], strict=True):
+        for together in ([one], [one, other]):
+            theta = model.zero()
+            for name in together:
+                theta[model.positions(name)] = model.first_trial[model.positions(name)]
+            vectors.append(theta)
+    vectors[3][1] = 0.2  # other times than those that most have
+    return model, make_batch(runs()), np.array(vectors)
+
+
+def one_by_one(model, vectors, batch, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(Program, "side_by_side", lambda *_: None)
+        return model.predictions(vectors, batch)
+
+
+def test_effects_of_every_kind_agree_with_the_other_program(asked, monkeypatch):
+    model, batch, vectors = asked
+    found = model.predictions(vectors, batch)
+    other = one_by_one(model, vectors, batch, monkeypatch)
+    largest = np.max(np.abs(other), axis=2, keepdims=True)
+    assert np.all(np.isfinite(other))
+    # the same scheme in the same steps: roundings alone
+    np.testing.assert_allclose(found / largest, other / largest, atol=1e-11)
+    # and not because effects do nothing
+    assert np.min(np.max(np.abs(other[1:] - other[0]) / largest[0], axis=(1, 2))) > 1e-6
+
+
+def test_a_vector_does_not_depend_on_those_beside_it(asked):
+    model, batch, vectors = asked
+    together = model.predictions(vectors, batch)
+    for i in (0, 3, 7, len(vectors) - 1):
+        alone = model.predictions(vectors[i : i + 1], batch)[0]
+        largest = np.max(np.abs(alone))
+        np.testing.assert_allclose(together[i], alone, atol=1e-12 * largest)
+
+
+def test_a_trial_that_runs_away_is_told_from_the_same_sample_on(asked, monkeypatch):
+    model, batch, vectors = asked
+    away = model.zero()
+    away[model.positions(TERMS[0])] = -5.0
+    found, calm = model.predictions([away, vectors[1]], batch)
+    other = one_by_one(model, [away], batch, monkeypatch)[0]
+    assert np.any(~np.isfinite(other))
+    # what is too large by far in the one may be no number in the other
+    bounded = [np.abs(stress) < 1e6 for stress in (found, other)]
+    np.testing.assert_array_equal(*bounded)
+    np.testing.assert_allclose(calm, model.predictions(vectors[1:2], batch)[0], rtol=1e-12)
+    assert np.all(np.isinf(model.residuals([away], batch, np.array([1e9]))))
+
+
+@dataclass(frozen=True)
+class Iterated(ConstitutiveEffect):
+    """An effect of a user's own that asks for what lanes do not know."""
+
+    def extra_term(self, values, stress, rate):
+        """Return c times σ, found by adding it up in a loop."""
+        del rate
+        total = jax.lax.fori_loop(0, 2, lambda _, x: x + 0.5 * stress, jnp.zeros_like(stress))
+        return values[0] * total
+
+
+def test_an_effect_that_lanes_do_not_know_is_predicted_all_the_same():
+    amplitude = EffectParameter("c", "c", low=0.0, high=10.0, range_source="a test")
+    effect = Iterated("iterated", (amplitude,), equation="c", source="a test", check="none")
+    model = AugmentedModel(DeclaredModel.maxwell(50.0, 2.0), [effect])
+    times = np.linspace(0.1, 6.0, 20)
+    batch = make_batch([Run("a", times, start_up(0.5), np.full(20, 0.5), np.full(20, 10.0))])
+    theta = model.zero()
+    theta[model.positions("iterated")] = 1.0
+    # with c = 1 the mode relaxes twice as fast
+    exact = 50.0 * 0.5 * 1.0 * (1.0 - np.exp(-times / 1.0))
+    # the error of the steps that a loop takes
+    np.testing.assert_allclose(model.predict(theta, batch)[0], exact, rtol=1e-5)
+
+
+def counted(monkeypatch):
+    """Return lists to which kernels and programs that are made from here on are added."""
+    kernels, programs = [], []
+    loaded, made = code.callable_of, Compiled._made
+    monkeypatch.setattr(code, "callable_of", lambda *of: kernels.append(1) or loaded(*of))
+    monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
+    return kernels, programs
+
+
+def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
+    batch, declared = make_batch(runs()), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
+
+    def predicted(declared, *names):
+        model = AugmentedModel(declared, [make_effect(name) for name in names])
+        theta = model.zero()
+        for name in names:
+            theta[model.positions(name)] = model.first_trial[model.positions(name)]
+        return model.predict(theta, batch)
+
+    predicted(declared, "giesekus_mobility", "rate_rise_time", "transducer_lag")
+    kernels, programs = counted(monkeypatch)
+    predicted(declared, "thixotropy", "stress_gain", "wall_slip", TERMS[0], "relaxation_mode")
+    predicted(replace(declared, fit_modulus=True), "ptt_exponential")
+    assert (len(kernels), len(programs)) == (0, 0)
+    # negative control: an effect of a user's own is none of those that stand in every kernel
+    model = AugmentedModel(declared, [replace(make_effect("giesekus_mobility"), name="of_my_own")])
+    model.predict(model.zero(), batch)
+    assert (len(kernels), len(programs)) == (1, 1)
+
+
+def test_other_free_constants_of_a_law_share_the_code(monkeypatch):
+    batch = make_batch(runs()[:2])
+    constants = {"epsilon": 0.2, "xi": 0.1}
+
+    def predicted(*free):
+        model = AugmentedModel(
+            DeclaredModel.named("ptt_linear_non_affine", constants, [60.0, 20.0], [0.1, 2.0], free),
+            [],
+        )
+        return model.predict(model.zero(), batch)
+
+    one = predicted("epsilon")
+    kernels, _ = counted(monkeypatch)
+    np.testing.assert_allclose(predicted("xi", "epsilon"), one, rtol=1e-12)
+    assert not kernels
+
+
+def test_a_linearised_model_has_the_derivatives_of_the_closed_form():
+    moduli, times = np.array([60.0, 20.0]), np.array([0.1, 2.0])
+    declared = DeclaredModel.maxwell(moduli, times, solvent_viscosity=1.0, fit_modulus=True)
+    model, batch = AugmentedModel(declared, [make_effect("stress_gain")]), make_batch(runs()[:1])
+    gain = model.positions("stress_gain")[0]
+    moves = np.array([[3.0, 0.0, 0.0], [0.0, 2.0, 0.5]])
+    found = model.linearise(model.zero(), batch, [0, gain], moves)
+    grown = 0.5 * times[:, None] * (1.0 - np.exp(-runs()[0].time / times[:, None]))
+    whole, weight = moduli @ grown, np.asarray(batch.weight)[0]
+    expected = [whole, whole + 0.5, 3.0 * grown[0], 2.0 * grown[1] + 0.5 * 0.5]
+    np.testing.assert_allclose(found.residual[0], (whole + 0.5 - 50.0) * weight, rtol=1e-5)
+    # the error of the steps that a loop takes, and of a difference of one side
+    for column, exact in zip(found.jacobian[:, 0], expected, strict=True):
+        np.testing.assert_allclose(column, exact * weight, rtol=2e-5)
+
+
+def test_at_an_upper_end_a_derivative_is_taken_from_inside():
+    model = AugmentedModel(DeclaredModel.maxwell(50.0, 2.0), [make_effect("giesekus_mobility")])
+    batch, (at,) = make_batch(runs()[:2]), model.positions("giesekus_mobility")
+    tried, residuals = [], model.residuals
+    model.residuals = lambda thetas, *given: tried.extend(thetas) or residuals(thetas, *given)
+    theta = model.zero()
+    theta[at] = model.high[at]
+    found = model.linearise(theta, batch, [at])
+    assert max(vector[at] for vector in tried) == model.high[at]
+    assert np.all(np.isfinite(found.jacobian))
+    assert np.any(found.jacobian < 0.0)  # a larger mobility lowers the stress

@@ -1,0 +1,100 @@
+"""Runs laid out in one room: one program, and what each predicts stays the same."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from discover.dataset import Run
+from discover.effects import make_effect
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.inference.step_instants import with_places, with_rate_steps
+from discover.laws import Fluid, UpperConvectedMaxwell
+from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
+from discover.simulate import simulate
+
+MODULI, TIMES = np.array([50.0, 120.0, 30.0, 10.0]), np.array([3.0, 0.5, 0.05, 0.01])
+DECLARED = DeclaredModel.maxwell(MODULI, TIMES)
+AMPLITUDES = {"giesekus_mobility": 0.3, "instrument_inertia": 2.0, "tool_compliance": 1e-4}
+
+
+def record(name, flow, end, count):
+    time = np.linspace(end / count, end, count)
+    return Run(name, time, flow, shear_rates(flow, time), np.ones(count))
+
+
+MANY = [
+    record("fast", start_up(5.0), 8.0, 60),
+    record("slow", start_up(0.5), 8.0, 60),
+    record("turned", oscillatory_shear(3.0, 1.2), 8.0, 50),
+]
+FEW = [record("short", start_up(2.0), 1.0, 12)]
+
+
+def model_of(fitted=None):
+    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)], fitted=fitted)
+    theta = model.zero()
+    for name, value in AMPLITUDES.items():
+        theta[model.positions(name)[0]] = value
+    return model, theta
+
+
+@pytest.mark.parametrize("runs", [FEW, MANY[1:], MANY + FEW + MANY[:1]])
+def test_runs_in_the_room_of_others_are_predicted_as_in_their_own(runs):
+    batch = make_batch(runs)
+    alone, theta = model_of()
+    shared, _ = model_of(make_batch(MANY))
+    expected = alone.predict(theta, batch)
+    found = shared.predict(theta, batch)
+    assert found.shape == expected.shape
+    # the same steps; sums of modes may be taken in another order
+    np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(expected))
+
+
+def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
+    batches = [make_batch(runs) for runs in (MANY, FEW, MANY[:2], [*MANY, *MANY])]
+    shared, theta = model_of(batches[0])
+    program, every = shared._program, shared._of_every_effect
+    program.met.clear()
+    every._kernels.clear()
+    for batch in batches:
+        shared.predict(theta, batch)
+    # one kernel for all of them, and no program for vectors one by one
+    assert (len(every._kernels), len(program.met)) == (1, 0)
+
+
+def test_longer_runs_stay_as_they_are():
+    small, large = (make_batch(runs).transients for runs in (FEW, MANY))
+    assert large.laid_out(small.room) == [large]
+    assert [batch.room for batch in small.laid_out(large.room)] == [large.room]
+
+
+def test_a_rate_that_steps_between_samples_still_steps_there():
+    time = np.linspace(0.05, 3.0, 60)
+    run, *others = (
+        Run(f"to_{level}", time, measured_rate(time, rate), rate, np.ones(60))
+        for level in (3.0, 0.5)
+        for rate in [np.where(time < 1.52, 1.0, level)]
+    )
+    declared, [run, *others], _ = with_places(
+        DECLARED, [with_rate_steps(one) for one in (run, *others)], []
+    )
+    assert run.rate_steps
+    batch = make_batch([run])
+    expected = AugmentedModel(declared, []).predict(np.array([0.0, 0.0, 0.3, 0.7]), batch)
+    shared = AugmentedModel(declared, [], fitted=make_batch([run, *others]))
+    np.testing.assert_allclose(
+        shared.predict(np.array([0.0, 0.0, 0.3, 0.7]), batch), expected, rtol=1e-10
+    )
+
+
+def test_weights_of_steps_follow_the_times_that_are_tried():
+    model, flow = AugmentedModel(DECLARED, []), start_up(2.0)
+    run = record("a", flow, 8.0, 60)
+    batch = make_batch([run], strain_step=0.05)
+    for factor in (1.0, 2.0, 1.0):
+        theta = model.zero()
+        theta[1] = np.log(factor)
+        fluid = Fluid(UpperConvectedMaxwell(), jnp.asarray(MODULI), jnp.asarray(factor * TIMES))
+        reference = simulate(fluid, flow, run.time).shear_stress
+        # fixed fourth-order steps of 0.05 strain
+        np.testing.assert_allclose(model.predict(theta, batch)[0], reference, rtol=1e-4)

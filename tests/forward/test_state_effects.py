@@ -1,0 +1,255 @@
+"""Effects that carry state or feel the stress, against analytic solutions and scipy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset import Run
+from discover.effects import make_effect, named_effects
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.inference.least_squares import fit_batch
+from discover.protocols import oscillatory_shear, shear_rates, start_up
+
+MODULUS, TIME = 100.0, 1.0
+STEADY, OSCILLATION = 1.5, (1.2, 2.0)
+TIMES = np.linspace(0.1, 8.0, 60)
+FLOWS = (start_up(STEADY), oscillatory_shear(*OSCILLATION))
+
+
+def make_run(name, flow):
+    rate = shear_rates(flow, TIMES)
+    return Run(name, TIMES, flow, rate, np.ones(len(TIMES)))
+
+
+BATCH = make_batch([make_run(str(i), flow) for i, flow in enumerate(FLOWS)], strain_step=0.1)
+MODEL = AugmentedModel(
+    DeclaredModel.maxwell(MODULUS, TIME),
+    list(named_effects().values()),
+    {"stress": 100.0, "sampling_time": 0.1, "run_time": 8.0, "strain": 12.0},
+)
+
+
+def predict(**effects):
+    theta = MODEL.zero()
+    for name, values in effects.items():
+        at = MODEL.positions(name)
+        theta[at[: len(np.atleast_1d(values))]] = values
+    return MODEL.predict(theta, BATCH)
+
+
+def maxwell_in_start_up(modulus, time, rate=STEADY):
+    return modulus * time * rate * (1 - np.exp(-TIMES / time))
+
+
+def oscillating_rate(t):
+    return OSCILLATION[0] * np.cos(OSCILLATION[1] * t)
+
+
+def integrate(slope, size, rate):
+    solution = solve_ivp(
+        lambda t, y: slope(y, rate(t)), (0, TIMES[-1]), np.zeros(size), t_eval=TIMES,
+        method="DOP853", rtol=1e-10, atol=1e-10,
+    )  # fmt: skip
+    return solution.y
+
+
+@pytest.mark.slow
+def test_all_effects_together_at_zero_amplitude_leave_maxwell():
+    start, oscillation = predict()
+    np.testing.assert_allclose(start, maxwell_in_start_up(MODULUS, TIME), rtol=1e-6)
+    exact = integrate(lambda y, r: MODULUS * r - y / TIME, 1, oscillating_rate)[0]
+    np.testing.assert_allclose(oscillation, exact, atol=1e-4 * MODULUS)
+
+
+@pytest.mark.parametrize("name", sorted(named_effects()))
+def test_every_effect_changes_the_record_and_composes_with_another(name):
+    size = 10 * MODEL.first_trial[MODEL.positions(name)[0]]
+    size = min(size, 0.5 * MODEL.high[MODEL.positions(name)[0]])
+    if name == "viscous_heating":
+        # no fluid of 100 Pa is warmed like that; what is asked is the equation
+        size = 0.1 / MODULUS
+    alone = predict(**{name: size})
+    assert np.all(np.isfinite(alone))
+    assert np.max(np.abs(alone - predict())) > 1e-3 * MODULUS
+    other = "stress_gain" if name != "stress_gain" else "stress_offset"
+    both = predict(**{name: size, other: 0.1})
+    assert np.max(np.abs(both - alone)) > 1e-3
+    assert np.max(np.abs(both - predict(**{other: 0.1}))) > 1e-3
+
+
+def test_an_extra_mode_adds_its_own_start_up():
+    start = predict(relaxation_mode=(40.0, 0.3))[0]
+    exact = maxwell_in_start_up(MODULUS, TIME) + maxwell_in_start_up(40.0, 0.3)
+    np.testing.assert_allclose(start, exact, rtol=1e-6)
+
+
+def test_structure_breaks_down_as_moores_equation_says():
+    breakdown, build_up = 0.3, 2.0
+    start = predict(thixotropy=(breakdown, build_up))[0]
+    decay = 1 / build_up + breakdown * STEADY
+    end = 1 / build_up / decay
+    structure = end + (1 - end) * np.exp(-decay * TIMES)
+    exact = structure * maxwell_in_start_up(MODULUS, TIME)
+    # the rate is constant, so the step of the structure is exact
+    np.testing.assert_allclose(start, exact, rtol=1e-6)
+
+
+def test_slip_lowers_the_steady_stress_and_shortens_its_growth():
+    slip = 0.004
+    start = predict(wall_slip=slip)[0]
+    # σ' = G(γ̇ − sσ) − σ/λ
+    faster = 1 / TIME + slip * MODULUS
+    exact = MODULUS * STEADY / faster * (1 - np.exp(-faster * TIMES))
+    # second order in steps of 0.1 strain
+    np.testing.assert_allclose(start, exact, rtol=2e-3)
+    assert start[-1] < maxwell_in_start_up(MODULUS, TIME)[-1]
+
+
+def test_compliance_delays_the_stress_and_leaves_its_steady_value():
+    compliance = 0.004
+    start, oscillation = predict(tool_compliance=compliance)
+    # σ' = G(γ̇ − Cσ') − σ/λ
+    slower = TIME * (1 + compliance * MODULUS)
+    exact = MODULUS * TIME * STEADY * (1 - np.exp(-TIMES / slower))
+    np.testing.assert_allclose(start, exact, rtol=2e-3)
+    assert start[-1] == pytest.approx(maxwell_in_start_up(MODULUS, TIME)[-1], rel=5e-3)
+
+    def slope(y, rate):
+        return (MODULUS * rate - y / TIME) / (1 + compliance * MODULUS)
+
+    exact = integrate(slope, 1, oscillating_rate)[0]
+    # what gives way is constant in a step of 0.13 rad
+    np.testing.assert_allclose(oscillation, exact, atol=5e-3 * np.max(exact))
+
+
+def test_slip_and_compliance_in_series_with_a_giesekus_fluid_that_has_a_solvent():
+    slip, compliance, mobility, solvent = 0.003, 0.002, 0.3, 10.0
+    oscillation = predict(
+        wall_slip=slip, tool_compliance=compliance, giesekus_mobility=mobility,
+        solvent_viscosity=solvent,
+    )[1]  # fmt: skip
+    # γ + Cσ is followed exactly where σ is a state: T = σ12 + η r, and r = γ̇ − sT − C dT/dt, so
+    # that r obeys C η r' = γ̇ − s T − C σ12' − r
+
+    def slope(y, rate):
+        s11, s22, s33, s12, felt = y
+
+        def relax(component, square):
+            return -(component + mobility * square)
+
+        d12 = felt * (1 + s22) + relax(s12, s12 * (s11 + s22))
+        torque = MODULUS * s12 + solvent * felt
+        # before the flow the torque was zero, so the felt rate starts at zero and rises fast
+        change = (rate - slip * torque - compliance * MODULUS * d12 - felt) / (compliance * solvent)
+        return [
+            2 * felt * s12 + relax(s11, s11**2 + s12**2),
+            relax(s22, s22**2 + s12**2),
+            relax(s33, s33**2),
+            d12,
+            change,
+        ]
+
+    exact = integrate(slope, 5, oscillating_rate)
+    torque = MODULUS * exact[3] + solvent * exact[4]
+    np.testing.assert_allclose(oscillation, torque, atol=1e-2 * np.max(torque))
+
+
+@pytest.mark.parametrize("name", ["viscous_heating", "softening_by_work"])
+def test_heat_and_work_shorten_the_relaxation_times(name):
+    heating, loss = 1e-3, 2.0
+    start, oscillation = predict(**{name: (heating, loss)})
+
+    def slope(y, rate):
+        return [
+            MODULUS * rate - y[0] * np.exp(y[1]) / TIME,
+            heating * y[0] * rate - y[1] / loss,
+        ]
+
+    # second order in steps of 0.1 strain
+    for record, rate in ((start, lambda t: STEADY), (oscillation, oscillating_rate)):
+        exact = integrate(slope, 2, rate)[0]
+        np.testing.assert_allclose(record, exact, atol=2e-3 * np.max(exact))
+    assert start[-1] < 0.95 * maxwell_in_start_up(MODULUS, TIME)[-1]
+
+
+def test_a_yield_stress_raises_the_steady_stress_as_saramito_says():
+    yield_strain = 0.2
+
+    def slope(y, rate):
+        s11, s22, s33, s12 = y
+        deviator = 0.5 * (s11**2 + s22**2 + s33**2 + 2 * s12**2 - (s11 + s22 + s33) ** 2 / 3)
+        share = max(0.0, 1 - yield_strain / np.sqrt(max(deviator, 1e-24)))
+        return [
+            2 * rate * s12 - share * s11, -share * s22, -share * s33,
+            rate * (1 + s22) - share * s12,
+        ]  # fmt: skip
+
+    start = predict(yield_stress=yield_strain)[0]
+    exact = MODULUS * integrate(slope, 4, lambda t: STEADY)[3]
+    np.testing.assert_allclose(start, exact, atol=1e-3 * np.max(exact))
+    assert start[-1] > 1.05 * maxwell_in_start_up(MODULUS, TIME)[-1]
+
+
+SLIP, INERTIA, FRICTION = 0.5 / (MODULUS * TIME), 15.0, 20.0
+
+
+def slipping(rate):
+    """Return stress and felt rate at the samples of a Maxwell fluid that slips, by scipy."""
+
+    def slope(stress, commanded):
+        return MODULUS * (commanded - SLIP * stress) - stress / TIME
+
+    stress = integrate(slope, 1, rate)[0]
+    return stress, rate(TIMES) - SLIP * stress
+
+
+def test_inertia_and_friction_follow_the_tool_and_not_the_fluid_that_slips():
+    record = predict(
+        wall_slip=SLIP, instrument_inertia=INERTIA, bearing_friction=FRICTION
+    )[1]  # fmt: skip
+    stress, felt = slipping(oscillating_rate)
+    amplitude, frequency = OSCILLATION
+    tool = -amplitude * frequency * np.sin(frequency * TIMES)
+    exact = stress + INERTIA * tool + FRICTION * np.sign(oscillating_rate(TIMES))
+    # slip to second order, slopes by central differences, both in steps of 0.1 strain
+    np.testing.assert_allclose(record, exact, atol=0.01 * np.max(np.abs(exact)))
+    # the control: the rate that the fluid feels would miss by far more
+    follows_fluid = stress + INERTIA * np.gradient(felt, TIMES) + FRICTION * np.sign(felt)
+    assert np.sqrt(np.mean((follows_fluid - exact) ** 2) / np.mean(stress**2)) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("between", "tool"),
+    [
+        # a motor that lags moves the tool late: τ x' + x = γ̇ from rest, x' = (γ̇ − x)/τ
+        ({"rate_rise_time": 0.4}, lambda: (oscillating_rate(TIMES) - lagged(0.4)) / 0.4),
+        # a wrong gap does not change what the tool does, and a soft tool moves where it is driven
+        ({"rate_gain": 0.3}, lambda: np.gradient(oscillating_rate(FINE), FINE)[::50]),
+        ({"tool_compliance": 0.004}, lambda: np.gradient(oscillating_rate(FINE), FINE)[::50]),
+    ],
+    ids=lambda value: next(iter(value)) if isinstance(value, dict) else "",
+)
+def test_the_tool_feels_what_is_upstream_of_it_alone(between, tool):
+    added = predict(instrument_inertia=INERTIA, **between)[1] - predict(**between)[1]
+    # central differences in steps of 0.08 s, of a rate that begins to rise; one-sided at the end
+    np.testing.assert_allclose(added[:-1], INERTIA * tool()[:-1], atol=0.02 * INERTIA * 2.4)
+
+
+FINE = np.linspace(TIMES[0], TIMES[-1], 50 * (len(TIMES) - 1) + 1)
+
+
+def lagged(tau):
+    return integrate(lambda x, rate: (rate - x) / tau, 1, oscillating_rate)[0]
+
+
+def test_a_correction_for_inertia_that_is_too_large_is_found():
+    stress = integrate(lambda y, rate: MODULUS * rate - y / TIME, 1, oscillating_rate)[0]
+    tool = -OSCILLATION[0] * OSCILLATION[1] * np.sin(OSCILLATION[1] * TIMES)
+    noise = 0.01 * np.sqrt(np.mean(stress**2)) * np.random.default_rng(1).normal(size=len(TIMES))
+    run = Run("1", TIMES, FLOWS[1], oscillating_rate(TIMES), stress - 8.0 * tool + noise)
+    name = "instrument_inertia"
+    model = AugmentedModel(
+        DeclaredModel.maxwell(MODULUS, TIME), [make_effect(name)], data_scales([run])
+    )
+    fit = fit_batch(model, make_batch([run]), [model.zero()], [model.positions(name)])[0]
+    assert fit.theta[model.positions(name)[0]] == pytest.approx(-8.0, rel=0.05)

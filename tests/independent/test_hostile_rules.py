@@ -1,0 +1,152 @@
+"""The rules by which a claim is a confident falsehood, on claims written by hand."""
+
+import ast
+from dataclasses import replace
+
+import hostile
+import numpy as np
+import product
+import pytest
+from hostile import GROUPS, case_named, judge, make
+from independent.noise import rms
+from run import ask
+
+KNOWN, PLANTED = case_named("control_ucm"), case_named("mobility")
+OUTSIDE, EMPTY = replace(KNOWN, outside=True), case_named("dead_sensor")
+MADE: dict[str, tuple] = {}
+
+
+def made(case):
+    """Return the runs of a case, made once."""
+    if case.truth not in MADE:
+        MADE[case.truth] = make(case, 0)
+    return MADE[case.truth]
+
+
+def stage(effect, aliases=(), **parameters):
+    values = {
+        name: {"value": value, "ci95": list(interval)}
+        for name, (value, interval) in parameters.items()
+    }
+    return {"effect": effect, "aliases": list(aliases), "parameters": values}
+
+
+def claim(case, verdict, stages=(), off=0.0, **more):
+    """Return the falsehoods of a loop whose prediction is off by this many times the noise."""
+    clean, noisy = made(case)
+    rows = {}
+    for name, run in clean.items():
+        exact = run.columns["stress_Pa"]
+        size = rms(noisy[name].columns["stress_Pa"] - exact)
+        rows[name, "sigma12", "augmented"] = {
+            "time": run.columns["time_s"],
+            "value": exact + off * size,
+        }
+    said = {"verdict": verdict, "stages": list(stages), **more}
+    return judge(case, "close-loop", said, rows, clean, noisy)["false"]
+
+
+@pytest.mark.parametrize("verdict", ["effects_added", "no_effect_needed"])
+def test_to_explain_nothing_is_false(verdict):
+    assert claim(EMPTY, verdict)
+
+
+@pytest.mark.parametrize("verdict", ["unexplained", "no_signal"])
+def test_to_claim_nothing_is_never_false(verdict):
+    for case in (EMPTY, OUTSIDE, PLANTED, KNOWN):
+        assert not claim(case, verdict, [stage("wall_slip")], off=3.0)
+
+
+def test_to_explain_what_is_missed_is_false_and_what_is_met_is_not():
+    assert claim(OUTSIDE, "no_effect_needed", off=0.8)
+    assert not claim(OUTSIDE, "no_effect_needed", off=0.2)
+
+
+def test_a_name_must_be_planted_or_an_alias_of_what_is():
+    right = {"alpha": (0.31, (0.29, 0.33))}
+    assert not claim(PLANTED, "effects_added", [stage("giesekus_mobility", **right)])
+    alias = stage("ptt_linear", ["giesekus_mobility"])
+    assert not claim(PLANTED, "effects_added", [alias])
+    assert claim(PLANTED, "effects_added", [stage("ptt_linear", ["wall_slip"])])
+    assert claim(KNOWN, "effects_added", [stage("ptt_linear")])
+    assert claim(PLANTED, "no_effect_needed", off=2.0)
+
+
+def test_an_interval_may_miss_by_three_half_widths_and_no_more():
+    near = {"alpha": (0.34, (0.32, 0.36))}
+    far = {"alpha": (0.40, (0.38, 0.42))}
+    assert not claim(PLANTED, "effects_added", [stage("giesekus_mobility", **near)])
+    assert claim(PLANTED, "effects_added", [stage("giesekus_mobility", **far)])
+
+
+@pytest.mark.parametrize(
+    ("statement", "half_band", "off", "false"),
+    [
+        ({"undetermined": ["N1"]}, 0.0, 0.5, False),
+        ({"statements": [{"quantity": "N1", "determined": "no"}]}, 0.0, 0.5, False),
+        ({}, None, 0.5, True),
+        ({}, 0.1, 0.5, True),
+        ({}, 0.1, 0.15, False),
+    ],
+)
+def test_a_normal_stress_that_is_determined_holds_within_two_bands(
+    statement, half_band, off, false
+):
+    clean, noisy = made(KNOWN)
+    rows = {}
+    for name, run in clean.items():
+        size, time = rms(run.N1), run.columns["time_s"]
+        value, half = run.N1 + off * size, (np.nan if half_band is None else half_band) * size
+        band = {"value": value, "low": value - half, "high": value + half}
+        rows[name, "N1", "tensor_sindy"] = {"time": time, **band}
+        exact = {"time": time, "value": run.columns["stress_Pa"]}
+        rows[name, "sigma12", "tensor_sindy"] = {
+            **exact,
+            "low": time + np.nan,
+            "high": time + np.nan,
+        }
+    said = {"verdict": "explained", "learners": {"tensor_sindy": {"terms": []}}}
+    said |= {"undetermined": [], "statements": [], **statement}
+    found = judge(KNOWN, "compare", said, rows, clean, noisy)["false"]
+    assert bool(found) == false
+
+
+def test_a_law_that_is_told_apart_from_the_truth_is_false():
+    law = replace(KNOWN, truth="giesekus")
+    laws = [{"law": "xpp", "is_told_apart": False}, {"law": "giesekus", "is_told_apart": True}]
+    assert claim(law, "no_effect_needed", laws=laws)
+    laws[1]["is_told_apart"] = False
+    assert not claim(law, "no_effect_needed", laws=laws)
+
+
+def test_every_line_of_the_file_is_a_case_with_records_that_reproduce():
+    assert len(GROUPS["bad_days"]) >= 60
+    assert sum(map(len, GROUPS.values())) >= 500
+    for cases in hostile.FILE["sets"].values():  # to make all takes minutes
+        for case in (case for name, case in cases.items() if name != "all"):
+            for text in (case.get(key, "UCM") for key in ("records", "noise", "tables", "export")):
+                named = [n.id for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Name)]
+                assert {*named} <= hostile.words().keys(), text
+    one, other = (make(case_named("correlated"), 3)[1]["fast.csv"].columns for _ in range(2))
+    np.testing.assert_array_equal(one["stress_Pa"], other["stress_Pa"])
+    with pytest.raises(ValueError, match="no expression"):
+        hostile.evaluated(ast.parse("[x for x in y]", mode="eval").body, {})
+
+
+@pytest.mark.parametrize(
+    ("question", "loop"),
+    [
+        # few candidates are a small program
+        ("close-loop", {"effects": ["giesekus_mobility", "stress_gain", "tool_compliance"]}),
+        pytest.param("close-loop", {}, marks=pytest.mark.slow),
+        pytest.param("compare", {}, marks=pytest.mark.slow),
+    ],
+    ids=["few candidates", "close-loop", "compare"],
+)
+def test_a_dead_sensor_goes_through_the_whole_program_without_a_claim(
+    question, loop, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(hostile, "case_named", lambda name: replace(EMPTY, loop=loop))
+    row = ask("hostile", "dead_sensor", question, 0, str(tmp_path), 600.0)
+    assert row["verdict"] not in (*product.CONFIDENT, "fault", "late"), row.get("message")
+    assert not row.get("false")

@@ -1,0 +1,121 @@
+"""The likelihood, priors and mixtures of the engine are those of textbooks, computed by scipy."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal, norm
+
+import discover as dc
+from discover.inference.engine.noise import Noise, NoiseModel
+from discover.inference.engine.posterior import quantiles
+from discover.inference.engine.priors import Prior
+from discover.inference.engine.rows import Rows
+from discover.protocols import start_up
+
+
+def rows_of(counts, lot):
+    """Return rows of start-ups of so many samples each, of stresses about one Pa."""
+    runs = []
+    for number, n in enumerate(counts):
+        time = np.linspace(0.1, 5.0, n)
+        stress = 1.0 - np.exp(-time) + 0.01 * lot.standard_normal(n)
+        runs.append(dc.Run(f"{number}.csv", time, start_up(1.0), np.ones(n), stress))
+    return Rows.of(runs)
+
+
+def autoregressive(correlation, n, lot):
+    """Return a stationary AR(1) sequence of variance one."""
+    out = lot.standard_normal(n)
+    for i in range(1, n):
+        out[i] = correlation * out[i - 1] + np.sqrt(1 - correlation**2) * out[i]
+    return out
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return rows_of((40, 60), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.6])
+@pytest.mark.parametrize("share", [0.0, 0.9])
+def test_whitening_is_the_density_of_correlated_noise(rows, correlation, share):
+    model, lot = NoiseModel(rows), np.random.default_rng(1)
+    predicted, residual = 0.5 + lot.random(len(rows)), 0.02 * lot.standard_normal(len(rows))
+    noise = Noise(np.array([0.01, 0.03]), 0.02, correlation, share)
+    white = model.whitened(residual[:, None], predicted, noise)[:, 0]
+    found = model.log_determinant(predicted, noise) - 0.5 * white @ white
+    deviation = model.deviation(predicted, share) * noise.sizes[rows.run]
+    same = rows.run[:, None] == rows.run
+    apart = np.abs(np.subtract.outer(np.arange(len(rows)), np.arange(len(rows))))
+    covariance = np.outer(deviation, deviation) * same * correlation**apart
+    exact = multivariate_normal(np.zeros(len(rows)), covariance).logpdf(residual)
+    constant = 0.5 * len(rows) * np.log(2 * np.pi)
+    assert found - constant == pytest.approx(exact, rel=1e-9)  # rounding of a determinant
+
+
+@pytest.mark.parametrize(("correlation", "about"), [(0.0, 0.0), (0.6, 0.6)])
+def test_the_correlation_of_noise_is_told_from_its_residual(correlation, about):
+    lot = np.random.default_rng(2)
+    rows = rows_of((400, 400), lot)
+    sizes = np.repeat([0.01, 0.03], 400) * rows.size
+    residual = np.concatenate([autoregressive(correlation, 400, lot) for _ in range(2)]) * sizes
+    _, noise = NoiseModel(rows).log_likelihood(residual, rows.recorded)
+    assert noise.correlation == about
+    # of 400 samples a deviation is told to 3.5 %, of as many as 100 independent ones to 7 %
+    np.testing.assert_allclose(noise.sizes, [0.01, 0.03], rtol=0.2)
+
+
+def test_a_run_left_out_says_nothing(rows):
+    lot = np.random.default_rng(3)
+    residual = 0.01 * lot.standard_normal(len(rows))
+    loud = np.where(rows.run == 1, 50.0 * residual, residual)
+    model = NoiseModel(rows, without=1)
+    both = [model.log_likelihood(one, rows.recorded)[0] for one in (residual, loud)]
+    assert both[0] == both[1]
+    whole = NoiseModel(rows)
+    assert whole.log_likelihood(residual, rows.recorded)[0] != pytest.approx(
+        whole.log_likelihood(loud, rows.recorded)[0]
+    )
+
+
+def test_what_runs_away_has_no_likelihood(rows):
+    residual = np.full(len(rows), np.nan)
+    assert NoiseModel(rows).log_likelihood(residual, rows.recorded)[0] == -np.inf
+
+
+PRIORS = [
+    Prior("normal", 1.0, 0.5),
+    Prior("normal", 0.0, 0.5, low=0.0),
+    Prior("amplitude", 0.0, 0.2, low=0.0, high=np.inf),
+    Prior("amplitude", 0.0, 0.2),
+    Prior("logarithm", 2.0, 1.5),
+]
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+def test_a_prior_is_a_density_of_its_coordinate(prior):
+    low = prior.centre if prior.low == prior.centre and not prior.is_logarithm else -np.inf
+    whole, _ = quad(lambda x: np.exp(prior.log_density(x)), low, np.inf)
+    assert whole == pytest.approx(1.0, abs=1e-6)  # of the quadrature
+
+
+@pytest.mark.parametrize("prior", PRIORS)
+@pytest.mark.parametrize("coordinate", [0.05, 0.7, 3.0])
+def test_the_pull_of_a_prior_is_its_slope(prior, coordinate):
+    step = 1e-6
+    ends = [prior.log_density(coordinate + sign * step) for sign in (1, -1)]
+    slope, curvature = prior.pull(coordinate)
+    assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-6, abs=1e-8)
+    assert curvature > 0.0
+
+
+def test_quantiles_of_a_mixture_are_those_of_its_draws():
+    weights, middle, deviation = np.array([3.0, 1.0]), np.array([0.0, 4.0]), np.array([1.0, 0.5])
+    lot = np.random.default_rng(4)
+    chosen = lot.choice(2, 400_000, p=weights / 4.0)
+    drawn = lot.normal(middle[chosen], deviation[chosen])
+    found = quantiles(weights, middle[:, None], deviation[:, None] ** 2, (0.025, 0.5, 0.975))
+    # the standard error of a quantile of so many draws is below 0.005
+    np.testing.assert_allclose(np.ravel(found), np.quantile(drawn, (0.025, 0.5, 0.975)), atol=0.02)
+    one = quantiles(np.ones(1), np.zeros((1, 1)), np.ones((1, 1)), (0.975,))
+    assert one[0][0] == pytest.approx(norm.ppf(0.975), abs=1e-9)

@@ -1,0 +1,245 @@
+"""Constants of the declared law that differ from mode to mode; stresses by scipy."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from independent import Giesekus
+from independent.folders import write_table
+from independent.homogeneous import GiesekusFluid
+from modes_in_start_up import NOISE, noisy_start_ups
+
+import discover as dc
+from discover.dataset import Dataset, Run
+from discover.effects import known_effects, make_effect
+from discover.errors import InputError
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.by_mode import DEGREE
+from discover.loop import DeclaredModel
+from discover.protocols import in_flow, start_up
+from discover.report.plots.by_mode import by_mode_picture
+
+MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
+RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
+
+
+@cache
+def data(mobilities, rates=RATES):
+    """Return start-ups of shear with white noise."""
+    runs = noisy_start_ups(mobilities, MODULI, TIMES, rates, 12.0, seed=0)
+    return Dataset("three modes", tuple(runs))
+
+
+@cache
+def loop(mobilities, rates=RATES, by_mode=("alpha",)):
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI, TIMES)
+    return dc.close_loop(
+        data(mobilities, rates), base, free=["alpha"], by_mode=by_mode, effects=["stress_gain"],
+        max_effects=1, explanations=1,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "mobilities", [(0.1, 0.3, 0.6), pytest.param((0.5, 0.1, 0.5), marks=pytest.mark.slow)]
+)
+def test_the_constant_of_each_mode_is_found(mobilities):
+    result = loop(mobilities)
+    found = result.declared_parameters["alpha"]
+    assert result.verdict == "no_effect_needed"
+    # the noise alone is left
+    assert result.error_after.fit == pytest.approx(NOISE, rel=0.1)
+    assert result.differing_by_mode == ("alpha",)
+    for mode, mobility in zip(found.modes, mobilities, strict=True):
+        low, high = mode.ci95
+        # twice the interval: of six of 95 % one may miss
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+        assert high - low < 0.1
+        assert not mode.left_open
+    # one constant leaves some 9 %
+    assert found.evidence[-1] > 100.0
+
+
+@pytest.mark.slow
+def test_a_mode_that_no_flow_reaches_is_not_determined():
+    # at 1 1/s the fastest mode feels a Weissenberg number of 0.05
+    slow = loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).declared_parameters["alpha"]
+    assert [mode.left_open for mode in slow.modes] == [False, False, True]
+    assert slow.modes[2].ci95 is None
+
+
+@pytest.mark.slow
+def test_an_effect_that_the_loop_adds_gets_a_constant_for_each_mode():
+    base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
+    asked = {"effects": ["giesekus_mobility", "stress_gain"], "by_mode": ["giesekus_mobility"]}
+    result = dc.close_loop(data((0.1, 0.3, 0.6)), base, **asked)
+    stage = next(one for one in result.stages if one.effect == "giesekus_mobility")
+    found = stage.parameters["alpha"]
+    of_law = loop((0.1, 0.3, 0.6)).declared_parameters["alpha"]
+    assert (result.verdict, result.differing_by_mode) == ("effects_added", ("giesekus_mobility",))
+    # the same fluid as the Giesekus law by mode, to where fits stop
+    for mode, same in zip(found.modes, of_law.modes, strict=True):
+        assert mode.value == pytest.approx(same.value, rel=1e-2)
+    named = result.equation().named
+    assert named is not None
+    assert named.law == "giesekus"
+    assert [one["alpha"] for one in named.constants] == [mode.value for mode in found.modes]
+    # and with equal mobilities it stays one constant
+    equal = dc.close_loop(data((0.3, 0.3, 0.3)), base, **asked)
+    assert equal.differing_by_mode == ()
+    assert equal.equation().terms[0].coefficient == pytest.approx(0.3, rel=0.02)
+
+
+def test_a_library_term_by_mode_that_does_not_differ_is_the_term():
+    name = "tr(sigma.sigma)*sigma"
+    run = data((0.3, 0.3, 0.3)).runs[2]
+    batch, predicted = make_batch([run]), []
+    for by_mode in ((), (name,)):
+        declared = DeclaredModel.maxwell(MODULI, TIMES, by_mode=by_mode)
+        model = AugmentedModel(declared, [make_effect(name)])
+        theta = model.zero()
+        theta[model.positions(name)] = 0.02
+        predicted.append(model.predict(theta, batch))
+        theta[model.varying(name)[:1]] = 1e-3
+        varied = model.predict(theta, batch)
+    np.testing.assert_allclose(*predicted, rtol=1e-12)
+    assert np.max(np.abs(varied / predicted[1] - 1.0)) > 1e-3
+
+
+CONSTANTS = {
+    "alpha": lambda: DeclaredModel.named(
+        "giesekus", {"alpha": 0.3}, MODULI, TIMES, free=["alpha"], by_mode=("alpha",)
+    ),
+    "giesekus_mobility": lambda: DeclaredModel.maxwell(
+        MODULI,
+        TIMES,
+        effects=known_effects({"giesekus_mobility": "fit"}),
+        by_mode=("giesekus_mobility",),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CONSTANTS)
+@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+def test_the_forward_model_gives_each_mode_its_constant(kind, name):
+    mobilities = np.array([0.1, 0.3, 0.6])
+    declared = CONSTANTS[name]()
+    model = AugmentedModel(declared, [])
+    theta = model.zero()
+    theta[model.constant(name)[1]] = 0.3
+    deviations = np.log(mobilities / (1.0 - mobilities)) - np.log(0.3 / 0.7)
+    theta[model.varying(name)[DEGREE:]] = deviations
+    times = np.linspace(0.05, 2.0, 30)
+    truth = sum(
+        GiesekusFluid((g,), (t,), a).recorded(kind, lambda _: 2.0, times)
+        for g, t, a in zip(MODULI, TIMES, mobilities, strict=True)
+    )
+    run = Run("x", times, in_flow(start_up(2.0), kind), np.full(30, 2.0), truth)
+    predicted = model.predict(theta, make_batch([run], strain_step=0.05))[0]
+    # the integrator's error on such steps
+    np.testing.assert_allclose(predicted, truth, atol=1e-3 * np.max(np.abs(truth)))
+
+
+@pytest.mark.slow
+def test_a_flow_curve_tells_each_constant(tmp_path):
+    # steady shear in closed form   [Bird, Armstrong & Hassager 1987, table 7.3-2]
+    mobilities, rates = (0.1, 0.3, 0.6), np.geomspace(0.03, 300.0, 60)
+    modes = [Giesekus(*of) for of in zip(mobilities, MODULI, TIMES, strict=True)]
+    stress = np.array([sum(mode.steady_shear(rate)[0] for mode in modes) for rate in rates])
+    noise = NOISE * np.random.default_rng(0).standard_normal(len(rates))
+    columns = {"shear_rate_1_s": rates, "stress_Pa": stress * (1.0 + noise)}
+    write_table(tmp_path / "flow_curve.csv", columns)
+    curve = dc.load_dataset(tmp_path).with_material_functions()
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI, TIMES)
+    found = dc.close_loop(
+        curve, base, free=["alpha"], by_mode=["alpha"], effects=["stress_gain"], max_effects=0
+    ).declared_parameters["alpha"]
+    assert found.degree > 0
+    for mode, mobility in zip(found.modes, mobilities, strict=True):
+        low, high = mode.ci95
+        assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
+
+
+class Interrupted(BaseException):
+    """Ctrl-C, when the effect is in."""
+
+
+class Store(dict):
+    def load(self, part):
+        return json.loads(self[part]) if part in self else None
+
+    def save(self, part, content):
+        self[part] = json.dumps(content)
+        if content["active"]:
+            raise Interrupted
+
+
+@pytest.mark.slow
+def test_the_picture_says_what_is_determined_and_what_is_not():
+    drawn = by_mode_picture(loop((0.1, 0.3, 0.6), rates=(0.1, 0.3, 1.0)).by_mode, False)
+    assert drawn is not None
+    assert "Not determined by these data in the modes of 0.05 s" in drawn.caption
+    assert by_mode_picture({}, False) is None
+
+
+def test_a_law_by_mode_is_written_out_with_the_constants_of_each():
+    result = loop((0.1, 0.3, 0.6))
+    assert result.fluid is None
+    named = result.equation().named
+    assert named is not None
+    assert named.law == "giesekus"
+    found = [mode.value for mode in result.declared_parameters["alpha"].modes]
+    assert [one["alpha"] for one in named.constants] == pytest.approx(found)
+    declared = result.to_json()["declared"]
+    assert (declared["effects"], declared["by_mode"]) == ([], ["alpha"])
+    # what the loop started from, for others to start from
+    assert [one["alpha"] for one in declared["law"]["named"]["constants"]] == pytest.approx(found)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"free": [], "by_mode": ("alpha",)}, "no parameter of the law that is fitted"),
+        ({"by_mode": ("xi",)}, "by_mode names 'xi'"),
+        ({"by_mode": ("modulus_Pa",), "free": ["modulus_Pa"]}, "by_mode names 'modulus_Pa'"),
+        ({"by_mode": ("alpha", "alpha")}, "twice"),
+        ({"by_mode": "alpha"}, r"Write \['alpha'\]"),
+        ({"by_mode": ("alpha",), "modes": 1}, "has one mode"),
+        ({"by_mode": ("thixotropy",)}, "adds no term to the law of each mode"),
+        ({"by_mode": ("ptt_linear",), "effects": ["stress_gain"]}, "nor a candidate"),
+        (
+            {"by_mode": ("ptt_linear",), "known_effects": {"ptt_linear": {"epsilon": 0.1}}},
+            "whose epsilon has a value",
+        ),
+    ],
+)
+def test_what_cannot_differ_by_mode_is_refused(options, text):
+    modes = options.pop("modes", 3)
+    base = dc.Fluid(dc.make_law("giesekus", {"alpha": 0.2}), MODULI[:modes], TIMES[:modes])
+    with pytest.raises(InputError, match=text):
+        dc.close_loop(data((0.3, 0.3, 0.3)), base, **({"free": ["alpha"]} | options))
+
+
+def told_maxwell(mobilities, rates=RATES):
+    base = dc.Fluid(dc.make_law("ucm"), MODULI, TIMES)
+    # other explanations change neither stages nor constants by mode
+    asked = {"effects": ["giesekus_mobility", "stress_gain"], "max_effects": 2, "explanations": 1}
+    return dc.close_loop(data(mobilities, rates), base, held_out=[f"{rates[2]}"], **asked)
+
+
+@pytest.mark.slow
+def test_constants_that_differ_from_mode_to_mode_are_found_without_being_asked_for():
+    result = told_maxwell((0.1, 0.3, 0.6))
+    assert result.verdict == "effects_added"
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    assert result.differing_by_mode == ("giesekus_mobility",)
+    assert result.error_after.held_out == pytest.approx(NOISE, rel=0.3)  # 50 samples of noise
+
+
+@pytest.mark.slow
+def test_control_one_constant_that_explains_the_runs_stays_one():
+    result = told_maxwell((0.3, 0.3, 0.3))
+    assert [stage.effect for stage in result.stages] == ["giesekus_mobility"]
+    assert result.differing_by_mode == ()
+    low, high = result.stages[0].parameters["alpha"].ci95
+    assert low < 0.3 < high

@@ -1,0 +1,125 @@
+"""Of several laws the one that made the records is taken, and what cannot be told is said."""
+
+import numpy as np
+import pytest
+from independent import ExtendedPomPom, Giesekus, RoliePoly, Thixotropic, UpperConvectedMaxwell
+from independent.flow import start_up as flow_at
+from independent.noise import white
+
+import discover as dc
+from discover.errors import InputError
+from discover.report.loop.verdict import loop_verdict
+
+NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
+NOISE = 0.005
+
+
+def runs(law, rates, seed=0, end=8.0):
+    generator = np.random.default_rng(seed)
+    times = np.geomspace(0.05, end, 40)
+    out = []
+    for rate in rates:
+        stress = 100.0 * law.respond(flow_at(rate), times).sigma12
+        stress = white(stress, NOISE, generator)
+        protocol = dc.start_up(rate)
+        out.append(dc.Run(f"at_{rate:g}", times, protocol, np.full(40, rate), stress))
+    return dc.Dataset("planted", tuple(out))
+
+
+def chosen(data, held_out=(), names=NAMES):
+    base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
+    # none is added: with one candidate each law is a small program, with all of them a large one
+    return dc.close_loop(
+        data, base, held_out=held_out, laws=names, effects=["stress_offset"], max_effects=0
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "name", "constants"),
+    [
+        (Giesekus(0.3), "giesekus", {"alpha": 0.3}),
+        (RoliePoly(0.7, 0.1), "rolie_poly", {"stretch_time_ratio": 0.1, "beta": 0.7}),
+        (
+            ExtendedPomPom(4.0, 0.15, 0.3),
+            "xpp",
+            {"q": 4.0, "stretch_time_ratio": 0.3, "alpha": 0.15},
+        ),
+    ],
+    ids=["giesekus", "rolie_poly", "xpp"],
+)
+def test_the_law_that_made_the_records_is_taken_and_its_interval_holds(law, name, constants):
+    found = chosen(runs(law, (0.3, 1.0, 3.0, 10.0)), held_out=["at_10"])
+    best, *_ = found.laws
+    assert best.law == name
+    assert best.probability > 0.99
+    assert found.verdict == "no_effect_needed"
+    assert best.error.held_out < 2 * NOISE  # noise alone, and no more than as much of constants
+    for key, value in constants.items():
+        low, high = found.declared_parameters[key].ci95
+        # 95 % intervals, widened by half: six of them must hold at once
+        assert low - (high - low) / 4 < value < high + (high - low) / 4
+    assert f"{best.title} was taken" in loop_verdict(found)[0]
+    written = found.to_json()["laws"]
+    assert written[0]["law"] == name
+
+
+@pytest.mark.slow
+def test_laws_that_slow_shear_cannot_tell_apart_are_said_to_be_alike():
+    found = chosen(runs(Giesekus(0.3), (0.02, 0.05, 0.1)))
+    alike = [one.law for one in found.laws[1:] if one.probability > 0.05]
+    assert len(alike) >= 2  # h is of second order in a rate of a tenth
+    assert "do not tell it from" in loop_verdict(found)[0]
+
+
+@pytest.mark.slow
+def test_a_law_that_none_of_them_is_stays_unexplained():
+    """Two modes with constants of their own, told to be one."""
+    slow = Giesekus(0.8, 1.0, 4.0)
+    fast = RoliePoly(1.0, 0.02, relaxation_time=0.3)
+    times = np.geomspace(0.05, 8.0, 40)
+    made = []
+    for rate in (0.3, 1.0, 3.0):
+        stress = sum(50.0 * law.respond(flow_at(rate), times).sigma12 for law in (slow, fast))
+        made.append(dc.Run(f"at_{rate:g}", times, dc.start_up(rate), np.full(40, rate), stress))
+    found = chosen(dc.Dataset("two", tuple(made)), names=("giesekus", "rolie_poly"))
+    assert found.verdict == "unexplained"
+
+
+def test_a_name_that_is_no_law_is_told():
+    with pytest.raises(InputError, match=r"Unknown law 'newton'; write some of ucm"):
+        chosen(runs(Giesekus(0.3), (0.3, 1.0)), names=("ucm", "newton"))
+
+
+def found_beside(material, names, effects):
+    base = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
+    data = runs(material, (0.5, 2.0, 4.0), seed=2, end=10.0)
+    return dc.close_loop(
+        data, base, held_out=["at_4"], laws=names, effects=effects, max_effects=1, explanations=1
+    )
+
+
+@pytest.mark.slow
+def test_a_law_that_stood_for_a_missing_effect_gives_way_once_that_is_found():
+    material = Thixotropic(UpperConvectedMaxwell(), 0.3, 5.0)
+    found = found_beside(material, ("ucm", "white_metzner"), ["thixotropy"])
+    assert [stage.effect for stage in found.stages] == ["thixotropy"]
+    assert found.laws[0].law == "ucm"
+    low, high = found.stages[0].parameters["breakdown"].ci95
+    assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
+
+
+@pytest.mark.slow
+def test_control_a_law_that_is_there_stays_beside_an_effect():
+    material = Thixotropic(Giesekus(0.3), 0.3, 5.0)
+    found = found_beside(material, ("ucm", "giesekus"), ["thixotropy"])
+    assert [stage.effect for stage in found.stages] == ["thixotropy"]
+    best, other = found.laws
+    assert (best.law, other.law) == ("giesekus", "ucm")
+    assert other.probability < 0.01
+    low, high = found.declared_parameters["alpha"].ci95
+    assert low - (high - low) / 4 < 0.3 < high + (high - low) / 4
+    assert f"of 2 laws {best.title}" in loop_verdict(found)[0]
+    # beside the effect, and not as it was chosen without: then 1, the end of its range
+    assert best.parameters["alpha"] == pytest.approx(found.declared_parameters["alpha"].value, 0.05)
+    assert best.at_end == ()
