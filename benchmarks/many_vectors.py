@@ -1,9 +1,10 @@
 """What a prediction of transients costs where many vectors of parameters are asked for at once.
 
-Eight cases: start-ups of a melt of thirteen modes, steps of the rate of a fluid with one, large
-oscillations of a gel, and start-ups in shear and extension; each with the Maxwell law alone and
-with an effect. Prints milliseconds of processor a vector for 1, 8 and 32 of them, in this tree and,
-run in turns as a process of its own, in another; their ratio; and how far predictions are apart.
+Cases: start-ups of a melt of thirteen modes, steps of the rate of a fluid with one, large
+oscillations of a gel, start-ups in shear and extension, a flow curve and a sweep; each with the
+Maxwell law alone or with an effect, and start-ups with a law whose chains retract. Prints
+milliseconds of processor a vector for 1, 8 and 32 of them, in this tree and, run in turns as a
+process of its own, in another; their ratio; and how far predictions are apart.
 
     python benchmarks/many_vectors.py [OTHER_TREE]
 """
@@ -13,6 +14,7 @@ import os
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +27,13 @@ TURNS = 3
 def flows():
     """Return runs and modes of each fluid."""
     from discover.dataset import Run
-    from discover.protocols import oscillatory_shear, start_up, step_rates
+    from discover.protocols import (
+        oscillations,
+        oscillatory_shear,
+        start_up,
+        steady_rates,
+        step_rates,
+    )
     from discover.protocols.protocol import in_flow
 
     def run(name, protocol, times, rate):
@@ -46,7 +54,18 @@ def flows():
         when = np.geomspace(0.05, 3.0, 80) / rate
         ldpe.append(run(f"s{i}", start_up(rate), when, rate))
         ldpe.append(run(f"e{i}", in_flow(start_up(rate), "uniaxial"), when, rate))
+    rates = np.geomspace(1e-2, 1e2, 20)
+    curve = [run("c", steady_rates(rates), np.arange(1.0, 21.0), 1.0)]
+    curve = [replace(curve[0], rate=rates)]
+    strains, frequencies = np.geomspace(0.01, 5.0, 12), np.full(12, 2.0)
+    ones = np.ones(12)
+    sweep = Run(
+        "w", np.arange(1.0, 13.0), oscillations(strains, frequencies), strains * frequencies, ones,
+        strain=strains, storage_modulus=ones, loss_modulus=ones,
+    ).records  # fmt: skip
     return {
+        "curve": (curve, 3e4 * melt_times**-0.25, melt_times),
+        "sweep": (sweep, 1e4 * ldpe_times**-0.3, ldpe_times),
         "melt": (melt, 3e4 * melt_times**-0.25, melt_times),
         "blood": (blood, np.array([0.5]), np.array([0.1])),
         "gel": (gel, np.array([200.0, 80.0]), np.array([0.3, 4.0])),
@@ -63,6 +82,9 @@ CASES = {
     "gel, Giesekus and rise time": ("gel", ("giesekus_mobility", "rate_rise_time")),
     "LDPE, exponential PTT": ("ldpe", ("ptt_exponential",)),
     "LDPE, compliance": ("ldpe", ("ptt_exponential", "tool_compliance")),
+    "LDPE, Rolie-Poly": ("ldpe", ()),
+    "flow curve, exponential PTT": ("curve", ("ptt_exponential",)),
+    "sweep, Giesekus": ("sweep", ("giesekus_mobility",)),
 }
 
 
@@ -83,8 +105,13 @@ def measured() -> dict[str, dict]:
         declared = DeclaredModel.maxwell(modulus, relaxation_time, solvent_viscosity=0.01)
         model = AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch)
         models[name] = model, batch
+        if name == "ldpe":
+            law = {"stretch_time_ratio": 0.1, "beta": 0.5}
+            declared = DeclaredModel.named("rolie_poly", law, modulus, relaxation_time)
+            model = AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch)
+            models["LDPE, Rolie-Poly"] = model, batch
     for case, (name, effects) in CASES.items():
-        model, batch = models[name]
+        model, batch = models.get(case, models[name])
         theta = model.zero()
         for effect in effects:
             theta[model.positions(effect)] = model.first_trial[model.positions(effect)]

@@ -1,9 +1,9 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
 An effect at zero amplitude changes nothing, so a subset of effects is a vector of parameters with
-zeros, never another program. Runs are padded to one grid. Transients at a given rate of all trial
-vectors go through one kernel, see `discover.forward.side_by_side`; of what else there is each
-vector is a call of its own, which leaves out the terms that it has at zero.
+zeros, never another program. Runs are padded to one grid. All trial vectors go through one kernel,
+see `discover.forward.side_by_side`; where there is none each vector is a call of its own, which
+leaves out the terms that it has at zero.
 """
 
 from collections.abc import Mapping, Sequence
@@ -237,10 +237,8 @@ class AugmentedModel:
             solvent in Pa s. By default as declared. One that an error of a sweep moves may be
             negative.
         """
-        trials, out = (
-            self._trials(thetas, moduli=moduli),
-            np.zeros((len(thetas), *batch.recorded.shape)),
-        )
+        trials = self._trials(thetas, moduli=moduli)
+        out = np.zeros((len(thetas), *batch.recorded.shape))
         for i, rows in enumerate(batch.rows):
             found = self._of_part(trials, batch, i)
             out[:, rows, : found.shape[2]] = found
@@ -274,26 +272,35 @@ class AugmentedModel:
     def _of_piece(
         self, trials: "_Trials", piece: "_Piece"
     ) -> Float[np.ndarray, "trials runs *columns"]:
-        program, (part, judging, asked) = self._program, piece
+        program, (part, *judging) = self._program, piece
         judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
-        if isinstance(part, TransientFlows):
-            assert judging is not None  # of transients alone
-            kernel = self._of_every_effect.side_by_side(self._numbers, part)
-            if kernel is not None:
-                here, there, at_rest = self._beside_every_effect
-                vectors = np.tile(at_rest, (len(trials.thetas), 1))
-                vectors[:, there] = trials.thetas[:, here]
-                beside = trials._replace(thetas=vectors)
-                return kernel.predict(self._numbers, *beside, part, judging, asked)
+        kernel = self._of_every_effect.side_by_side(self._numbers, part)
+        if kernel is None:
+            return self._one_by_one(trials, piece)
+        here, there, at_rest = self._beside_every_effect
+        vectors = np.tile(at_rest, (len(trials.thetas), 1))
+        vectors[:, there] = trials.thetas[:, here]
+        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
+        if not np.any(alone):
+            return kernel.predict(self._numbers, *beside, part, *judging)
+        found = self._one_by_one(trials.taken(alone), piece)
+        out = np.empty((len(alone), *found.shape[1:]))
+        out[alone] = found
+        if not np.all(alone):
+            out[~alone] = kernel.predict(self._numbers, *beside.taken(~alone), part, *judging)
+        return out
+
+    def _one_by_one(
+        self, trials: "_Trials", piece: "_Piece"
+    ) -> Float[np.ndarray, "trials runs *columns"]:
+        """Return what vectors predict in a call of its own for each."""
+        program, (part, judging, _) = self._program, piece
 
         def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
             theta, moduli, limit = trial
-            numbers = replace(
-                self._numbers,
-                modulus=jnp.asarray(moduli[:-1]),
-                solvent_viscosity=jnp.asarray(moduli[-1]),
-            )
+            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
+            numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
             used = program.fluid.in_use(theta)
             weights = self._weights(theta, part)
             return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
@@ -360,7 +367,7 @@ class AugmentedModel:
             if not len(asked):
                 break
             left = ahead * (limits[asked] - sums[asked])
-            some = _Trials(trials.thetas[asked], trials.moduli[asked], left)
+            some = trials.taken(asked)._replace(limits=left)
             found = self._of_part(some, batch, i)
             rows, n = batch.rows[i], found.shape[2]
             off = batch.records.of_runs(rows, n).residual(found)
@@ -421,6 +428,10 @@ class _Trials(NamedTuple):
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
     limits: Float[np.ndarray, " trials"]
+
+    def taken(self, which: np.ndarray) -> "_Trials":
+        """Return some of them."""
+        return _Trials(*(each[which] for each in self))
 
 
 _Piece = tuple[Flows, Records | None, int]

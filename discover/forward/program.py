@@ -1,6 +1,7 @@
 """What is compiled of a model: predictions for one structure of law and effects."""
 
 import logging
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -10,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.effects import (
+    AbstractEffect,
     KinematicEffect,
     Record,
     SignalEffect,
@@ -26,7 +28,16 @@ from discover.forward.batches import (
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
-from discover.forward.side_by_side import SideBySide, intervals, kernel_of
+from discover.forward.side_by_side import (
+    Kernel,
+    PeriodicCode,
+    PeriodicSideBySide,
+    SideBySide,
+    SteadyCode,
+    SteadySideBySide,
+    code_of,
+    intervals,
+)
 from discover.forward.starts.half_cycles import first_harmonic
 from discover.forward.starts.periodic_start import Cycle
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
@@ -70,7 +81,7 @@ class Program:
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
-        self._kernels: dict[Any, SideBySide | None] = {}
+        self._kernels: dict[Any, Any] = {}
         self._known_parts: list[tuple[TransientFlows, bool]] = []
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
@@ -89,31 +100,46 @@ class Program:
             runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
         )
 
-    def side_by_side(self, numbers: Numbers, part: TransientFlows) -> SideBySide | None:
+    def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
-        To it are left chains that retract, runs that begin with a periodic state, and what laws or
-        effects of a user's own do that is not known in lanes.
+        To it are left runs that begin with a periodic state, and what laws or effects of a user's
+        own do that is not known in lanes.
         """
-        law = numbers.law
-        if law.retracts or law.tensors or part.cycle_steps:
+        if isinstance(part, StressFlows) or (isinstance(part, TransientFlows) and part.cycle_steps):
             return None
-        flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
+        flow = None
+        if not isinstance(part, PeriodicFlows):
+            flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        chooses = self._chooses_steps(part)
-        kind = (jax.tree.structure(arrays), shapes, *jax.tree.leaves(rest), flow is None, chooses)
+        chooses = isinstance(part, TransientFlows) and self._chooses_steps(part)
+        kind = (
+            type(part),
+            jax.tree.structure(arrays),
+            shapes,
+            *jax.tree.leaves(rest),
+            flow is None,
+            chooses,
+        )
         if kind not in self._kernels:
             try:
-                kernel = kernel_of(self.fluid, numbers, flow, chooses)
+                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, chooses)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
-            else:
-                self._kernels[kind] = SideBySide(
-                    self.fluid, kernel, self._rates, self._at_samples, self._made_from
-                )
         return self._kernels[kind]
+
+    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None, chooses: bool):
+        given, made_from = (self.fluid, numbers, flow), self._made_from
+        if control is SteadyFlows:
+            own = self._steady_rates, self._recorded_steady
+            return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
+        if control is PeriodicFlows:
+            own = self._periodic_rates, self._moduli_recorded
+            return PeriodicSideBySide(self.fluid, code_of(PeriodicCode, *given), *own, made_from)
+        kernel = code_of(Kernel, *given, chooses=chooses)
+        return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
 
     def _chooses_steps(self, part: TransientFlows) -> bool:
         """Return whether runs have intervals in which vectors choose their steps."""
@@ -207,13 +233,25 @@ class Program:
                     changed = effect.felt_rate(values, instrument_times, rate)
                     return where_in_shear(flow, changed, rate)
 
-                rate = jax.lax.cond(
-                    present[self._number[effect.name]], felt, lambda rate: rate, rate
-                )
+                rate = self._if_present(theta, present, effect, felt, rate)
             return rate
 
         upstream = shaped(rate, self._upstream)
         return shaped(upstream, self._downstream), upstream[::2]
+
+    def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
+        """Return what an effect makes of a value.
+
+        It is computed where one of the vectors has the effect; to those that have it not the value
+        stays what it is, to the last digit.
+        """
+        amplitude = theta[self.fluid.slices[effect.name].start]
+        return jax.lax.cond(
+            present[self._number[effect.name]],
+            lambda value: jnp.where(amplitude != 0.0, change(value), value),
+            lambda value: value,
+            value,
+        )
 
     def _at_samples(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
         """Return the recorded stress at the samples, of that at all steps before the signal."""
@@ -225,40 +263,52 @@ class Program:
                 record = Record(times, felt, stress, run.clock_factor, strain, tool_rate)
                 return self._as_recorded(theta, effect, record, run.kinematics)
 
-            stress = jax.lax.cond(
-                present[self._number[effect.name]], distorted, lambda stress: stress, stress
-            )
+            stress = self._if_present(theta, present, effect, distorted, stress)
         return stress[run.sample_index]
 
     def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
         flow = run.kinematics
-        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
-        rate = run.rate
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-                changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
-                rate = where_in_shear(flow, changed, rate)
         dynamics = self.fluid.dynamics(numbers, used, theta, flow)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
-        stress, felt = steady_states(dynamics, rate, flow)
+        present = self.fluid.present(theta)
+        rates = self._steady_rates(theta, present, run)
+        stress, felt = steady_states(dynamics, rates, flow)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
+        return self._recorded_steady(theta, present, run, stress, felt)
+
+    def _steady_rates(self, theta, present, run: SteadyFlows):
+        """Return the rates of a flow curve that the fluid feels where nothing slips."""
+        places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+
+                def felt(rate, effect=effect):
+                    changed = effect.felt_rate(self.fluid.values(theta, effect), places, rate)
+                    return where_in_shear(run.kinematics, changed, rate)
+
+                rate = self._if_present(theta, present, effect, felt, rate)
+        return rate
+
+    def _recorded_steady(self, theta, present, run: SteadyFlows, stress, felt):
+        """Return the recorded stress of a flow curve, of that before the signal."""
+        places = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype)
+        rate = self._steady_rates(theta, present, run)
         for effect in self._signal:
             if effect.acts_on_steady_states:
-                record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
-                stress = self._as_recorded(theta, effect, record, flow)
+
+                def distorted(stress, effect=effect):
+                    record = Record(places, felt, stress, jnp.ones(()), 0.0, rate)
+                    return self._as_recorded(theta, effect, record, run.kinematics)
+
+                stress = self._if_present(theta, present, effect, distorted, stress)
         return stress
 
     def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
-        places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
-        commanded = states.frequency * states.strain
-        rates = commanded
-        for effect in (*self._upstream, *self._downstream):
-            if effect.acts_on_steady_states:
-                rates = effect.felt_rate(self.fluid.values(theta, effect), places, rates)
         dynamics = self.fluid.dynamics(numbers, used, theta, None)
         kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
         dynamics = dynamics._replace(states=kept, states_in_use=None)
+        present = self.fluid.present(theta)
 
         def beside(felt):
             return self.fluid.beside(numbers, theta, felt, None)
@@ -266,14 +316,49 @@ class Program:
         def one(state):
             rate, nominal, frequency, steps = state
             found = complex_modulus(dynamics, rate / frequency, frequency, steps, beside)
-            found = found * rate / nominal
-            for effect in self._signal:
-                found = self._modulus_as_recorded(theta, effect, found, nominal, frequency)
-            return jnp.stack([found.real, found.imag])
+            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
 
+        rates = self._periodic_rates(theta, present, states)
+        commanded = states.frequency * states.strain
         # not side by side: each in as many cycles, and as many steps of each, as it needs, which
         # takes a quarter of the time of all in those of the largest
         return jax.lax.map(one, (rates, commanded, states.frequency, states.steps))
+
+    def _periodic_rates(self, theta, present, states: PeriodicFlows):
+        """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
+        places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
+        rates = states.frequency * states.strain
+        for effect in (*self._upstream, *self._downstream):
+            if effect.acts_on_steady_states:
+
+                def felt(rates, effect=effect):
+                    return effect.felt_rate(self.fluid.values(theta, effect), places, rates)
+
+                rates = self._if_present(theta, present, effect, felt, rates)
+        return rates
+
+    def _recorded_modulus(self, theta, present, found, rate, nominal, frequency):
+        """Return G′ and G″ as they are recorded, of those of the fluid at a rate that it feels."""
+        found = found * rate / nominal
+        for effect in self._signal:
+
+            def distorted(found, effect=effect):
+                return self._modulus_as_recorded(theta, effect, found, nominal, frequency)
+
+            found = self._if_present(theta, present, effect, distorted, found)
+        return jnp.stack([found.real, found.imag])
+
+    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, of_modes):
+        """Return both moduli of states as they are recorded, of those of the modes."""
+        rates = self._periodic_rates(theta, present, states)
+        commanded = states.frequency * states.strain
+
+        def one(rate, nominal, frequency, found):
+            beside = self.fluid.beside(numbers, theta, rate * jnp.cos(PHASE), None)
+            found = found + first_harmonic(beside, PHASE) / (rate / frequency)
+            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
+
+        return jax.vmap(one)(rates, commanded, states.frequency, of_modes)
 
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.

@@ -112,6 +112,25 @@ def test_what_is_not_known_in_lanes_is_refused():
         )
 
 
+def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
+    rng = np.random.default_rng(0)
+    entries, right = rng.normal(size=(9, LANES)), rng.normal(size=(3, LANES))
+    entries[0, ::2] = 0.0  # the first pivot is none in half of the lanes
+
+    def solved(*values):
+        return jnp.linalg.solve(jnp.stack(values[:9]).reshape(3, 3), jnp.stack(values[9:]))
+
+    found = in_lanes(solved, *entries, *right)
+    matrices = np.moveaxis(entries.reshape(3, 3, LANES), -1, 0)
+    exact = np.linalg.solve(matrices, right.T[:, :, None])[:, :, 0].T
+    np.testing.assert_allclose(found, exact, rtol=1e-11)
+
+
+def test_a_decomposition_alone_is_refused():
+    with pytest.raises(NotTranslatable):
+        in_lanes(lambda x: jax.lax.linalg.lu(jnp.eye(2) * x)[0][0], np.ones(LANES))
+
+
 def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users(
     tmp_path, monkeypatch
 ):

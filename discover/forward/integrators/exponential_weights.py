@@ -245,7 +245,7 @@ class StressWeights(NamedTuple):
         return with_shares(found, self.shares, 1.0, axis=0)
 
 
-def _mean_normal(stress: Float[Array, "s *c k"]) -> Float[Array, "*c k"]:
+def _mean_normal(stress: Float[Array, " s *c"]) -> Float[Array, " *c"]:
     return jnp.sum(stress[:3], axis=0) / 3.0
 
 

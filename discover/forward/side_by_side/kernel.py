@@ -4,27 +4,18 @@ What is done in them is told by `step`; here stands where numbers lie. Arrays ha
 each run is followed to its own end, and states of the fluid stay in a scratch array.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
-import equinox as eqx
 import jax
-import jax.numpy as jnp
 import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.layout import as_array as _array
 from discover.forward.side_by_side.own_widths import OWN, OwnWidths
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step, laid_out
-from discover.forward.structure import Numbers
-from discover.programs.lanes import (
-    LANES,
-    Arithmetic,
-    Translation,
-    Writing,
-    callable_of,
-    kept,
-)
+from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
+from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
@@ -47,48 +38,8 @@ _OWN = range(4, 4 + len(OWN))
 _STATE = _OWN.stop
 _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
-_MADE: dict[tuple, "Kernel"] = {}
-_KEPT = 16
 
-
-def kernel_of(
-    fluid: AugmentedFluid, numbers: Numbers, flow: Kinematics | None, chooses: bool
-) -> "Kernel":
-    """Return the machine code for a fluid, made once for all whose constants alone differ.
-
-    Parameters
-    ----------
-    fluid
-        The fluid with its effects.
-    numbers
-        One of those that it is called with; their values are data.
-    flow
-        Kinematics of one run; None where all are simple shear.
-    chooses
-        Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
-
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
-    """
-    theta = jax.ShapeDtypeStruct((fluid.size,), float)
-    found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
-    structure = fluid.structure.without_constants()
-    kinds = [
-        leaf.shape[axes:] if isinstance(leaf, jax.ShapeDtypeStruct) else leaf
-        for tree, axes in zip(found, (1, 0), strict=True)
-        for leaf in jax.tree.leaves(tree)
-    ]
-    key = (structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow), chooses)
-    if key not in _MADE:
-        _MADE[key] = Kernel(AugmentedFluid(structure), found, flow, chooses)
-        for earliest in list(_MADE)[:-_KEPT]:
-            del _MADE[earliest]
-    return _MADE[key]
-
-
-class Kernel:
+class Kernel(Code):
     """Machine code for the effects of a fluid and a law, with all constants and runs as data.
 
     Attributes
@@ -115,6 +66,8 @@ class Kernel:
         If a law or an effect does what is not known in lanes.
     """
 
+    counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
+
     def __init__(
         self,
         fluid: AugmentedFluid,
@@ -122,27 +75,15 @@ class Kernel:
         flow: Kinematics | None,
         chooses: bool,
     ):
-        self._chooses = chooses
-        self.flags, self.steps_taken = Flags(fluid), 0
+        super().__init__(fluid, found, flow)
+        self._chooses, self.steps_taken = chooses, 0
         self._times_at = self.flags.names.index("times")
-        of_mode, shared = (_Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True))
-        self._of_mode, self._shared, self._flow = of_mode, shared, _Layout(flow, 0)
-        law = eqx.combine(found[0].law, found[1].law)
-        is_array = lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct)  # noqa: E731
-        self._variables = law.variables
-        self._step = Step(fluid, eqx.filter(law, is_array, inverse=True))
+        self._variables = self._law.variables
+        self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        empty = [
-            jax.tree.map(
-                lambda leaf, axes=axes: np.empty(leaf.shape[axes:]) if is_array(leaf) else leaf,
-                tree,
-            )
-            for tree, axes in zip(found, (1, 0), strict=True)
-        ]
-        code = kept((fluid.structure, empty, flow, chooses), self._written)
-        self._call = callable_of(code, len(_COUNTS), len(_ARRAYS))
+        self._make(fluid, found, flow, chooses)
 
     def __call__(
         self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
@@ -179,10 +120,6 @@ class Kernel:
         self.steps_taken += int(goes_on[_STEPS])
         return stress, felt, bool(goes_on[0])
 
-    def packed(self, tree: Any, of_mode: bool) -> jax.Array:
-        """Return a part of `laid_out` as one array, of modes with these first."""
-        return (self._of_mode if of_mode else self._shared).packed(tree)
-
     def flows(self, flow: Kinematics | None) -> np.ndarray:
         """Return the kinematics of runs as one array, shape (runs, numbers)."""
         leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(flow)]
@@ -190,17 +127,7 @@ class Kernel:
             return np.zeros((1, 1))
         return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
-    def _written(self) -> bytes:
-        self._w = Writing(_COUNTS, _ARRAYS, _WIDE, _WHOLE)
-        self._arithmetic = Arithmetic(self._w.builder)
-        self._write = Translation(self._arithmetic)
-        self._runs()
-        code = self._w.compiled()
-        # what was written is large, and the code is made
-        del self._w, self._arithmetic, self._write, self._parameters, self._on, self._held
-        return code
-
-    def _runs(self) -> None:
+    def _body(self) -> None:
         w = self._w
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
@@ -438,37 +365,3 @@ class Kernel:
         beside = self._write(self._step.beside, self._parameters, self._on, flow, felt)[()]
         w.store(a.lanes(a.add(w.load("stress", at), beside)), "stress", at)
         w.store(a.lanes(felt), "felt", at)
-
-
-def _array(values: Sequence[Any]) -> np.ndarray:
-    found = np.empty(len(values), object)
-    found[:] = values
-    return found
-
-
-class _Layout:
-    """Trees of arrays as one axis of numbers, and back."""
-
-    def __init__(self, tree: Any, axes: int):
-        arrays = eqx.filter(
-            tree, lambda leaf: isinstance(leaf, jax.ShapeDtypeStruct) or eqx.is_array(leaf)
-        )
-        leaves, self._structure = jax.tree.flatten(arrays)
-        self._axes = axes
-        self._shapes = [leaf.shape[axes:] for leaf in leaves]
-        self.size = sum(int(np.prod(shape, dtype=int)) for shape in self._shapes)
-
-    def packed(self, tree: Any) -> jax.Array:
-        leaves = jax.tree.leaves(eqx.filter(tree, eqx.is_array))
-        flat = [jnp.asarray(leaf, float).reshape(*leaf.shape[: self._axes], -1) for leaf in leaves]
-        return jnp.concatenate(flat, axis=-1)
-
-    def tree(self, values: Sequence[Any]) -> Any:
-        leaves, place = [], 0
-        for shape in self._shapes:
-            leaf = np.empty(shape, object)
-            for at in np.ndindex(shape):
-                leaf[at] = values[place]
-                place += 1
-            leaves.append(leaf)
-        return jax.tree.unflatten(self._structure, leaves)

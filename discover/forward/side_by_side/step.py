@@ -5,7 +5,7 @@ precedes it, each mode, and what follows. A branch is taken by a flag that all v
 share, and costs nothing where it is not taken.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import reduce
 from operator import add
 from typing import Any, NamedTuple
@@ -19,11 +19,12 @@ from discover.effects import ConstitutiveEffect, StateEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.integrators.exponential_weights import (
     KrogstadWeights,
+    StressWeights,
     krogstad_weights,
     relax,
 )
 from discover.forward.structure import Numbers
-from discover.laws.each_mode import apart
+from discover.laws.each_mode import apart, of_each_mode
 from tensor_library.contraction import contracted
 from tensor_library.integrity_basis import integrity_basis
 from tensor_library.kinematics import rate_of_deformation
@@ -33,12 +34,20 @@ WEIGHTS = 10
 
 
 class Mode(NamedTuple):
-    """What differs from mode to mode: each leaf has a leading axis of modes, or is of one mode."""
+    """What differs from mode to mode: each leaf has a leading axis of modes, or is of one mode.
+
+    Attributes
+    ----------
+    relaxations, shares
+        What decides how chains that retract are stepped through, as the law's; None for others.
+    """
 
     modulus: Any
     relaxation_time: Any
     amplitudes: dict[str, Any]
     law: Any
+    relaxations: Any = None
+    shares: Any = None
 
 
 class Shared(NamedTuple):
@@ -60,9 +69,15 @@ def laid_out(fluid: AugmentedFluid, numbers: Numbers, theta) -> tuple[Mode, Shar
         modulus = jnp.append(modulus, extra.modulus)
         time = jnp.append(time, extra.relaxation_time)
     own, common = apart(law)
+    of_rest = [
+        of_each_mode(lambda law, name=name: getattr(law, name)(), law, len(modulus))
+        if has
+        else None
+        for name, has in (("relaxations", law.retracts), ("shares", law.tensors))
+    ]
     of_effects = jnp.concatenate([theta[:2], theta[fluid.of_effects]])
     return (
-        Mode(modulus, time, amplitudes, own),
+        Mode(modulus, time, amplitudes, own, *of_rest),
         Shared(of_effects, common, numbers.solvent_viscosity),
     )
 
@@ -120,10 +135,15 @@ class Step:
         The fluid with its effects.
     law
         What of the law is no array.
+    states
+        Those states of the fluid that are followed; by default all.
     """
 
-    def __init__(self, fluid: AugmentedFluid, law: Any):
+    def __init__(
+        self, fluid: AugmentedFluid, law: Any, states: Sequence[StateEffect] | None = None
+    ):
         self.fluid = fluid
+        self.states = fluid.states if states is None else states
         self._law = law
         self.decay = 1.0 if law.linear_relaxation else 0.0
 
@@ -167,23 +187,42 @@ class Step:
             total = _if(on[f"tensor {tensor}"], more, total)
         return total
 
-    def _remainder(self, shared, mode, on, flow, slow, stress, rate, now):
+    def _remainder(self, shared, mode, on, flow, w, slow, stress, rate, now):
         """Return what of the change is not relaxation; see `Dynamics.stage`."""
         gradient = now * mode.relaxation_time * rate
         if flow is not None:
             gradient = gradient * flow.gradient
-        relaxing = self.decay * stress
-        left = self._change(shared, mode, on, stress, gradient) + relaxing
-        return _if(on["times"], lambda: slow / now * (left - relaxing) + relaxing, left)
+        change = self._change(shared, mode, on, stress, gradient)
+        change = _if(on["times"], lambda: slow / now * change, change)
+        return w.remainder(stress, change, self.decay)
 
     def weights(self, mode: Mode, on, width, table):
-        """Return the weights of a step: those of a table, or of a mode's own time."""
+        """Return the weights of a step: those of a table, or of a mode's own time.
 
-        def own():
+        Where chains retract they are always a mode's own, of the stress and of its trace, and so on
+        of each further tensor: they depend on the constants of the law.
+        """
+
+        def own(faster=0.0):
             h = width / mode.relaxation_time
-            return jnp.stack(krogstad_weights(-self.decay * h, h)[:WEIGHTS])
+            return jnp.stack(krogstad_weights(-(self.decay + faster) * h, h)[:WEIGHTS])
 
-        return _if(on["own weights"], own, table)
+        if mode.relaxations is None:
+            return _if(on["own weights"], own, table)
+        rates = [rate for whole, trace in mode.relaxations for rate in (whole, whole + trace)]
+        return jnp.stack([own(), *(own(rate) for rate in rates[1:])])
+
+    def _of_step(self, mode: Mode, weights) -> StressWeights:
+        """Return weights as the integrators take them; see `Dynamics.weights_of_step`."""
+        kinds = [KrogstadWeights(*row, m4=jnp.zeros(())) for row in weights.reshape(-1, WEIGHTS)]
+        if mode.relaxations is None:
+            return StressWeights(kinds[0])
+        whole, trace, *others = kinds
+        beside = tuple(
+            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
+            for i, one in enumerate(mode.relaxations[1:])
+        )
+        return StressWeights(whole, trace, mode.relaxations[0, 1], beside, mode.shares)
 
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.
@@ -199,11 +238,11 @@ class Step:
         taken, earlier
             Rate that these take in this step and in the one before.
         """
-        w = KrogstadWeights(*weights, m4=jnp.zeros(()))
+        w = self._of_step(mode, weights)
         first, middle, last = rates
 
         def remainder(stress, rate, now):
-            return self._remainder(shared, mode, on, flow, slow[1], stress, rate, now)
+            return self._remainder(shared, mode, on, flow, w, slow[1], stress, rate, now)
 
         n1 = remainder(stress, first + earlier, slow[0])
         if self.fluid.series:
@@ -240,7 +279,7 @@ class Step:
     def _factor(self, name: str, shared, on, levels):
         """Return the product of a factor of all states; see `Dynamics.combined`."""
         total: Any = jnp.ones(())
-        for effect, level in zip(self.fluid.states, levels, strict=True):
+        for effect, level in zip(self.states, levels, strict=True):
             if getattr(type(effect), name) is getattr(StateEffect, name):
                 continue
 
@@ -254,7 +293,7 @@ class Step:
     def _later(self, shared, on, levels, rate, stress, widths):
         """Return the states after steps of several widths; see `Dynamics.later`."""
         after = []
-        for effect, level in zip(self.fluid.states, levels, strict=True):
+        for effect, level in zip(self.states, levels, strict=True):
 
             def moved(effect=effect, level=level):
                 values = self.fluid.values(shared.theta, effect)
@@ -297,8 +336,9 @@ class Step:
 
     def foreseen(self, shared, mode, on, flow, slow, stress, rate, weights):
         """Return what a mode adds to the stress after a step, and to its stiffness."""
-        w = KrogstadWeights(*weights, m4=jnp.zeros(()))
-        n1 = self._remainder(shared, mode, on, flow, slow[1], stress, rate, slow[0])
+        of_step = self._of_step(mode, weights)
+        n1 = self._remainder(shared, mode, on, flow, of_step, slow[1], stress, rate, slow[0])
+        w = of_step.whole
         whole = w.b1 + 2.0 * w.b23 + w.b4
         stretch = slow[1] * mode.relaxation_time * (1.0 + stress[1])
         predicted = w.full * stress[3] + whole * n1[3]

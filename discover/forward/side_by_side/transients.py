@@ -12,7 +12,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -20,7 +20,7 @@ from discover.forward.batches import Records, TransientFlows
 from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.with_effects import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.step import WEIGHTS, Flags, laid_out
+from discover.forward.side_by_side.step import WEIGHTS, Flags
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
@@ -151,15 +151,7 @@ class SideBySide:
         self._shaping = [at[e.name].start for e in shaping]
         self._distorting = [at[e.name].start for e in effects if isinstance(e, SignalEffect)]
 
-        def packed(numbers: Numbers, thetas, moduli):
-            def one(theta, modulus, solvent):
-                moved = Numbers(numbers.law, modulus, numbers.relaxation_time, solvent)
-                of_mode, shared = laid_out(fluid, moved, theta)
-                return kernel.packed(of_mode, True), kernel.packed(shared, False)
-
-            return jax.vmap(one, out_axes=-1)(thetas, moduli[:, :-1], moduli[:, -1])
-
-        self._packed = compiled(packed, made_from=("packed", *made_from))
+        self._packed = kernel.packing(fluid, made_from, -1)
         over_runs = jax.vmap(rates, in_axes=(None, None, 0))
         of_trials = jax.vmap(over_runs, in_axes=(0, None, None))
         self._rates = compiled(of_trials, ("rates", *made_from))
@@ -168,6 +160,10 @@ class SideBySide:
         self._recorded = compiled(of_trials, ("recorded", *made_from))
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
+
+    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
+        """Return which vectors are left to the other program: none."""
+        return np.zeros(len(thetas), bool)
 
     def predict(
         self,
@@ -302,7 +298,8 @@ class SideBySide:
         known, own = self._known_table, numbers.relaxation_time
         if known is not None and known[0] is own and known[1] is part and known[2] == time:
             return time, known[3]
-        if count < _MANY and time != 0.0:
+        # those of chains that retract depend on more than the times
+        if numbers.law.retracts or (count < _MANY and time != 0.0):
             return time, None
         times = np.asarray(own) * np.exp(time)
         decay = jnp.asarray(float(numbers.law.linear_relaxation))

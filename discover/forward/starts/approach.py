@@ -115,11 +115,13 @@ def moves(
     """
     width = pseudo_time_step(before.number, weissenberg_number)
     newton = jnp.all((after.number >= before.number) & (width > _LONG))
-    still = [
-        jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a)))
-        for a, b in [(before.stress, after.stress), *beside]
-    ]
-    return ~(newton & jnp.all(jnp.stack(still)))
+    return ~(newton & are_still([(before.stress, after.stress), *beside]))
+
+
+def are_still(pairs: Sequence[tuple[Array, Array]]) -> Bool[Array, ""]:
+    """Return whether nothing changed by more than rounding, of pairs before and after a step."""
+    still = [jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a))) for a, b in pairs]
+    return jnp.all(jnp.stack(still))
 
 
 def arrived(

@@ -131,9 +131,13 @@ def _of_harmonic(stress, phase, share) -> Float[Array, "2"]:
 
 def _mirrored(dynamics: Dynamics, end: _Carry) -> Float[Array, "s k"]:
     """Return the modes at the end of half a cycle as its mirror image begins with them."""
-    tensors = jnp.tile(jnp.array(_MIRROR), 1 + dynamics.tensors)
-    mirror = jnp.ones(4 + dynamics.variables).at[: len(tensors)].set(tensors)[:, None]
-    return mirror * end.stress
+    scalars = dynamics.variables - 4 * dynamics.tensors
+    return jnp.asarray(mirror(scalars, dynamics.tensors))[:, None] * end.stress
+
+
+def mirror(scalars: int, tensors: int) -> Float[np.ndarray, " s"]:
+    """Return the signs by which a state with so many tensors and scalars behind σ is mirrored."""
+    return np.concatenate([np.tile(_MIRROR, 1 + tensors), np.ones(scalars)])
 
 
 def _step(dynamics: Dynamics, width, unroll: int):

@@ -27,10 +27,10 @@ from discover.forward.starts.modified_newton import (
 
 # Most iterations in all, and the relative change of what is followed by iteration below which the
 # next one would change nothing that is seen
-_MOST, _TOLERANCE = 60, 1e-8
+MOST_CYCLES, _TOLERANCE = 60, 1e-8
 
 # The same of the modes' steps: Newton's error goes as their square
-_STEP = 1e-6
+NEWTON_STEP = 1e-6
 
 # Bounds of the secant's slope
 _SECANT = 0.2, 5.0
@@ -115,7 +115,7 @@ def complex_modulus(
         felt, lacking = next_felt(now, found)
         slowness = frequency * dynamics.modes.relaxation_time
         changes = [
-            _TOLERANCE / _STEP * relative_change(now.modes, modes, slowness, _STEP),
+            _TOLERANCE / NEWTON_STEP * relative_change(now.modes, modes, slowness, NEWTON_STEP),
             jnp.abs(felt / now.felt - 1.0),
             *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
         ]
@@ -153,7 +153,7 @@ def complex_modulus(
         change=jnp.asarray(jnp.inf),
     )
     end = jax.lax.while_loop(
-        lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
+        lambda now: goes_on(now.modes, now.change, MOST_CYCLES, _TOLERANCE),
         improved,
         jax.lax.fori_loop(0, FROM_REST, followed, start),
     )
@@ -234,15 +234,15 @@ def periodic_state(
         )(units)
         jacobian = jnp.moveaxis(ends, 2, 0)
         following, better = next_approximation(now.modes, end, jacobian)
-        change = relative_change(now.modes, following, slowness, _STEP)
+        change = relative_change(now.modes, following, slowness, NEWTON_STEP)
         change = jnp.where(jnp.all(better), change, jnp.inf)
         return _Solving(following, change, jacobian, harmonics)
 
     def hopeful(now: _Solving):
-        further = goes_on(now.modes, now.change, _MOST, _STEP)
+        further = goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
         if together is None:
             return further
-        given_up = ~further & ~(now.change < _STEP)
+        given_up = ~further & ~(now.change < NEWTON_STEP)
         return further & (jax.lax.pmax(given_up.astype(int), together) == 0)
 
     size, modes = fixed.rest()[0].shape
@@ -267,7 +267,7 @@ def periodic_state(
     step = jnp.linalg.solve(matrix, (found.stress - end.modes.stress).T[:, :, None])[:, :, 0].T
     recorded = found.recorded + dynamics.viscosity * strain * wave[::2]
     whole = first_harmonic(recorded, phase[::2]) + jnp.sum(end.harmonics * step)
-    whole = jnp.where(end.change < _STEP, whole / strain, jnp.nan)
+    whole = jnp.where(end.change < NEWTON_STEP, whole / strain, jnp.nan)
     return PeriodicState(end.modes.stress + step, whole)
 
 

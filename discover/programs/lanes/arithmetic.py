@@ -63,6 +63,8 @@ class Arithmetic:
 
     def lanes(self, value: Value) -> Value:
         """Return a value as eight doubles."""
+        if value is None:
+            raise NotTranslatable("a part of what is only known as a whole")
         if self.is_known(value):
             return ir.Constant(DOUBLES, [float(value)] * LANES)
         return value if value.type == DOUBLES else self.chosen(value, 1.0, 0.0)
@@ -181,6 +183,11 @@ class Arithmetic:
     def opposite(self, x: Value) -> Value:
         """Return the logical not of a truth."""
         return not x if self.is_known(x) else self.builder.not_(x)
+
+    def in_some(self, truths: Value) -> Value:
+        """Return the truth whether one holds in any of the lanes."""
+        bits = ir.IntType(LANES)
+        return self.builder.icmp_unsigned("!=", self.builder.bitcast(truths, bits), bits(0))
 
     def larger(self, x: Value, y: Value) -> Value:
         """Return the larger of two; not a number where one is not."""

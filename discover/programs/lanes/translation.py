@@ -5,7 +5,7 @@ about is done by NumPy, or by JAX on their places, while code is written, and co
 """
 
 from collections.abc import Callable, Sequence
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 import jax
@@ -91,6 +91,11 @@ class Translation:
             return _moved(equation, inputs, _MOVED[name])
         if name == "scatter-add":
             return self._scatter_add(equation, inputs)
+        if name == "lu":
+            # looked at by nothing but the solution, which begins with the matrix
+            return [np.full(variable.aval.shape, None, object) for variable in equation.outvars]
+        if name == "custom_linear_solve":
+            return self._solution(given["const_lengths"], inputs)
         raise NotTranslatable(name)
 
     def _inner(self, closed, inputs: list[Values]) -> list[Values]:
@@ -138,7 +143,44 @@ class Translation:
                 either.add_incoming(first_lanes[i][j], first_end)
                 either.add_incoming(second_lanes[i][j], second_end)
                 array[place] = either
-        return merged
+        # a truth went through as a number
+        return [
+            _elementwise(lambda x: self.arithmetic.compare("!=", x, 0.0), array)
+            if _kind(before) == jnp.bool_
+            else array
+            for array, before in zip(merged, first, strict=True)
+        ]
+
+    def _solution(self, counts, inputs: list[Values]) -> list[Values]:
+        """Return what solves systems of equations, by elimination with pivots of each lane."""
+        if counts.matvec != 1 or len(inputs) != sum(counts) + 1 or inputs[0].ndim != 2:
+            raise NotTranslatable("a system of equations of a kind of its own")
+        a, right = inputs[0].copy(), inputs[-1].copy()
+        arithmetic, size = self.arithmetic, len(a)
+        of_row = np.concatenate([a, right.reshape(-1, size).T], axis=1)
+        for i in range(size):
+            for j in range(i + 1, size):
+                larger = arithmetic.compare(
+                    ">", arithmetic.size(of_row[j, i]), arithmetic.size(of_row[i, i])
+                )
+                upper, lower = of_row[i].copy(), of_row[j].copy()
+                for column in range(i, of_row.shape[1]):
+                    pair = upper[column], lower[column]
+                    of_row[i, column] = arithmetic.chosen(larger, *pair[::-1])
+                    of_row[j, column] = arithmetic.chosen(larger, *pair)
+            for j in range(i + 1, size):
+                share = arithmetic.divide(of_row[j, i], of_row[i, i])
+                for column in range(i + 1, of_row.shape[1]):
+                    less = arithmetic.multiply(share, of_row[i, column])
+                    of_row[j, column] = arithmetic.subtract(of_row[j, column], less)
+        for column in range(size, of_row.shape[1]):
+            for i in reversed(range(size)):
+                left = of_row[i, column]
+                for j in range(i + 1, size):
+                    known = arithmetic.multiply(of_row[i, j], of_row[j, column])
+                    left = arithmetic.subtract(left, known)
+                of_row[i, column] = arithmetic.divide(left, of_row[i, i])
+        return [of_row[:, size:].T.reshape(right.shape)]
 
     def _scatter_add(self, equation, inputs: list[Values]) -> Values:
         """Return numbers with others added where constant indices say."""
@@ -231,11 +273,12 @@ def _pad(given, array: Values, filler: Values) -> Values:
     return found
 
 
-def _reduced(operation: str):
+def _reduced(operation: str, *first: str):
     def over(arithmetic: Arithmetic, given, array: Values) -> Values:
+        pairwise = partial(getattr(arithmetic, operation), *first)
         for axis in sorted(given["axes"], reverse=True):
             rows = [as_values(row) for row in np.moveaxis(array, axis, 0)]
-            array = reduce(lambda a, b: _elementwise(getattr(arithmetic, operation), a, b), rows)
+            array = reduce(lambda a, b: _elementwise(pairwise, a, b), rows)
         return array
 
     return over
@@ -327,6 +370,7 @@ _ELEMENTWISE: dict[str, Callable[[Arithmetic, dict], Callable[..., Value]]] = {
     "and": lambda a, _: lambda x, y: a.both("and", x, y),
     "or": lambda a, _: lambda x, y: a.both("or", x, y),
     "not": lambda a, _: a.opposite,
+    "is_finite": lambda a, _: lambda x: a.compare("<", a.size(x), float("inf")),
     "convert_element_type": _converted,
     "stop_gradient": _same,
     "copy": _same,
@@ -351,6 +395,8 @@ _ARRANGED: dict[str, Callable[..., Any]] = {
     "slice": _slice,
     "pad": _pad,
     "iota": _iota,
+    # written over before it is looked at
+    "empty2": lambda given: as_values(0.0),
 }
 
 _SUMMED: dict[str, Callable[..., Values]] = {
@@ -358,6 +404,8 @@ _SUMMED: dict[str, Callable[..., Values]] = {
     "reduce_max": _reduced("larger"),
     "reduce_min": _reduced("smaller"),
     "reduce_prod": _reduced("multiply"),
+    "reduce_and": _reduced("both", "and"),
+    "reduce_or": _reduced("both", "or"),
     "dot_general": _dot,
 }
 

@@ -1,0 +1,161 @@
+"""Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
+
+from collections.abc import Callable
+from typing import Any, ClassVar, TypeVar
+
+import equinox as eqx
+import jax
+import numpy as np
+
+from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.side_by_side.layout import Layout
+from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
+from discover.forward.structure import Numbers
+from discover.programs import compiled
+from discover.programs.lanes import Arithmetic, Translation, Writing, callable_of, kept
+from discover.protocols.kinematics import Kinematics
+
+_MADE: dict[tuple, "Code"] = {}
+_KEPT = 16
+
+
+class Code:
+    """Machine code for the effects of a fluid and a law, with all constants and flows as data.
+
+    Attributes
+    ----------
+    flags
+        Which parts of it a vector needs.
+    counts, arrays
+        What it takes: whole numbers, and arrays.
+    wide, whole
+        Arrays of all lanes, and those of whole numbers.
+
+    Parameters
+    ----------
+    fluid
+        The effects, of a structure without constants of the law.
+    found
+        Shapes of what is data to it; see `laid_out`.
+    flow
+        Kinematics of one run; None where all are simple shear.
+    """
+
+    counts: ClassVar[tuple[str, ...]]
+    arrays: ClassVar[tuple[str, ...]]
+    wide: ClassVar[tuple[str, ...]]
+    whole: ClassVar[tuple[str, ...]]
+
+    def __init__(
+        self, fluid: AugmentedFluid, found: tuple[Mode, Shared], flow: Kinematics | None = None
+    ):
+        self.flags = Flags(fluid)
+        self._of_mode, self._shared = (
+            Layout(tree, axes) for tree, axes in zip(found, (1, 0), strict=True)
+        )
+        self._flow = Layout(flow, 0)
+        self._law = eqx.combine(found[0].law, found[1].law)
+        self._plain_law = eqx.filter(self._law, _is_shape, inverse=True)
+
+    def packing(self, fluid: AugmentedFluid, made_from: tuple, axis: int) -> Callable:
+        """Return a program from numbers, vectors and their moduli to modes, and what these share.
+
+        The moduli are those of the declared modes, and behind them the viscosity of the solvent.
+
+        Parameters
+        ----------
+        fluid
+            The fluid with its effects, of which the vectors are.
+        made_from
+            What tells it from that of another structure.
+        axis
+            Where the vectors stand in what is returned.
+        """
+
+        def packed(numbers: Numbers, thetas, moduli):
+            def one(theta, modulus, solvent):
+                moved = Numbers(numbers.law, modulus, numbers.relaxation_time, solvent)
+                of_mode, shared = laid_out(fluid, moved, theta)
+                return self._of_mode.packed(of_mode), self._shared.packed(shared)
+
+            return jax.vmap(one, out_axes=axis)(thetas, moduli[:, :-1], moduli[:, -1])
+
+        return compiled(packed, made_from=("packed", axis, *made_from))
+
+    def _make(self, fluid: AugmentedFluid, found: tuple[Mode, Shared], *others: Any) -> None:
+        """Write the code, or take that of an earlier start; others tell it from other code too."""
+        empty = [
+            jax.tree.map(
+                lambda leaf, axes=axes: np.empty(leaf.shape[axes:]) if _is_shape(leaf) else leaf,
+                tree,
+            )
+            for tree, axes in zip(found, (1, 0), strict=True)
+        ]
+        code = kept((type(self).__name__, fluid.structure, empty, *others), self._written)
+        self._call = callable_of(code, len(self.counts), len(self.arrays))
+
+    def _written(self) -> bytes:
+        known = set(vars(self))
+        self._w = Writing(self.counts, self.arrays, self.wide, self.whole)
+        self._arithmetic = Arithmetic(self._w.builder)
+        self._write = Translation(self._arithmetic)
+        self._body()
+        code = self._w.compiled()
+        # what was written is large, and the code is made
+        for name in set(vars(self)) - known:
+            delattr(self, name)
+        return code
+
+    def _body(self) -> None:
+        raise NotImplementedError
+
+
+def _is_shape(leaf: Any) -> bool:
+    return isinstance(leaf, jax.ShapeDtypeStruct)
+
+
+_Kind = TypeVar("_Kind", bound=Code)
+
+
+def code_of(
+    kind: type[_Kind],
+    fluid: AugmentedFluid,
+    numbers: Numbers,
+    flow: Kinematics | None,
+    **choices: bool,
+) -> _Kind:
+    """Return the machine code of a kind for a fluid, made once for all whose constants differ.
+
+    Parameters
+    ----------
+    kind, choices
+        Which code, and what else it takes.
+    fluid
+        The fluid with its effects.
+    numbers
+        One of those that it is called with; their values are data.
+    flow
+        Kinematics of one run; None where all are simple shear.
+
+    Raises
+    ------
+    NotTranslatable
+        If a law or an effect does what is not known in lanes.
+    """
+    theta = jax.ShapeDtypeStruct((fluid.size,), float)
+    found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
+    structure = fluid.structure.without_constants()
+    kinds = [
+        leaf.shape[axes:] if _is_shape(leaf) else leaf
+        for tree, axes in zip(found, (1, 0), strict=True)
+        for leaf in jax.tree.leaves(tree)
+    ]
+    chosen = sorted(choices.items())
+    key = (kind, structure, jax.tree.structure(found), *kinds, jax.tree.structure(flow), *chosen)
+    made = _MADE.get(key)
+    if not isinstance(made, kind):
+        made = kind(AugmentedFluid(structure), found, flow, **choices)
+        _MADE[key] = made
+        for earliest in list(_MADE)[:-_KEPT]:
+            del _MADE[earliest]
+    return made

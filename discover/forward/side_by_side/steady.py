@@ -1,0 +1,151 @@
+"""Flow curves of many vectors of parameters: every steady state is a lane of its own."""
+
+from collections.abc import Callable
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float
+
+from discover.effects import KinematicEffect, SignalEffect
+from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.batches import Records, SteadyFlows
+from discover.forward.side_by_side.steady_code import SteadyCode
+from discover.forward.side_by_side.step import Flags
+from discover.forward.structure import Numbers
+from discover.programs import compiled, in_threads
+from discover.programs.lanes import LANES
+
+# Eights of states that one call of the code takes
+_AT_ONCE = 8
+
+
+class SteadySideBySide:
+    """Predictions of flow curves for one structure of law and effects.
+
+    Parameters
+    ----------
+    fluid, code
+        The fluid with its effects, and its machine code.
+    rates
+        Of a vector, the effects that are present, and a run: the felt rate without slip.
+    recorded
+        Of these, the stress and the felt rate, what is recorded.
+    made_from
+        What tells these from those of another structure.
+    """
+
+    def __init__(
+        self,
+        fluid: AugmentedFluid,
+        code: SteadyCode,
+        rates: Callable,
+        recorded: Callable,
+        made_from: tuple,
+    ):
+        self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
+        acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
+        self._shaping = [
+            fluid.slices[e.name].start for e in acting if isinstance(e, KinematicEffect)
+        ]
+        self._distorting = [
+            fluid.slices[e.name].start for e in acting if isinstance(e, SignalEffect)
+        ]
+
+        self._packed = code.packing(fluid, made_from, 0)
+        of_runs = jax.vmap(rates, in_axes=(None, None, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None))
+        self._rates = compiled(of_trials, ("steady rates", *made_from))
+        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0))
+        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0))
+        self._recorded = compiled(of_trials, ("steady records", *made_from))
+
+    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
+        """Return which vectors are left to the other program: none."""
+        return np.zeros(len(thetas), bool)
+
+    def predict(
+        self,
+        numbers: Numbers,
+        thetas: Float[np.ndarray, "trials p"],
+        moduli: Float[np.ndarray, "trials c"],
+        limits: Float[np.ndarray, " trials"],
+        part: SteadyFlows,
+        judging: Records | None,
+        runs: int,
+    ) -> Float[np.ndarray, "trials runs n"]:
+        """Return what is recorded; see `SideBySide.predict`.
+
+        Limits, what judges and how many runs are no padding say nothing here.
+        """
+        del limits, judging, runs
+        count, present = len(thetas), self._fluid.present(thetas)
+        # so many as one program is compiled for
+        padded = np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
+        eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
+        own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
+        pairs = zip(eights, own, strict=True)
+        of_eights = [self._packed(numbers, eight, each) for eight, each in pairs]
+        modes, shared = (np.concatenate(arrays) for arrays in zip(*of_eights, strict=True))
+        rate = np.broadcast_to(np.asarray(part.rate), (len(padded), *part.rate.shape))
+        if np.any(thetas[:, self._shaping]):
+            rate = np.concatenate([self._rates(eight, present, part) for eight in eights])
+        stress, felt = self._states(thetas, modes, len(numbers.modulus), shared, rate, part)
+        if not np.any(thetas[:, self._distorting]):
+            return stress
+        found = [
+            self._recorded(
+                eight, present, part, *(of[padded[at : at + LANES]] for of in (stress, felt))
+            )
+            for eight, at in zip(eights, range(0, len(padded), LANES), strict=True)
+        ]
+        return np.concatenate(found)[:count]
+
+    def _states(self, thetas, modes, declared: int, shared, rate, part) -> np.ndarray:
+        """Return stresses and felt rates, shape (2, trials, runs, n)."""
+        own = np.asarray(part.rate)
+        # behind the last there are copies of it
+        changes = np.diff(own, axis=1) != 0.0
+        last = own.shape[1] - 1 - np.argmax(changes[:, ::-1], axis=1) if changes.size else 0
+        last = np.where(np.any(changes, axis=1), last, 0)
+        place = np.minimum(np.arange(own.shape[1]), last[:, None])
+        of_run, at = np.nonzero(np.arange(own.shape[1]) <= last[:, None])
+        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(part.kinematics)]
+        flows = (
+            np.concatenate([leaf.reshape(len(own), -1) for leaf in leaves], 1) if leaves else None
+        )
+        flags = self._flags.of(thetas)
+        patterns, which = np.unique(flags, axis=0, return_inverse=True)
+        out = np.empty((2, len(thetas), *own.shape))
+
+        def some(lanes: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
+            pattern, trial, state = lanes
+            filled = np.arange(-(-len(trial) // LANES) * LANES).clip(max=len(trial) - 1)
+            trial, state = trial[filled], state[filled]
+            row, column = of_run[state], at[state]
+
+            def grouped(values: np.ndarray) -> np.ndarray:
+                return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
+
+            of_mode = modes[trial]
+            # what effects add is left out where no lane has it
+            present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
+            present[:declared] = True
+            given = {
+                "rate": grouped(rate[trial, row, column]),
+                "shared": grouped(shared[trial]),
+                "mode": grouped(of_mode[:, present]),
+                "flow": np.zeros(1) if flows is None else grouped(flows[row]),
+            }
+            stress, felt = self._code(patterns[pattern[0]], given)
+            out[:, trial, row, column] = stress.ravel(), felt.ravel()
+
+        pieces = []
+        for number in range(len(patterns)):
+            trials = np.flatnonzero(which.ravel() == number)
+            trial = np.repeat(trials, len(of_run))
+            state = np.tile(np.arange(len(of_run)), len(trials))
+            for first in range(0, len(trial), _AT_ONCE * LANES):
+                piece = slice(first, first + _AT_ONCE * LANES)
+                pieces.append((np.array([number]), trial[piece], state[piece]))
+        in_threads(some, pieces, is_compiled=True)
+        return np.take_along_axis(out, np.broadcast_to(place, out.shape), axis=3)

@@ -1,0 +1,127 @@
+"""Sweeps of many vectors at once: each oscillation in steady alternation is a lane of its own."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from discover.dataset import Run
+from discover.effects import make_effect
+from discover.forward import AugmentedModel, make_batch
+from discover.forward.declared import DeclaredModel
+from discover.forward.program import Program
+from discover.protocols import oscillations
+
+MODULI, TIMES, SOLVENT = np.array([60.0, 20.0]), np.array([0.1, 2.0]), 1.0
+STRAINS, FREQUENCIES = np.array([0.01, 1.0, 3.0, 0.01, 0.5]), np.array([0.3, 1.0, 2.0, 30.0, 5.0])
+
+
+@pytest.fixture(scope="module")
+def asked():
+    """Return a model and a sweep."""
+    n = len(STRAINS)
+    run = Run(
+        "sweep", np.arange(1.0, n + 1.0), oscillations(STRAINS, FREQUENCIES),
+        STRAINS * FREQUENCIES, np.ones(n), strain=STRAINS, storage_modulus=np.ones(n),
+        loss_modulus=np.ones(n),
+    )  # fmt: skip
+    declared = DeclaredModel.maxwell(MODULI, TIMES, solvent_viscosity=SOLVENT)
+    effects = [make_effect(name) for name in ("giesekus_mobility", "stress_gain")]
+    return AugmentedModel(declared, effects), make_batch(run.records)
+
+
+def predicted(asked, amplitudes):
+    """Return complex moduli of vectors, none of which is left to the other program."""
+    model, batch = asked
+    thetas = np.tile(model.zero(), (len(amplitudes), 1))
+    for theta, values in zip(thetas, amplitudes, strict=True):
+        for name, value in values.items():
+            theta[model.positions(name)[0]] = value
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Program, "_predict_all", None)
+        storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
+    return storage + 1j * loss
+
+
+def giesekus(strain, frequency, mobility):
+    """Return G′ + iG″ of the modes, by scipy over cycles enough for the start to be forgotten."""
+
+    def of(time):
+        def change(t, s):
+            xx, yy, xy = s
+            flow = time * strain * frequency * np.cos(frequency * time * t)
+            return [
+                2.0 * flow * xy - xx - mobility * (xx * xx + xy * xy),
+                -yy - mobility * (yy * yy + xy * xy),
+                flow * (1.0 + yy) - xy - mobility * xy * (xx + yy),
+            ]
+
+        period = 2.0 * np.pi / (frequency * time)
+        begins = np.ceil(30.0 / period) * period
+        phase = np.linspace(0.0, 2.0 * np.pi, 129)[:-1]
+        when = begins + phase / (frequency * time)
+        found = solve_ivp(
+            change, (0.0, when[-1]), np.zeros(3), "LSODA", when, rtol=1e-11, atol=1e-13
+        )
+        # of what is periodic, the sum over a period is exact to all orders
+        return np.mean(found.y[2] * 2j * np.exp(-1j * phase)) / strain
+
+    return sum(g * of(time) for g, time in zip(MODULI, TIMES, strict=True))
+
+
+def test_a_maxwell_fluid_has_its_closed_moduli_at_every_strain(asked):
+    # σ12 of an upper convected Maxwell fluid is linear in the strain; a gain multiplies the record
+    gains = np.linspace(0.0, 0.16, 9)
+    found = predicted(asked, [{"stress_gain": gain} for gain in gains])
+    w = FREQUENCIES[:, None]
+    exact = np.sum(MODULI * 1j * w * TIMES / (1.0 + 1j * w * TIMES), axis=1)
+    exact += 1j * FREQUENCIES * SOLVENT
+    ratio = found / exact
+    # the steps of a cycle err by so much; the gain is exact
+    np.testing.assert_allclose(ratio[0], 1.0, atol=2e-5)
+    np.testing.assert_allclose(np.ptp(ratio / ratio[0], axis=1), 0.0, atol=1e-12)
+    assert np.all(np.diff(np.abs(ratio[:, 0])) != 0.0)
+
+
+def test_a_giesekus_fluid_has_the_moduli_that_scipy_ends_at(asked):
+    (found,) = predicted(asked, [{"giesekus_mobility": 0.3}])
+    exact = [giesekus(*each, 0.3) for each in zip(STRAINS, FREQUENCIES, strict=True)]
+    # as above
+    np.testing.assert_allclose(found, np.array(exact) + 1j * FREQUENCIES * SOLVENT, rtol=2e-5)
+
+
+def test_a_vector_of_a_sweep_does_not_depend_on_those_beside_it(asked):
+    # far below zero a mode grows without end
+    vectors = [{"giesekus_mobility": value} for value in (0.3, -40.0, 0.1)]
+    together = predicted(asked, vectors)
+    assert not np.all(np.isfinite(together[1]))
+    np.testing.assert_allclose(together[::2], predicted(asked, vectors[::2]), rtol=1e-12)
+
+
+def test_moduli_of_each_vector_and_its_solvent_are_its_own(asked):
+    model, batch = asked
+    theta = model.zero()
+    theta[model.positions("giesekus_mobility")[0]] = 0.3
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Program, "_predict_all", None)
+        # one mode at a time, and the solvent alone
+        found = model.predictions(
+            [theta] * 4, batch, np.vstack([model.moduli, np.diag(model.moduli)])
+        )
+    # the record is linear in the moduli, each mode's own and the solvent's
+    np.testing.assert_allclose(np.sum(found[1:], axis=0), found[0], rtol=1e-12)
+    np.testing.assert_allclose(found[3, 1], FREQUENCIES * SOLVENT, rtol=1e-12)
+
+
+def test_what_gives_way_in_a_sweep_is_predicted_by_the_other_program_in_its_place(asked):
+    model, batch = asked
+    model = AugmentedModel(model.declared, [*model.effects, make_effect("wall_slip")])
+    thetas = np.tile(model.zero(), (3, 1))
+    thetas[[0, 2], model.positions("giesekus_mobility")[0]] = 0.3
+    at = model.positions("wall_slip")
+    thetas[1:, at] = model.first_trial[at]
+    found = model.predictions(thetas, batch)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Program, "side_by_side", lambda *_: None)
+        other = model.predictions(thetas, batch)
+    np.testing.assert_allclose(found, other, rtol=1e-5)  # where Newton's method ends
+    assert np.all(np.abs(found[2, 0] / found[0, 0] - 1.0) > 1e-4)
