@@ -137,7 +137,14 @@ def complaint(case: Case, outcome: Outcome) -> str | None:
         return f"takes nonsense: {case.nonsense}" if case.nonsense and not warned else None
     if outcome.code != 2:
         return f"ends with {outcome.code}"
-    said = [line for line in everything.splitlines() if line.startswith(("discover: ", "error: "))]
+    # each problem of a list is judged, beside the place that its first line names
+    listed = re.sub(
+        r"^(discover: .*) problems\.\n((?:- .*\n?)+)",
+        lambda found: "".join(f"{found[1]}: {one}\n" for one in found[2].splitlines()),
+        everything,
+        flags=re.MULTILINE,
+    )
+    said = [line for line in listed.splitlines() if line.startswith(("discover: ", "error: "))]
     if isinstance(case.call, list) and "--json" in case.call:
         said = said or [outcome.stdout]
     if not said and re.search(r"Usage:.*Error", outcome.stderr, re.DOTALL):

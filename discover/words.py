@@ -2,9 +2,13 @@
 
 import difflib
 from collections.abc import Iterable, Sequence
+from pathlib import PurePath
 
 _LONGEST = 80
 """Characters of a name that a message repeats."""
+
+_LIKENESS = 0.65
+"""Least share of letters in common of a guess: 'alfa' is alpha (0.67), 'sweep' no creep (0.60)."""
 
 
 def listed(parts: Sequence[str]) -> str:
@@ -30,13 +34,16 @@ def percent_of(share: float) -> str:
 def nearest(given: object, known: Iterable[str]) -> str | None:
     """Return what is spelled most like a text; None where nothing is.
 
-    Capitals do not count, and a hyphen or a blank is an underscore.
+    Capitals do not count, nor does an ending of files in common, and a hyphen or a blank is an
+    underscore.
     """
+    # of a longer text no name is meant, and difflib would take minutes
+    wanted = _plain(str(given)[:_LONGEST])
+    ending = PurePath(wanted).suffix
     plain: dict[str, str] = {}
     for name in known:
-        plain.setdefault(_plain(name), name)
-    # of a longer text no name is meant, and difflib would take minutes
-    near = difflib.get_close_matches(_plain(str(given)[:_LONGEST]), list(plain), 1)
+        plain.setdefault(_plain(name).removesuffix(ending), name)
+    near = difflib.get_close_matches(wanted.removesuffix(ending), list(plain), 1, _LIKENESS)
     return plain[near[0]] if near else None
 
 
@@ -50,8 +57,8 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
     return "" if near is None else f" Did you mean {near!r}?"
 
 
-def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
-    """Return what is said of a name that nobody knows.
+def unknown_name(what: str, given: object, known: Iterable[str], owner: str = "") -> str:
+    """Return what is said of a name that nobody knows: what was got, meant, and may be written.
 
     Parameters
     ----------
@@ -61,10 +68,12 @@ def unknown_name(what: str, given: object, known: Iterable[str]) -> str:
         The name.
     known
         Names that would do.
+    owner
+        What has no such thing, as the subject of a sentence: 'The law giesekus'.
     """
     names = list(known)
     text = str(given)
     shown = repr(text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…")
-    return (
-        f"Unknown {what} {shown}.{did_you_mean(given, names)} Known: {', '.join(names) or 'none'}."
-    )
+    said = f"{owner} has no {what} {shown}." if owner else f"Unknown {what} {shown}."
+    remedy = f"Write {'one of: ' if len(names) > 1 else ''}{', '.join(names)}."
+    return f"{said}{did_you_mean(given, names)} {remedy if names else 'It has none; leave it out.'}"

@@ -33,8 +33,9 @@ def sweep_studies(study: Study) -> list[Asked]:
     studies = []
     for law in sweep.laws:
         if sweep.parameter not in LAWS[law].parameters:
-            said = unknown_name("parameter", sweep.parameter, LAWS[law].parameters)
-            raise InputError(f"compare.sweep: the law {law!r}: {said}")
+            its = LAWS[law].parameters
+            said = unknown_name("parameter", sweep.parameter, its, f"the law {law!r}")
+            raise InputError(f"compare.sweep: {said}")
         for value in sweep.values:
             make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
             made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})

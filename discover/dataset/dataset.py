@@ -133,7 +133,7 @@ class Dataset(NotebookView):
                 f"The run {name!r} of {self.name!r} cannot be used: {self.set_aside[name]}. Name "
                 "another."
             )
-        raise InputError(f"The data set {self.name!r}: {unknown_name('run', name, self.names)}")
+        raise InputError(unknown_name("run", name, self.names, f"The data set {self.name!r}"))
 
     def _numbered(self, number: int) -> Run:
         if not -len(self) <= number < len(self):

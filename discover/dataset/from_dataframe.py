@@ -80,7 +80,7 @@ def from_dataframe(
     no_option = [one for one in options if one not in signature(load_dataset).parameters]
     if no_option:
         known = list(signature(load_dataset).parameters)[1:]
-        raise InputError(f"from_dataframe: {unknown_name('option', no_option[0], known)}")
+        raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
     unknown = [kind for kind in tables or {} if kind not in _KINDS]
     if unknown:
         raise InputError(unknown_name("table", unknown[0], _KINDS))

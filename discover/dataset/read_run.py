@@ -66,7 +66,7 @@ def read_run(
     metadata = _metadata(index, row)
     test = declared_test(index, row, rate_before)
     in_shear = test.flow == "shear"
-    _require_columns(table, in_shear)
+    _require_columns(table, test)
     time = table.required(units.TIME)
     strain = table.quantity(units.STRAIN if in_shear else units.HENCKY_STRAIN)
     rate, derived = _rate(table, test, time, strain, rate_window)
@@ -113,17 +113,21 @@ _OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
 _BESIDE = (units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE)
 
 
-def _require_columns(table: Table, in_shear: bool) -> None:
+def _require_columns(table: Table, test: DeclaredTest) -> None:
     """Refuse a table with all that is wrong in its columns, and not with the first of it."""
     problems = Problems()
     with problems.collected():
         _checked_time(table)
-    stress, *answers = _OF_SHEAR if in_shear else _OF_EXTENSION
-    with problems.collected():
-        table.required(stress)
+    stress, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION
+    absent = []
     for quantity in (*answers, *_BESIDE):
         with problems.collected():
-            table.quantity(quantity)
+            if table.quantity(quantity) is None:
+                absent.append(quantity)
+    with problems.collected():
+        if all(answer in absent for answer in answers):
+            _refuse_another_flow(table, test)  # or a stress of that flow is taken for a slip
+        table.required(stress)
     problems.require_none(table.name)
 
 
@@ -149,7 +153,6 @@ def _rate(
     if strain is None:
         if test.step_strain:
             return np.zeros(len(time)), False  # held after the step
-        _refuse_another_flow(table, test)
         # said in the words of the commoner mistake
         strain = table.required(quantity)
     if test.control == "stress" and len(time) < _FEWEST_SMOOTHED:

@@ -94,7 +94,8 @@ def _known_effect(name: str, asked: object, where: str) -> KnownEffect:
     problems, values = Problems(), []
     unknown = [key for key in asked if key not in parameters]
     for key in unknown:
-        problems.add(f"{where}: the effect {name}: {unknown_name('parameter', key, parameters)}")
+        said = unknown_name("parameter", key, parameters, f"the effect {name}")
+        problems.add(f"{where}: {said}")
     meant = {nearest(key, parameters) for key in unknown}
     for key, parameter in parameters.items():
         if key in asked:

@@ -132,9 +132,9 @@ def register_law(
         Returns h written out, for exports of a law that is no sum of terms; see
         `tensor_library.isotropic_function`.
     extra_term
-        h as a plain function of stress and rate, both dimensionless, and of the parameters by name;
-        the law is then λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h. Written with `tensor_library.algebra`
-        (``trace``, ``square``, ``inner``, ``anticommutator``, ``identity_like``) and numbers.
+        h as a plain function of stress and rate, dimensionless tensors of shape (3, 3), and of the
+        parameters by name; the law is then λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h. Written with
+        `tensor_library.algebra` (``trace``, ``square``, ``inner``, ``anticommutator``, ``identity_like``) and numbers.
 
     Raises
     ------
@@ -256,8 +256,7 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
     entry, problems, values = LAWS[name], Problems(), []
     for key in parameters:
         if key not in entry.parameters:
-            said = unknown_name("parameter", key, entry.parameters)
-            problems.add(f"The law {name!r}: {said}")
+            problems.add(unknown_name("parameter", key, entry.parameters, f"The law {name!r}"))
     meant = {nearest(key, entry.parameters) for key in parameters if key not in entry.parameters}
     for key, (low, high) in entry.parameters.items():
         if key not in parameters:

@@ -80,7 +80,7 @@ def close_loop(
     """
     unknown = sorted(set(options) - _OPTIONS)
     if unknown:
-        raise InputError(f"close_loop: {unknown_name('option', unknown[0], sorted(_OPTIONS))}")
+        raise InputError(unknown_name("option", unknown[0], sorted(_OPTIONS), "close_loop"))
     asked = _checked(options)
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)

@@ -29,6 +29,7 @@ from discover.loop.parts import LawFit
 from discover.loop.path import predicted
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.words import unknown_name
 
 MOST_LISTED = 8
 """Explanations that are listed by default."""
@@ -189,7 +190,7 @@ class Task:
         """
         unknown = [name for name in laws if name not in LAWS]
         if unknown:
-            raise InputError(f"Unknown law {unknown[0]!r}; write some of {', '.join(LAWS)}.")
+            raise InputError(unknown_name("law", unknown[0], LAWS))
         found: dict[str, Search] = {}
         for name in dict.fromkeys(laws):
             self.say(f"law {len(found) + 1} of {len(laws)}: {LAWS[name].title}")

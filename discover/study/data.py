@@ -150,11 +150,10 @@ def _observed(
     whole = dataset.quantity_by_quantity()
     missing = set(observe) - {run.quantity for run in whole}
     if missing:
+        there, its = sorted({run.quantity for run in whole}), f"the data set {dataset.name!r}"
         left = f" {whole.left_out}" if whole.left_out else ""
         raise InputError(
-            f"[data] observe: no run of {dataset.name!r} has it. "
-            f"{unknown_name('quantity', sorted(missing)[0], sorted({r.quantity for r in whole}))}"
-            f"{left}"
+            f"[data] observe: {unknown_name('quantity', sorted(missing)[0], there, its)}{left}"
         )
     wanted = dataset.names if fit is None else fit
     by_name = {run.name: [] for run in dataset}

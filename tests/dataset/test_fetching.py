@@ -189,4 +189,4 @@ def test_an_installer_that_fails_says_what_it_said_last(tmp_path, monkeypatch):
 
 
 def test_an_unknown_set_is_refused(tmp_path):
-    assert "write polyisoprene" in invoke("nobody", "--out", tmp_path / "x").stderr
+    assert "Write polyisoprene" in invoke("nobody", "--out", tmp_path / "x").stderr

@@ -183,7 +183,7 @@ def test_names_of_the_users_own_are_read_and_kept_for_the_next_import(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ('shear_rte = ["a"]', "Is shear_rate meant"),
+        ('shear_rte = ["a"]', "Did you mean 'shear_rate'"),
         ('stress = "tau"', "must be a list"),
         ("stress = [3]", "no name"),
         ('stress = ["()"]', "no name"),
@@ -202,7 +202,7 @@ def test_a_wrong_file_of_names_is_one_message(tmp_path, text, said):
 
 
 def test_a_mapping_file_with_names_of_an_unknown_quantity_is_refused():
-    with pytest.raises(InputError, match="Is shear_rate meant"):
+    with pytest.raises(InputError, match="Did you mean 'shear_rate'"):
         make_mapping({"names": {"shear_rte": ["a"]}}, "import.toml")
 
 

@@ -142,7 +142,7 @@ def test_what_is_recorded_and_not_observed_judges(tmp_path):
     ("keys", "message"),
     [
         ({"creep": "fit"}, "has no creep.csv; it has flow_curve.csv"),
-        ({"observe": ["N2"]}, "observe names N2, which no run of .* has"),
+        ({"observe": ["N2"]}, "observe: the data set .* has no quantity 'N2'"),
         ({"flow_curve": "use"}, "flow_curve"),
     ],
 )

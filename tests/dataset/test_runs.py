@@ -45,7 +45,7 @@ def test_a_window_cuts_samples_and_keeps_the_flow():
 
 def test_selecting_an_unknown_run_names_those_there_are():
     data = Dataset("set", (make_run(),))
-    with pytest.raises(InputError, match=r"no run 'b\.csv'; it has a\.csv"):
+    with pytest.raises(InputError, match=r"no run 'b\.csv'\. Write a\.csv"):
         data.select(["b.csv"])
 
 

@@ -157,7 +157,7 @@ def test_a_table_is_the_data_set_that_its_files_would_be(tmp_path):
         ((DATA.to_dataframe().assign(run="../a"),), "names of runs"),
         ((DATA.to_dataframe(), pd.DataFrame({"run": ["b"]})), "of which there is no sample"),
         ((DATA.to_dataframe(), pd.DataFrame({"flow": ["shear"]})), "no column 'file'"),
-        ((None, None, {"sweep": DATA.to_dataframe()}), "There is no table 'sweep'"),
+        ((None, None, {"sweep": DATA.to_dataframe()}), "Unknown table 'sweep'. Write one of"),
     ],
 )
 def test_a_table_that_is_no_data_set_is_refused(arguments, message):

@@ -23,7 +23,7 @@ def test_fit_alone_leaves_every_parameter_to_be_fitted():
     ("written", "words"),
     [
         ({"stress_gian": "fit"}, "Unknown effect 'stress_gian'"),
-        ({"stress_gain": {"gain": 0.1}}, "no parameter 'gain'. It has gain_error"),
+        ({"stress_gain": {"gain": 0.1}}, "no parameter 'gain'. Write gain_error"),
         ({"edge_fracture": {"loss": 0.1}}, "needs critical_strain too"),
         ({"stress_gain": {"gain_error": 7.0}}, "between -0.8 and 4"),
         ({"stress_gain": {"gain_error": "free"}}, 'a number or "fit"'),

@@ -73,7 +73,9 @@ def test_without_the_package_the_commands_of_the_page_are_refused(workplace):
     archives(workplace.folder)
     workplace.run(*commands()[0], code=2)
     done = workplace.run(*commands()[0], "--format", "house_rheometer", code=2)
-    assert "Unknown format 'house_rheometer'; known are text, spreadsheet, reptate." in done.stderr
+    assert (
+        "Unknown format 'house_rheometer'. Write one of: text, spreadsheet, reptate." in done.stderr
+    )
 
 
 def test_a_name_or_a_suffix_is_not_given_twice():

@@ -60,7 +60,7 @@ def test_what_returns_no_result_is_an_error_that_names_the_learner(workplace):
 
 def test_without_the_package_the_study_of_the_page_is_refused(workplace):
     # negative control of the first test, in this process, where nothing is installed
-    said = "unknown learner 'one_term'; write one of tensor_sindy, tbnn_ude"
+    said = "unknown learner 'one_term'. Write one of: tensor_sindy, tbnn_ude"
     with pytest.raises(InputError, match=said):
         read_study(workplace.folder / workplace.study(PAGE))
 

@@ -84,7 +84,7 @@ def test_the_form_of_the_page_is_found_in_data_reported_and_exported(workplace):
 
 def test_without_the_package_the_study_of_the_page_is_refused(workplace):
     # negative control of the test above, in this process, where nothing is installed
-    said = "unknown closed form 'tanh'; write some of exp, saturating"
+    said = "unknown closed form 'tanh'. Write one of: exp, saturating"
     with pytest.raises(InputError, match=said):
         read_study(workplace.folder / workplace.study(PAGE))
 

@@ -87,7 +87,7 @@ def test_a_law_that_none_of_them_is_stays_unexplained():
 
 
 def test_a_name_that_is_no_law_is_told():
-    with pytest.raises(InputError, match=r"Unknown law 'newton'; write some of ucm"):
+    with pytest.raises(InputError, match=r"Unknown law 'newton'\. Write one of: ucm"):
         chosen(runs(Giesekus(0.3), (0.3, 1.0)), names=("ucm", "newton"))
 
 

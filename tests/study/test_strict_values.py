@@ -63,7 +63,7 @@ def test_python_refuses_truth_values_and_text_for_numbers_as_studies_do():
 
 
 def test_whole_numbers_are_numbers_and_truth_values_are_truth_values():
-    model = study("model", modulus_Pa=3, parameters={"alpha": 0}).model
+    model = study("model", law="giesekus", modulus_Pa=3, parameters={"alpha": 0}).model
     assert (model.modulus_Pa, model.parameters["alpha"]) == (3.0, 0.0)
     assert study("compare", quick=True).compare.quick is True
     assert study("loop", strain=[0, 25]).loop.strain == (0.0, 25.0)
