@@ -392,11 +392,9 @@ class Predictions:
         runs = len(missed)
         # as few runs tell a deviation badly: of the next one Student's quantile is the wider
         wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
-        size = [
-            np.sqrt(np.mean((missed * np.maximum(fast / fastest, 1.0)) ** 2))
-            for fast in self.rows.fastest
-        ]
-        return np.minimum(wider * np.array(size), _MOST_MISSED)[self.rows.run]
+        # as far as the worst of them, and in proportion to the rate beyond the fastest
+        size = np.max(missed) * np.maximum(self.rows.fastest / np.max(fastest), 1.0)
+        return np.minimum(wider * size, _MOST_MISSED)[self.rows.run]
 
 
 def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
