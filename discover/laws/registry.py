@@ -134,8 +134,8 @@ def register_law(
     extra_term
         h as a plain function of stress and rate, dimensionless tensors of shape (3, 3), and of the
         parameters by name; the law is then λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h. Written with
-        `tensor_library.algebra` (``trace``, ``square``, ``inner``, ``anticommutator``, ``identity_like``)
-        and numbers.
+        `tensor_library.algebra` (``trace``, ``square``, ``inner``, ``anticommutator``,
+        ``identity_like``) and numbers.
 
     Raises
     ------
