@@ -139,7 +139,7 @@ def complaint(case: Case, outcome: Outcome) -> str | None:
         return f"ends with {outcome.code}"
     # each problem of a list is judged, beside the place that its first line names
     listed = re.sub(
-        r"^(discover: .*) problems\.\n((?:- .*\n?)+)",
+        r"^(discover: .*) problems\.\n((?: *- .*\n?)+)",
         lambda found: "".join(f"{found[1]}: {one}\n" for one in found[2].splitlines()),
         everything,
         flags=re.MULTILINE,
