@@ -1,7 +1,7 @@
 """Residuals and their derivatives by differences, of vectors side by side."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -13,17 +13,6 @@ _WIDTH = 1e-5
 
 _BEYOND = 1e-3
 """By how much a move may lengthen the residuals, whose length is an error over the record."""
-
-
-class HasResiduals(Protocol):
-    """A model with residuals of many vectors at once, as `AugmentedModel` has."""
-
-    high: Float[np.ndarray, " p"]
-    first_trial: Float[np.ndarray, " p"]
-
-    def residuals(self, thetas: Any, batch: Batch, limits: Any = None, /) -> np.ndarray:
-        """Return the weighted residuals of parameter vectors."""
-        ...
 
 
 class Linearised(NamedTuple):
@@ -70,7 +59,7 @@ class Point(NamedTuple):
 
 
 def widths_of(
-    model: HasResiduals, theta: Float[np.ndarray, " p"], positions: Sequence[int]
+    model: Any, theta: Float[np.ndarray, " p"], positions: Sequence[int]
 ) -> Float[np.ndarray, " positions"]:
     """Return by how much parameters are moved for a derivative, away from an upper bound."""
     at = list(positions)
@@ -78,13 +67,13 @@ def widths_of(
     return np.where(theta[at] + width > model.high[at], -width, width)
 
 
-def linearised(model: HasResiduals, points: Sequence[Point], batch: Batch) -> list[Linearised]:
+def linearised(model: Any, points: Sequence[Point], batch: Batch) -> list[Linearised]:
     """Return what is asked about several vectors, from one call for all of them.
 
     Parameters
     ----------
     model, batch
-        Whose residuals, of which runs.
+        An `AugmentedModel` whose residuals are asked for, and of which runs.
     points
         The vectors.
     """
