@@ -34,17 +34,22 @@ def percent_of(share: float) -> str:
 def nearest(given: object, known: Iterable[str]) -> str | None:
     """Return what is spelled most like a text; None where nothing is.
 
-    Capitals do not count, nor does an ending of files in common, and a hyphen or a blank is an
-    underscore.
+    Capitals do not count, nor do an ending of files in common and the order of words, and a hyphen
+    or a blank is an underscore.
     """
     # of a longer text no name is meant, and difflib would take minutes
     wanted = _plain(str(given)[:_LONGEST])
     ending = PurePath(wanted).suffix
     plain: dict[str, str] = {}
     for name in known:
-        plain.setdefault(_plain(name).removesuffix(ending), name)
-    near = difflib.get_close_matches(wanted.removesuffix(ending), list(plain), 1, _LIKENESS)
+        plain.setdefault(_in_order(_plain(name).removesuffix(ending)), name)
+    asked = _in_order(wanted.removesuffix(ending))
+    near = difflib.get_close_matches(asked, list(plain), 1, _LIKENESS)
     return plain[near[0]] if near else None
+
+
+def _in_order(name: str) -> str:
+    return "_".join(sorted(name.split("_")))
 
 
 def _plain(name: str) -> str:
