@@ -136,7 +136,7 @@ class NoiseModel:
         values: Float[np.ndarray, "rows k"],
         predicted: Float[np.ndarray, " rows"],
         noise: Noise,
-    ) -> Float[np.ndarray, "rows k"]:
+    ) -> Float[np.ndarray, "kept k"]:
         """Return columns of the rows that are kept, over independent noise of variance one."""
         deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
         scaled = values[self.kept] / deviation[:, None]
