@@ -19,3 +19,17 @@ def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray
     if not kept.shape[1]:
         return values
     return values - kept @ np.linalg.lstsq(kept, values, rcond=_ROUNDING)[0]
+
+
+def squared_distance(
+    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
+) -> float:
+    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
+
+    By singular values: draws that nearly run away spread so far that the k × k matrix of Woodbury's
+    identity is singular to rounding.
+    """
+    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
+    along = rows @ difference
+    beside = difference - along @ rows
+    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))

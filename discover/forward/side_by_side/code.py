@@ -12,11 +12,21 @@ from discover.forward.side_by_side.layout import Layout
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
 from discover.forward.structure import Numbers
 from discover.programs import compiled
-from discover.programs.lanes import Arithmetic, Translation, Writing, callable_of, kept
+from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
 from discover.protocols.kinematics import Kinematics
 
 _MADE: dict[tuple, "Code"] = {}
 _KEPT = 16
+
+
+def in_whole_eights(count: int) -> np.ndarray:
+    """Return places of so many lanes, the last again until the eights are full."""
+    return np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
+
+
+def lanes_last(values: np.ndarray) -> np.ndarray:
+    """Return values of lanes, in whole eights, with these eights first and their lanes last."""
+    return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
 
 
 class Code:

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import PeriodicFlows, Records
+from discover.forward.side_by_side.code import in_whole_eights, lanes_last
 from discover.forward.side_by_side.periodic_code import PeriodicCode
 from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
@@ -85,7 +86,7 @@ class PeriodicSideBySide:
         del limits, judging, runs
         count, frequency = len(thetas), np.asarray(part.frequency)
         present = self._fluid.present(thetas)
-        padded = np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
+        padded = in_whole_eights(count)
         eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
         own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
         pairs = list(zip(eights, own, strict=True))
@@ -111,21 +112,18 @@ class PeriodicSideBySide:
         out = np.empty((len(thetas), len(frequency)), complex)
 
         def some(lanes: tuple[np.ndarray, np.ndarray]) -> None:
-            trial, state = (lane[np.arange(-(-len(lane) // LANES) * LANES).clip(max=len(lane) - 1)]
-                            for lane in lanes)  # fmt: skip
+            trial, state = (lane[in_whole_eights(len(lane))] for lane in lanes)
             own = steps[state[::LANES]]
             half = np.arange(2 * own.max() + 1) * (0.5 * np.pi / own[:, None])
-
-            def grouped(values: np.ndarray) -> np.ndarray:
-                return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
 
             of_mode = modes[trial]
             # what effects add is left out where no lane has it
             present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
             present[:declared] = True
             given = {
-                "strain": grouped(strain[trial, state]), "frequency": grouped(frequency[state]),
-                "shared": grouped(shared[trial]), "mode": grouped(of_mode[:, present]),
+                "strain": lanes_last(strain[trial, state]),
+                "frequency": lanes_last(frequency[state]),
+                "shared": lanes_last(shared[trial]), "mode": lanes_last(of_mode[:, present]),
                 "steps": own, "cosine": np.cos(half), "sine": np.sin(half),
             }  # fmt: skip
             found = self._code(patterns[which.ravel()[trial[0]]], given)

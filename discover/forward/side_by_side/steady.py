@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, SteadyFlows
+from discover.forward.side_by_side.code import in_whole_eights, lanes_last
 from discover.forward.side_by_side.steady_code import SteadyCode
 from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
@@ -80,7 +81,7 @@ class SteadySideBySide:
         del limits, judging, runs
         count, present = len(thetas), self._fluid.present(thetas)
         # so many as one program is compiled for
-        padded = np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
+        padded = in_whole_eights(count)
         eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
         own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
         pairs = zip(eights, own, strict=True)
@@ -119,22 +120,19 @@ class SteadySideBySide:
 
         def some(lanes: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
             pattern, trial, state = lanes
-            filled = np.arange(-(-len(trial) // LANES) * LANES).clip(max=len(trial) - 1)
+            filled = in_whole_eights(len(trial))
             trial, state = trial[filled], state[filled]
             row, column = of_run[state], at[state]
-
-            def grouped(values: np.ndarray) -> np.ndarray:
-                return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
 
             of_mode = modes[trial]
             # what effects add is left out where no lane has it
             present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
             present[:declared] = True
             given = {
-                "rate": grouped(rate[trial, row, column]),
-                "shared": grouped(shared[trial]),
-                "mode": grouped(of_mode[:, present]),
-                "flow": np.zeros(1) if flows is None else grouped(flows[row]),
+                "rate": lanes_last(rate[trial, row, column]),
+                "shared": lanes_last(shared[trial]),
+                "mode": lanes_last(of_mode[:, present]),
+                "flow": np.zeros(1) if flows is None else lanes_last(flows[row]),
             }
             stress, felt = self._code(patterns[pattern[0]], given)
             out[:, trial, row, column] = stress.ravel(), felt.ravel()

@@ -9,9 +9,10 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from discover.identify.design.experiments import OBSERVED, Experiment
-from discover.identify.design.next_experiment import spread_of, squared_distance
+from discover.identify.design.next_experiment import spread_of
 from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws.multimode import Fluid
+from discover.statistics.projection import squared_distance
 
 _DRAWS = 32
 

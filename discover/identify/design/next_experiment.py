@@ -21,6 +21,7 @@ from jaxtyping import Float
 from discover.identify.design.experiments import OBSERVED, Experiment
 from discover.identify.side_by_side.many_laws import Contender, fluid_of, predict_laws, sigma_points
 from discover.laws.multimode import Fluid
+from discover.statistics.projection import squared_distance
 
 DECISIVE = 5.0
 """Natural logarithm of the odds (150 to 1) from which an experiment counts as deciding."""
@@ -220,20 +221,6 @@ def _seen(factor: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "r n"]:
     _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
     kept = sizes > _HIDDEN
     return sizes[kept, None] * rows[kept]
-
-
-def squared_distance(
-    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
-) -> float:
-    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
-
-    By singular values: draws that nearly run away spread so far that the k × k matrix of Woodbury's
-    identity is singular to rounding.
-    """
-    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
-    along = rows @ difference
-    beside = difference - along @ rows
-    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))
 
 
 def spread_of(group: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "k n"]:

@@ -26,7 +26,7 @@ from discover.inference.engine.fits import Fit
 from discover.inference.engine.possible_tests import PossibleTest, possible_tests
 from discover.inference.engine.posterior import Posterior
 from discover.protocols.kinematics import RecordedQuantity
-from discover.statistics.projection import rms
+from discover.statistics.projection import rms, squared_distance
 
 DECISIVE = 5.0
 """Log odds from which on a test decides: one against 150."""
@@ -265,17 +265,3 @@ def _factor(group: Float[np.ndarray, "varied n"]) -> Float[np.ndarray, "k n"]:
     """Return F with FᵀF the covariance of a prediction; the prediction itself comes first."""
     varied = group[1:][np.all(np.isfinite(group[1:]), axis=1)]
     return varied - group[0]
-
-
-def squared_distance(
-    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
-) -> float:
-    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
-
-    By singular values: what nearly runs away spreads so far that the k × k matrix of Woodbury's
-    identity is singular to rounding.
-    """
-    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
-    along = rows @ difference
-    beside = difference - along @ rows
-    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))

@@ -140,7 +140,7 @@ class Discrepancy:
     def _others(self) -> tuple[list[str], Float[np.ndarray, " k"]]:
         problem = self.fitter.problem
         names = [e.name for e in problem.candidates if e.name not in self.fit.names]
-        return names, np.array([1e-2 * problem.priors((n,))[self._at(n)].width for n in names])
+        return names, np.array([1e-2 * problem.amplitude(n).width for n in names])
 
     def _at(self, name: str) -> int:
         return self.fitter.problem.model.positions(name)[0]
@@ -154,7 +154,8 @@ class Discrepancy:
             theta = self.fit.theta.copy()
             theta[self._at(name)] += step
             thetas.append(theta)
-        found = (fitter.predict(thetas) - predicted).T / self._steps
+        with np.errstate(over="ignore", invalid="ignore"):  # an effect that runs away
+            found = (fitter.predict(thetas) - predicted).T / self._steps
         return np.where(np.all(np.isfinite(found), axis=0), found, 0.0)
 
     # the grid ---------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """Likeliest constants of hypotheses, by Gauss-Newton steps of many fits side by side."""
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -91,6 +92,11 @@ class Fit:
         return theta
 
 
+def _running_away() -> np.errstate:
+    """Return what lets a trial that runs away be a rejected step, without a word."""
+    return np.errstate(over="ignore", invalid="ignore")
+
+
 class Fitter:
     """Fits of hypotheses of a problem to some of its rows.
 
@@ -98,15 +104,19 @@ class Fitter:
     ----------
     problem, rows
         The problem, and what is predicted of it.
-    without
-        A run that is predicted and not fitted; None for none.
     """
 
-    def __init__(self, problem: Problem, rows: Rows, without: int | None = None):
+    def __init__(self, problem: Problem, rows: Rows):
         self.problem, self.rows = problem, rows
-        self.noise = NoiseModel(rows, without, problem.noise)
+        self.noise = NoiseModel(rows, None, problem.noise)
         self._shifts = self._modulus_shifts()
         self.widths = self._widths()
+
+    def leaving_out(self, run: int) -> "Fitter":
+        """Return what fits the same rows without those of one run."""
+        other = copy(self)
+        other.noise = NoiseModel(self.rows, run, self.problem.noise)
+        return other
 
     # what is linear ---------------------------------------------------------------------------
 
@@ -166,47 +176,40 @@ class Fitter:
 
     def _set(self, fit: Fit, predicted: np.ndarray) -> None:
         """Set what a prediction of the model says of a hypothesis."""
-        record = predicted + self.linear_columns(predicted) @ fit.linear
-        fit.log_likelihood, fit.noise = self.noise.log_likelihood(
-            self.rows.recorded - record, record
-        )
         fit.predicted = predicted
+        record = self.record(fit)
+        left = self.rows.recorded - record
+        fit.log_likelihood, fit.noise = self.noise.log_likelihood(left, record)
         known = sum(
             p.log_density(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)
         )
         known += float(-0.5 * np.sum((fit.linear / self.widths) ** 2))
         fit.log_posterior = fit.log_likelihood + known
 
+    def _steps(self, fit: Fit) -> Float[np.ndarray, " free"]:
+        """Return by how much each coordinate is moved for a derivative, away from an upper end."""
+        steps = [_STEP * prior.width for prior in fit.priors.values()]
+        ends = [prior.ends[1] for prior in fit.priors.values()]
+        return np.where(fit.coordinates + steps > ends, np.negative(steps), steps)
+
     def _moved(self, fit: Fit) -> list[np.ndarray]:
         """Return vectors whose differences from the fit are its derivatives."""
         thetas = []
-        for at, prior in fit.priors.items():
-            moved, coordinate = fit.theta.copy(), prior.to_coordinate(fit.theta[at])
-            step = _STEP * prior.width
-            if coordinate + step > prior.ends[1]:
-                step = -step
-            moved[at] = prior.to_value(coordinate + step)
+        moves = zip(fit.priors.items(), fit.coordinates + self._steps(fit), strict=True)
+        for (at, prior), coordinate in moves:
+            moved = fit.theta.copy()
+            moved[at] = prior.to_value(coordinate)
             thetas.append(moved)
         return thetas
 
     def _columns(self, fit: Fit, moved: np.ndarray) -> Float[np.ndarray, "rows n"]:
         """Return the derivatives of the records, of predictions at `_moved`."""
-        steps = []
-        for at, prior in fit.priors.items():
-            step = _STEP * prior.width
-            inside = prior.to_coordinate(fit.theta[at]) + step <= prior.ends[1]
-            steps.append(step if inside else -step)
-        own = (moved - fit.predicted).T / np.array(steps)
+        with _running_away():
+            own = (moved - fit.predicted).T / self._steps(fit)
         own = np.where(np.all(np.isfinite(own), axis=0), own, 0.0)
-        gain = (
-            1.0
-            + fit.linear[0]
-            + (
-                fit.linear[1 + 2 * len(self.rows.runs) :][self.rows.run]
-                if self.problem.loading
-                else np.zeros(len(self.rows))
-            )
-        )
+        gain = np.full(len(self.rows), 1.0 + fit.linear[0])
+        if self.problem.loading:
+            gain += fit.linear[1 + 2 * len(self.rows.runs) :][self.rows.run]
         return np.column_stack([own * gain[:, None], self.linear_columns(fit.predicted)])
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
@@ -218,29 +221,32 @@ class Fitter:
     def fit(self, starts: Sequence[Fit], rounds: int = 14, derivatives: bool = True) -> list[Fit]:
         """Return hypotheses at their likeliest constants; all take their steps side by side."""
         fits = list(starts)
-        for fit, predicted in zip(fits, self.predict([f.theta for f in fits]), strict=True):
-            self._set(fit, predicted)
+        with _running_away():
+            for fit, predicted in zip(fits, self.predict([f.theta for f in fits]), strict=True):
+                self._set(fit, predicted)
         active = [fit for fit in fits if np.isfinite(fit.log_posterior)]
         for _ in range(rounds):
             if not active:
                 break
-            self._linearise(active)
+            self.linearise(active)
             trials = [trial for fit in active for trial in self._trials(fit)]
             found = self.predict([theta for theta, _ in trials])
-            still, place = [], 0
-            for fit in active:
-                if self._take(fit, trials[place : place + 3], found[place : place + 3]):
-                    still.append(fit)
-                place += 3
-            active = still
+            each = range(0, len(trials), len(_DAMPINGS))
+            own = [slice(first, first + len(_DAMPINGS)) for first in each]
+            with _running_away():
+                active = [
+                    fit for fit, at in zip(active, own, strict=True)
+                    if self._take(fit, trials[at], found[at])
+                ]  # fmt: skip
         if derivatives:
             usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
-            self._linearise(usable)
+            self.linearise(usable)
             for fit in usable:
                 self._judge(fit)
         return fits
 
-    def _linearise(self, fits: Sequence[Fit]) -> None:
+    def linearise(self, fits: Sequence[Fit]) -> None:
+        """Set the derivatives of fits, all of whose vectors are predicted side by side."""
         moved = [self._moved(fit) for fit in fits]
         found = self.predict([theta for some in moved for theta in some])
         place = 0

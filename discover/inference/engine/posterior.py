@@ -124,15 +124,6 @@ class Posterior:
             return "unexplained"
         return "effects_added" if self.explanations[0].members[0] else "no_effect_needed"
 
-    @property
-    def inclusion(self) -> dict[str, float]:
-        """Probability of each effect, that something has no name being another answer."""
-        found: dict[str, float] = {}
-        for fit, probability in self.fits:
-            for name in fit.names:
-                found[name] = found.get(name, 0.0) + probability
-        return found
-
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
         parts = []
@@ -180,7 +171,7 @@ class Posterior:
     def missed(self, fit: Fit) -> Float[np.ndarray, " runs"]:
         """Return by how much of its size each fitted run is missed that is left out of a fit."""
         if "missed" not in fit.memory:
-            fit.memory["missed"] = left_out(self.problem, fit)
+            fit.memory["missed"] = left_out(self.search.fitter, fit)
         return fit.memory["missed"]
 
     @in_one_thread
@@ -341,8 +332,9 @@ class Predictions:
             return fit.memory["jacobian"]
         ahead = self.fitter.start(fit.names, fit.theta)
         ahead.predicted = predicted
-        moved = self.fitter.predict(self.fitter._moved(ahead))
-        own = self.fitter._columns(ahead, moved)[:, : len(fit.priors)]
+        self.fitter.linearise([ahead])
+        assert ahead.jacobian is not None
+        own = ahead.jacobian[:, : len(fit.priors)]
         # of what is linear, only the gain and the moduli are those of the fitted runs
         runs, q = len(self.problem.fitted.runs), len(fit.linear)
         linear, each = self.fitter.linear_columns(predicted), 2 + bool(self.problem.loading)
@@ -397,11 +389,11 @@ class Predictions:
         return np.minimum(wider * size, _MOST_MISSED)[self.rows.run]
 
 
-def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
+def left_out(whole: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
     """Return by how much of its size each fitted run is missed when it is left out of the fit."""
-    rows, found = problem.fitted, []
+    rows, problem, found = whole.rows, whole.problem, []
     for i in range(len(rows.runs)):
-        fitter = Fitter(problem, rows, without=i)
+        fitter = whole.leaving_out(i)
         start = fitter.start(fit.names, fit.theta, fit.linear)
         # when a rate steps is read off its own record, and is no prediction
         own = [step.place for step in rows.runs[i].rate_steps if step.place is not None]
@@ -409,8 +401,9 @@ def left_out(problem: Problem, fit: Fit) -> Float[np.ndarray, " runs"]:
         start.priors = {at: prior for at, prior in start.priors.items() if at not in held}
         part = fitter.fit([start], _LEFT_OUT_ROUNDS, derivatives=False)[0]
         at = rows.run == i
-        off = (rows.recorded - part.predicted)[at] / rows.size[at]
-        size = float(np.sqrt(max(float(np.mean(off**2)) - fit.noise.common**2, 0.0)))
+        with np.errstate(over="ignore", invalid="ignore"):  # without the run the law runs away
+            off = (rows.recorded - part.predicted)[at] / rows.size[at]
+            size = float(np.sqrt(max(float(np.mean(off**2)) - fit.noise.common**2, 0.0)))
         found.append(min(size, _MOST_MISSED) if np.isfinite(size) else _MOST_MISSED)
     return np.array(found)
 

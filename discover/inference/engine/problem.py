@@ -42,7 +42,7 @@ class Nuisance:
     Attributes
     ----------
     effect
-        Name of the effect whose amplitude it is; empty for the clock.
+        Name of the effect whose amplitude it is.
     sound
         Standard deviation in a sound instrument, in the scale of the effect's first trial.
     source
@@ -88,8 +88,8 @@ class Problem:
         The model to start from.
     candidates
         Effects that may be there.
-    runs
-        All runs that are fitted, and those that are predicted.
+    fitted, predicted
+        Runs that are fitted, and those that are predicted.
     loading
         Relative deviation by which loadings of the sample differ, if each run is its own.
     noise
@@ -116,14 +116,10 @@ class Problem:
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
         self.zero, self.moduli = self.model.zero(), self.model.moduli
         self._priors = self._known()
-        self.always = tuple(sorted(self._priors))
         self._widths = self._signatures()
-        root = (
-            root_of(declared.modulus_covariance)
-            if declared.modulus_covariance is not None
-            else None
-        )
-        self.modulus_root = None if root is None else np.asarray(root)
+        self._odds = sum(self.odds(effect.name) for effect in candidates)
+        covariance = declared.modulus_covariance
+        self.modulus_root = None if covariance is None else root_of(covariance)
 
     # what is known ---------------------------------------------------------------------------
 
@@ -173,9 +169,11 @@ class Problem:
         steps = 1e-3 * np.abs(model.first_trial[at])
         thetas = np.tile(self.zero, (len(at) + 1, 1))
         thetas[np.arange(len(at)), at] += steps
-        found = rows.flat(model.predictions(thetas, rows.batch))
-        change = (found[:-1] - found[-1]) / rows.size / steps[:, None]
-        size = np.sqrt(np.mean(np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0) ** 2, axis=1))
+        with np.errstate(over="ignore", invalid="ignore"):  # an effect that runs away
+            found = rows.flat(model.predictions(thetas, rows.batch))
+            change = (found[:-1] - found[-1]) / rows.size / steps[:, None]
+            change = np.nan_to_num(change, nan=0.0, posinf=0.0, neginf=0.0)
+            size = np.sqrt(np.mean(change**2, axis=1))
         # where the declared model is far off, little of an effect changes much
         first = _FIRST * np.abs(model.first_trial[at])
         widths = np.where(size > 0, _TYPICAL / np.maximum(size, 1e-300), first)
@@ -188,15 +186,17 @@ class Problem:
         found = dict(self._priors)
         for name in names:
             positions, effect = self.model.positions(name), self.effects[name]
-            low, high = self.model.low, self.model.high
-            found[positions[0]] = Prior(
-                "amplitude", 0.0, self._widths[name], float(low[positions[0]]),
-                float(high[positions[0]]),
-            )  # fmt: skip
+            found[positions[0]] = self.amplitude(name)
             for position, parameter in zip(positions[1:], effect.parameters[1:], strict=True):
                 found[position] = self._inner(position, parameter)
             found |= self._by_mode(name)
         return found
+
+    def amplitude(self, name: str) -> Prior:
+        """Return the prior of the amplitude of an effect that is there."""
+        at, model = self.model.positions(name)[0], self.model
+        ends = float(model.low[at]), float(model.high[at])
+        return Prior("amplitude", 0.0, self._widths[name], *ends)
 
     def _inner(self, position: int, parameter: EffectParameter) -> Prior:
         low, high = float(self.model.low[position]), float(self.model.high[position])
@@ -229,8 +229,7 @@ class Problem:
 
     def log_prior(self, names: Sequence[str]) -> float:
         """Return the log prior of a set: one effect of all is expected."""
-        total = sum(self.odds(effect.name) for effect in self.candidates)
-        return float(sum(np.log(self.odds(name) / total) for name in names))
+        return float(sum(np.log(self.odds(name) / self._odds) for name in names))
 
     def without(self, theta: Float[np.ndarray, " p"], *names: str) -> Float[np.ndarray, " p"]:
         """Return a vector without some effects."""

@@ -80,10 +80,6 @@ class Rows:
     def __len__(self) -> int:
         return len(self.recorded)
 
-    def only(self, keep: Sequence[int]) -> "Rows":
-        """Return the rows of some runs."""
-        return Rows.of([self.runs[i] for i in keep])
-
     def flat(
         self, predicted: Float[np.ndarray, "trials runs n"]
     ) -> Float[np.ndarray, "trials rows"]:

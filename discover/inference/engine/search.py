@@ -115,7 +115,7 @@ class Search:
             theta, at = fit.theta.copy(), problem.model.positions(name)[0]
             for position, value in inner.items():
                 theta[position] = value
-            prior = problem.priors((name,))[at]
+            prior = problem.amplitude(name)
             centre = theta[at] if at in fit.priors else 0.0  # a nuisance that may be at fault
             step = probe * prior.width
             step = -step if centre + step > prior.high else step
@@ -123,7 +123,8 @@ class Search:
             thetas.append(theta)
             steps.append(step)
             priors.append(prior)
-        columns = (fitter.predict(thetas) - fit.predicted).T / np.array(steps)
+        with np.errstate(over="ignore", invalid="ignore"):  # an effect that runs away
+            columns = (fitter.predict(thetas) - fit.predicted).T / np.array(steps)
         usable = np.all(np.isfinite(columns), axis=0)
         columns = np.where(usable, columns, 0.0)
         record = fitter.record(fit)
