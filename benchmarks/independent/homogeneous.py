@@ -45,7 +45,19 @@ class GiesekusFluid:
         begins: float = 0.0,
         jumps: Sequence[float] = (),
     ) -> np.ndarray:
-        """Return σ12 in shear, σ11 − σ22 in extension, in Pa.
+        """Return σ12 in shear, σ11 − σ22 in extension, in Pa; parameters as of `stress`."""
+        total = self.stress(kind, rate, times, begins, jumps)
+        return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
+
+    def stress(
+        self,
+        kind: str,
+        rate: Callable[[float], float],
+        times: np.ndarray,
+        begins: float = 0.0,
+        jumps: Sequence[float] = (),
+    ) -> np.ndarray:
+        """Return the extra stress in Pa, shape (n, 3, 3).
 
         Parameters
         ----------
@@ -78,5 +90,4 @@ class GiesekusFluid:
             y, t = solution.y[:, -1], end
         total = np.array([found[t].reshape(modes, 3, 3).sum(axis=0) for t in times])
         gradients = np.array([UNIT[kind] * rate(t) for t in times])
-        total = total + self.solvent_viscosity * (gradients + np.swapaxes(gradients, 1, 2))
-        return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
+        return total + self.solvent_viscosity * (gradients + np.swapaxes(gradients, 1, 2))

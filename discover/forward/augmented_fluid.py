@@ -214,7 +214,7 @@ class AugmentedFluid:
             extra,
             {effect: self.values(theta, effect) for effect in self.states},
             series,
-            self.beside(numbers, theta, jnp.ones(1), flow)[0],
+            self.beside(numbers, theta, jnp.ones(1), flow and flow.driven)[0],
             self._of_modes_at_rest("relaxations", law, declared.modulus, extra)
             if law.retracts
             else None,

@@ -7,11 +7,9 @@ leaves out the terms that it has at zero.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -19,10 +17,7 @@ from jaxtyping import Float
 from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.batches import (
     Batch,
-    Flows,
     PeriodicFlows,
-    Places,
-    Records,
     SteadyFlows,
     StressFlows,
     TransientFlows,
@@ -30,16 +25,13 @@ from discover.forward.batches import (
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.linearised import Linearised, Point, linearised, widths_of
+from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.forward.structure import Numbers, Structure
-from discover.programs import in_threads
+from discover.forward.structure import Structure
 from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
-
-# Of the batches that were laid out for the program
-_KEPT = 8
 
 # A steady state is solved for, a transient followed, a periodic state followed again and again
 _BY_SPEED = (SteadyFlows, TransientFlows, StressFlows, PeriodicFlows)
@@ -72,9 +64,7 @@ class AugmentedModel:
     ):
         self.declared = declared
         transients = None if fitted is None else fitted.transients
-        self._room = None if transients is None else transients.room
-        self._last_weights: tuple[Any, float, Any] | None = None
-        self._laid_out: list[tuple[TransientFlows, Records, list[_Piece]]] = []
+        room = None if transients is None else transients.room
         names = {effect.name for effect in effects}
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
@@ -90,9 +80,10 @@ class AugmentedModel:
             declared.step_instants,
             declared.added_modes,
         )
-        self._program = program_of(structure)
-        self._of_every_effect = program_of(structure.with_every_effect())
-        fluid = self._program.fluid
+        every_effect = structure.with_every_effect()
+        program = program_of(structure)
+        self._predictor = Predictor(declared, program, program_of(every_effect), room)
+        fluid = program.fluid
         self.slices, self.size, self.instants = fluid.slices, fluid.size, fluid.instants
         parameters = [p for effect in self.effects for p in effect.parameters]
         sizes = {"one": 1.0} | dict(scales or {})
@@ -114,33 +105,6 @@ class AugmentedModel:
         ]
         first = [0.01] * (2 + len(free)) + [1.0] * len(varying)
         self.first_trial = np.array([*first, *trials, *[0.5] * steps])
-
-    @cached_property
-    def _numbers(self) -> Numbers:
-        declared = self.declared
-        return Numbers(
-            declared.law,
-            jnp.asarray(declared.modulus),
-            jnp.asarray(declared.relaxation_time),
-            jnp.asarray(float(declared.solvent_viscosity)),
-        )
-
-    @cached_property
-    def _beside_every_effect(self) -> tuple[list[int], list[int], np.ndarray]:
-        """What of a vector counts, where it stands beside all effects, and all of them at rest."""
-        own, every = self._program.fluid, self._of_every_effect.fluid
-        at_rest = np.zeros(every.size)
-        for effect in every.structure.effects:
-            inner = [parameter.first_trial for parameter in effect.parameters[1:]]
-            at_rest[every.slices[effect.name]] = [0.0, *inner]
-        # no trial passes through a factor on the moduli that is not fitted
-        here = [*range(0 if self.declared.fit_modulus else 1, own.of_effects.start)]
-        there = [*here, *range(every.instants.start, every.instants.stop)]
-        here += range(own.instants.start, own.instants.stop)
-        for name, at in own.slices.items():
-            here += range(at.start, at.stop)
-            there += range(every.slices[name].start, every.slices[name].stop)
-        return here, there, at_rest
 
     def zero(self) -> Float[np.ndarray, " p"]:
         """Return the vector of the declared model: amplitudes zero, inner parameters at start.
@@ -237,10 +201,32 @@ class AugmentedModel:
             solvent in Pa s. By default as declared. One that an error of a sweep moves may be
             negative.
         """
+        return self._predicted(thetas, batch, moduli, normal=False)[..., 0]
+
+    def observables(
+        self,
+        thetas: Sequence[np.ndarray] | np.ndarray,
+        batch: Batch,
+        moduli: Float[np.ndarray, "trials c"] | None = None,
+    ) -> Float[np.ndarray, "trials runs n 3"]:
+        """Return the predicted records, N1 and N2 in Pa of any number of parameter vectors.
+
+        All three come from one integration, in the order of `OBSERVED`: what is recorded is σ12 in
+        shear and the tensile stress in extension. N1 is σ11 − σ22 and N2 is σ22 − σ33 in any flow.
+        They are not numbers where a test has none, as a sweep.
+
+        Parameters
+        ----------
+        thetas, batch, moduli
+            As in `predictions`. An effect of the torque's signal does not change N1 and N2.
+        """
+        return self._predicted(thetas, batch, moduli, normal=True)
+
+    def _predicted(self, thetas, batch: Batch, moduli, normal: bool):
         trials = self._trials(thetas, moduli=moduli)
-        out = np.zeros((len(thetas), *batch.recorded.shape))
+        out = np.zeros((len(thetas), *batch.recorded.shape, 3 if normal else 1))
         for i, rows in enumerate(batch.rows):
-            found = self._of_part(trials, batch, i)
+            found = self._predictor.of_part(trials, batch, i, normal)
             out[:, rows, : found.shape[2]] = found
         return out
 
@@ -249,90 +235,11 @@ class AugmentedModel:
         """Moduli of the declared modes in Pa, and behind them the viscosity of the solvent."""
         return np.append(self.declared.modulus, float(self.declared.solvent_viscosity))
 
-    def _trials(self, thetas, limits: Any = np.inf, moduli=None) -> "_Trials":
+    def _trials(self, thetas, limits: Any = np.inf, moduli=None) -> Trials:
         if moduli is None:
             moduli = np.broadcast_to(self.moduli, (len(thetas), len(self.moduli)))
         limits = np.broadcast_to(limits, len(thetas))
-        return _Trials(np.asarray(thetas, dtype=float), moduli, limits)
-
-    def _of_part(
-        self, trials: "_Trials", batch: Batch, number: int
-    ) -> Float[np.ndarray, "trials rows n"]:
-        """Return the records that a part of a batch holds, in the order of its rows."""
-        part = batch.parts[number]
-        if isinstance(part, PeriodicFlows):
-            return _of_sweeps(self._of_piece(trials, (part, None, 0)), batch.moduli)
-        if not isinstance(part, TransientFlows):
-            return self._of_piece(trials, (part, None, 0))
-        pieces = self._pieces(part, batch, batch.rows[number])
-        found = [self._of_piece(trials, piece) for piece in pieces]
-        runs, samples = part.sample_index.shape
-        return np.concatenate(found, axis=1)[:, :runs, :samples]
-
-    def _of_piece(
-        self, trials: "_Trials", piece: "_Piece"
-    ) -> Float[np.ndarray, "trials runs *columns"]:
-        program, (part, *judging) = self._program, piece
-        judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
-        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
-        kernel = self._of_every_effect.side_by_side(self._numbers, part)
-        if kernel is None:
-            return self._one_by_one(trials, piece)
-        here, there, at_rest = self._beside_every_effect
-        vectors = np.tile(at_rest, (len(trials.thetas), 1))
-        vectors[:, there] = trials.thetas[:, here]
-        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
-        if not np.any(alone):
-            return kernel.predict(self._numbers, *beside, part, *judging)
-        found = self._one_by_one(trials.taken(alone), piece)
-        out = np.empty((len(alone), *found.shape[1:]))
-        out[alone] = found
-        if not np.all(alone):
-            out[~alone] = kernel.predict(self._numbers, *beside.taken(~alone), part, *judging)
-        return out
-
-    def _one_by_one(
-        self, trials: "_Trials", piece: "_Piece"
-    ) -> Float[np.ndarray, "trials runs *columns"]:
-        """Return what vectors predict in a call of its own for each."""
-        program, (part, judging, _) = self._program, piece
-
-        def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
-            theta, moduli, limit = trial
-            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
-            numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
-            used = program.fluid.in_use(theta)
-            weights = self._weights(theta, part)
-            return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
-
-        shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
-        program.met.add(shape)
-        return np.stack(found)
-
-    def _weights(self, theta: np.ndarray, part: Flows):
-        """Return the weights of the steps, computed once for trials of the same times."""
-        known = self._last_weights
-        if known is None or known[0] is not part or known[1] != theta[1]:
-            known = (part, theta[1], self._program.weights(self._numbers, theta, part))
-            self._last_weights = known
-        return known[2]
-
-    def _pieces(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> list["_Piece"]:
-        """Return runs, and what judges them, in the room of the fitted ones, laid out once."""
-        for known, records, pieces in self._laid_out:
-            if known is part and records is batch.records:
-                return pieces
-        inside = [part] if self._room is None else part.laid_out(self._room)
-        judging, pieces = batch.records.of_runs(rows, part.room.samples), []
-        for flows in inside:
-            size = flows.room
-            own = min(size.runs, len(judging))
-            pieces.append((flows, judging.padded(size.runs, size.samples), own))
-            judging = judging.of_runs(range(size.runs, len(judging)))
-        self._laid_out.append((part, batch.records, pieces))
-        del self._laid_out[:-_KEPT]
-        return pieces
+        return Trials(np.asarray(thetas, dtype=float), moduli, limits)
 
     def residuals(
         self,
@@ -368,7 +275,7 @@ class AugmentedModel:
                 break
             left = ahead * (limits[asked] - sums[asked])
             some = trials.taken(asked)._replace(limits=left)
-            found = self._of_part(some, batch, i)
+            found = self._predictor.of_part(some, batch, i)[..., 0]
             rows, n = batch.rows[i], found.shape[2]
             off = batch.records.of_runs(rows, n).residual(found)
             out[np.ix_(asked.tolist(), rows, range(n))] = off
@@ -415,35 +322,7 @@ class AugmentedModel:
     def vectors_at_once(self, batch: Batch) -> int:
         """Return how many vectors cost what one does: as many as stand side by side."""
         kernels = (
-            isinstance(part, TransientFlows)
-            and self._of_every_effect.side_by_side(self._numbers, part) is not None
+            isinstance(part, TransientFlows) and self._predictor.side_by_side(part) is not None
             for part in batch.parts
         )
         return LANES if all(kernels) else 1
-
-
-class _Trials(NamedTuple):
-    """Parameter vectors side by side, and the moduli and the limit of each."""
-
-    thetas: Float[np.ndarray, "trials p"]
-    moduli: Float[np.ndarray, "trials c"]
-    limits: Float[np.ndarray, " trials"]
-
-    def taken(self, which: np.ndarray) -> "_Trials":
-        """Return some of them."""
-        return _Trials(*(each[which] for each in self))
-
-
-_Piece = tuple[Flows, Records | None, int]
-"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
-no padding."""
-
-
-def _of_sweeps(
-    found: Float[np.ndarray, "trials states 2"], runs: Sequence[Places]
-) -> Float[np.ndarray, "trials rows n"]:
-    """Return the moduli of each run, of those of all states; zero behind a shorter run's last."""
-    out = np.zeros((len(found), len(runs), max(len(places) for _, places in runs)))
-    for row, (modulus, places) in enumerate(runs):
-        out[:, row, : len(places)] = found[:, list(places), modulus]
-    return out

@@ -90,7 +90,7 @@ class Dynamics(NamedTuple):
     series
         Elements in series with the fluid; None where there can be none.
     viscosity
-        Recorded stress beside the modes at unit rate, in Pa s.
+        Stress that drives the flow beside that of the modes, at unit rate, in Pa s.
     relaxations
         Rates at which each tensor of a mode at rest, and its trace, relax beside −σ, over 1/λ, as
         the law's, shape (t, 2, k); these too are integrated exactly. None where chains do not

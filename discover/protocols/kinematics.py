@@ -5,10 +5,12 @@ All of them share their principal third axis, so that the stress has four compon
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
@@ -114,6 +116,11 @@ class Kinematics(eqx.Module):
         """Whether the torque is what is recorded: σ12 in shear."""
         return self.recorded[..., 3] == 1.0
 
+    @property
+    def driven(self) -> "Kinematics":
+        """The same flow, of which the stress that drives it is the viscous one: σ12 in shear."""
+        return replace(self, viscous=jnp.where(self.is_shear, 1.0, self.viscous))
+
     def equivalent_shear_stress(self, components: Float[Array, "4 ..."]) -> Float[Array, " ..."]:
         """Return the stress whose work at the shear rate of equal intensity is that of the flow."""
         return contracted(self.gradient, components) / self.intensity
@@ -140,7 +147,7 @@ def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinema
     if not isinstance(kind, str) or kind not in _GRADIENT:
         raise InputError(unknown_name("flow", kind, KINDS))
     gradient = np.array(_GRADIENT[kind])
-    rate = gradient * np.array([2.0, 2.0, 2.0, 1.0])  # γ̇ = L + Lᵀ
+    rate = _rate(gradient)
     recorded = np.array(_RECORDED[quantity or recorded_name(kind)])
     intensity = np.sqrt(0.5 * rate @ (rate * np.array([1.0, 1.0, 1.0, 2.0])))
     return Kinematics(
@@ -162,6 +169,58 @@ def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:
     recorded = np.asarray(kinematics.recorded)
     names: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
     return next(name for name in names if np.array_equal(_RECORDED[name], recorded))
+
+
+def kinematics_recording(
+    kinematics: Kinematics | None, quantity: RecordedQuantity, count: int
+) -> Kinematics:
+    """Return the kinematics of so many runs as if another stress of theirs were recorded.
+
+    Parameters
+    ----------
+    kinematics
+        Those of the runs; None where all are simple shear.
+    quantity
+        ``"N1"`` or ``"N2"``, of any flow.
+    """
+    every = kinematics or stack_kinematics([kinematics_of("shear")] * count)
+    assert every is not None
+    recorded = np.tile(_RECORDED[quantity], (count, 1))
+    viscous = np.sum(recorded * _rate(np.asarray(every.gradient)), axis=-1)
+    return replace(every, recorded=on_device(recorded), viscous=on_device(viscous))
+
+
+def normal_stress_differences(
+    kinematics: Kinematics | None,
+    recorded: Float[np.ndarray, "trials runs n"],
+    of_modes: Float[np.ndarray, "trials runs n 4"],
+) -> Float[np.ndarray, "trials runs n 2"]:
+    """Return N1 and N2 of runs.
+
+    Parameters
+    ----------
+    kinematics
+        Those of the runs; None where all are simple shear.
+    recorded, of_modes
+        The recorded stress, and σ11, σ22, σ33, σ12 of the modes alone: what else stands in the
+        recorded one is that of a generalised Newtonian fluid, which in shear has neither.
+    """
+    weights = np.array([_RECORDED["N1"], _RECORDED["N2"]])
+    found = of_modes @ weights.T
+    if kinematics is None:
+        return found
+    gradient, own, viscous = (
+        np.asarray(of) for of in (kinematics.gradient, kinematics.recorded, kinematics.viscous)
+    )
+    beside = recorded - np.sum(of_modes * own[:, None], axis=-1)
+    none = (viscous == 0.0)[:, None]
+    share = np.where(none, 0.0, _rate(gradient) @ weights.T / (viscous[:, None] + none))
+    return found + share[:, None] * beside[..., None]
+
+
+def _rate(gradient: Float[np.ndarray, "*runs 4"]) -> Float[np.ndarray, "*runs 4"]:
+    """Return the components of γ̇ = L + Lᵀ."""
+    return gradient * np.array([2.0, 2.0, 2.0, 1.0])
 
 
 def of_one_kind(each: Sequence[Kinematics | None]) -> list[Kinematics] | list[None]:

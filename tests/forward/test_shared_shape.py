@@ -53,7 +53,7 @@ def test_runs_in_the_room_of_others_are_predicted_as_in_their_own(runs):
 def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
     batches = [make_batch(runs) for runs in (MANY, FEW, MANY[:2], [*MANY, *MANY])]
     shared, theta = model_of(batches[0])
-    program, every = shared._program, shared._of_every_effect
+    program, every = shared._predictor.program, shared._predictor.of_every_effect
     program.met.clear()
     every._kernels.clear()
     for batch in batches:

@@ -48,14 +48,14 @@ def trials(model):
 
 def followed(monkeypatch, model):
     """Return a list to which the number of vectors is added whenever a sweep is followed."""
-    counts, of_part = [], model._of_part
+    counts, of_part = [], model._predictor.of_part
 
     def counting(trials, batch, number):
         if isinstance(batch.parts[number], PeriodicFlows):
             counts.append(len(trials.thetas))
         return of_part(trials, batch, number)
 
-    monkeypatch.setattr(model, "_of_part", counting)
+    monkeypatch.setattr(model._predictor, "of_part", counting)
     return counts
 
 
@@ -94,11 +94,11 @@ def test_a_transient_is_left_where_it_misses_too_much(start_ups):
     costs = np.sum(model.residuals([right, maxwell], batch) ** 2, axis=(1, 2))
     assert costs[0] < 1e-6 < 1.0 < costs[1]
     limits = np.array([0.1, 0.1])
-    whole = model._of_part(model._trials([right, maxwell]), batch, 0)
+    whole = model._predictor.of_part(model._trials([right, maxwell]), batch, 0)
     # beside one that is of use it is followed along, which costs nothing, and alone it is not
-    beside = model._of_part(model._trials([right, maxwell], limits), batch, 0)
+    beside = model._predictor.of_part(model._trials([right, maxwell], limits), batch, 0)
     np.testing.assert_array_equal(beside[0], whole[0])
-    alone = model._of_part(model._trials([maxwell], limits[:1]), batch, 0)
+    alone = model._predictor.of_part(model._trials([maxwell], limits[:1]), batch, 0)
     assert not np.any(np.isfinite(alone))
     both = model.residuals([right, maxwell], batch, limits)
     assert np.all(np.isfinite(both[0]))
@@ -110,8 +110,8 @@ def test_a_transient_whose_record_is_altered_afterwards_is_followed_to_the_end(s
     model, batch = start_ups
     theta = model.zero()
     theta[model.positions("stress_gain")[0]] = 1e-6
-    found = model._of_part(model._trials([theta], np.array([0.1])), batch, 0)
-    np.testing.assert_array_equal(found, model._of_part(model._trials([theta]), batch, 0))
+    found = model._predictor.of_part(model._trials([theta], np.array([0.1])), batch, 0)
+    np.testing.assert_array_equal(found, model._predictor.of_part(model._trials([theta]), batch, 0))
 
 
 def test_fits_to_transients_are_those_of_trials_followed_to_the_end(start_ups, monkeypatch):

@@ -19,9 +19,9 @@ from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER, TRUTH
 from discover.protocols.kinematics import Kinematics
 
-_COUNTS = ("runs", "steps", "modes", "tabled")
+_COUNTS = ("runs", "steps", "modes", "tabled", "normal")
 # of all modes and lanes: rates, parameters, modes and the limit of each vector; and what is written
-_WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "scratch")
+_WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "of_modes", "scratch")
 _WHOLE = ("last", "held", "flags", "goes_on")
 _SCALAR = ("width", "whole", "least", "table", "flow", "jump", "weight", "recorded")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
@@ -86,11 +86,18 @@ class Kernel(Code):
         self._make(fluid, found, flow, chooses)
 
     def __call__(
-        self, runs: int, tabled: int, used: np.ndarray, given: dict[str, np.ndarray]
-    ) -> tuple[np.ndarray, np.ndarray, bool]:
-        """Return stress and felt rate at step ends, and whether any vector was still of use.
+        self,
+        runs: int,
+        tabled: int,
+        used: np.ndarray,
+        given: dict[str, np.ndarray],
+        normal: bool = False,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """Return stress and felt rate at step ends, the modes', and whether any vector is of use.
 
-        Both have the shape (runs, ends, lanes); the stress is not a number where none was computed.
+        The first two have the shape (runs, ends, lanes); the stress is not a number where none was
+        computed. That of the modes is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where
+        normal stresses are asked for, and empty if not.
 
         Parameters
         ----------
@@ -102,23 +109,28 @@ class Kernel(Code):
             Parts of the program that one of the vectors needs; see `Flags`.
         given
             The arrays beside these, by name.
+        normal
+            Whether normal stresses are asked for.
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
         felt, goes_on = np.zeros_like(stress), np.zeros(2, np.int64)
+        of_modes = np.full((*stress.shape[:2], 4 if normal else 0, LANES), np.nan)
+        of_modes[:, 0] = 0.0
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * (4 + self._variables)
         # a step whose width is chosen holds the state three times
         scratch = np.empty((_STATE + 3 * (size - _STATE), LANES))
         arrays = given | {
-            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
+            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
+            "of_modes": of_modes,
         }  # fmt: skip
         # contiguous already; were one of them not, the code would read what is not its own
         laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
-        self._call(runs, steps, modes, tabled, *(array.ctypes.data for array in laid))
+        self._call(runs, steps, modes, tabled, int(normal), *(array.ctypes.data for array in laid))
         self.steps_taken += int(goes_on[_STEPS])
-        return stress, felt, bool(goes_on[0])
+        return stress, felt, of_modes, bool(goes_on[0])
 
     def flows(self, flow: Kinematics | None) -> np.ndarray:
         """Return the kinematics of runs as one array, shape (runs, numbers)."""
@@ -294,13 +306,16 @@ class Kernel(Code):
             found.append(values)
         return tuple(found)
 
+    def _constants(self, mode_number) -> Mode:
+        """Return what differs from mode to mode."""
+        w, size = self._w, self._of_mode.size
+        places = [w.at((mode_number, size), (i, 1)) for i in range(size)]
+        return self._of_mode.tree([w.load("mode", place) for place in places])
+
     def _mode(self, run, number, mode_number, width, slow, is_held):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, builder, counts = self._w, self._w.builder, self._w.counts
-        size = self._of_mode.size
-        mode = self._of_mode.tree(
-            [w.load("mode", w.at((mode_number, size), (i, 1))) for i in range(size)]
-        )
+        mode = self._constants(mode_number)
         untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
         own = builder.or_(builder.or_(self._on["own weights"], untabled), is_held)
         # past the table's end its first row is read, and not used
@@ -322,6 +337,8 @@ class Kernel(Code):
         at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         w.store(a.lanes(recorded), "stress", at)
         w.store(a.lanes(taken), "felt", at)
+        with builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))), a.apart():
+            self._record_modes(at)
         weight = w.load("weight", at)
         with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
             beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
@@ -336,6 +353,21 @@ class Kernel(Code):
             bits = builder.bitcast(of_use, _EIGHT_BITS)
             some = builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
             w.store(builder.zext(some, INTEGER), "goes_on", 0)
+
+    def _record_modes(self, at) -> None:
+        """Write down σ11, σ22, σ33 and σ12 of the modes."""
+        w, a = self._w, self._arithmetic
+        places = [w.at((at, 4), (i, 1)) for i in range(4)]
+        for place in places:
+            w.store(a.lanes(0.0), "of_modes", place)
+        factor = self._write(self._step.stiffness, self._parameters, self._on, self._states())[()]
+        with w.loop(w.counts["modes"]) as number, a.apart():
+            mode = self._constants(number)
+            own = a.multiply(factor, mode.modulus[()])
+            stress = w.at((number, 4 + self._variables), (self._state_at, 1))
+            for i, place in enumerate(places):
+                more = a.multiply(own, self._kept(w.at((stress, 1), (i, 1))))
+                w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""

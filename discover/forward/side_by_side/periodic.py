@@ -78,12 +78,14 @@ class PeriodicSideBySide:
         part: PeriodicFlows,
         judging: Records | None,
         runs: int,
+        normal: bool,
     ) -> Float[np.ndarray, "trials states 2"]:
         """Return both moduli; see `SideBySide.predict`.
 
-        Limits, what judges and how many runs are no padding say nothing here.
+        Limits, what judges and how many runs are no padding say nothing here, and a modulus has no
+        normal stresses beside it.
         """
-        del limits, judging, runs
+        del limits, judging, runs, normal
         count, frequency = len(thetas), np.asarray(part.frequency)
         present = self._fluid.present(thetas)
         padded = in_whole_eights(count)

@@ -15,6 +15,7 @@ from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
+from discover.protocols.kinematics import normal_stress_differences
 
 # Eights of states that one call of the code takes
 _AT_ONCE = 8
@@ -73,7 +74,8 @@ class SteadySideBySide:
         part: SteadyFlows,
         judging: Records | None,
         runs: int,
-    ) -> Float[np.ndarray, "trials runs n"]:
+        normal: bool,
+    ) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return what is recorded; see `SideBySide.predict`.
 
         Limits, what judges and how many runs are no padding say nothing here.
@@ -90,19 +92,23 @@ class SteadySideBySide:
         rate = np.broadcast_to(np.asarray(part.rate), (len(padded), *part.rate.shape))
         if np.any(thetas[:, self._shaping]):
             rate = np.concatenate([self._rates(eight, present, part) for eight in eights])
-        stress, felt = self._states(thetas, modes, len(numbers.modulus), shared, rate, part)
+        found = self._states(thetas, modes, len(numbers.modulus), shared, rate, part)
+        stress, felt, of_modes = found[..., 0], found[..., 1], found[..., 2:]
+        beside = []
+        if normal:
+            beside = [normal_stress_differences(part.kinematics, stress, of_modes)]
         if not np.any(thetas[:, self._distorting]):
-            return stress
-        found = [
+            return np.concatenate([stress[..., None], *beside], axis=-1)
+        recorded = [
             self._recorded(
                 eight, present, part, *(of[padded[at : at + LANES]] for of in (stress, felt))
             )
             for eight, at in zip(eights, range(0, len(padded), LANES), strict=True)
         ]
-        return np.concatenate(found)[:count]
+        return np.concatenate([np.concatenate(recorded)[:count, ..., None], *beside], axis=-1)
 
     def _states(self, thetas, modes, declared: int, shared, rate, part) -> np.ndarray:
-        """Return stresses and felt rates, shape (2, trials, runs, n)."""
+        """Return stresses, felt rates and those of the modes, shape (trials, runs, n, 6)."""
         own = np.asarray(part.rate)
         # behind the last there are copies of it
         changes = np.diff(own, axis=1) != 0.0
@@ -116,7 +122,7 @@ class SteadySideBySide:
         )
         flags = self._flags.of(thetas)
         patterns, which = np.unique(flags, axis=0, return_inverse=True)
-        out = np.empty((2, len(thetas), *own.shape))
+        out = np.empty((len(thetas), *own.shape, 6))
 
         def some(lanes: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
             pattern, trial, state = lanes
@@ -134,8 +140,10 @@ class SteadySideBySide:
                 "mode": lanes_last(of_mode[:, present]),
                 "flow": np.zeros(1) if flows is None else lanes_last(flows[row]),
             }
-            stress, felt = self._code(patterns[pattern[0]], given)
-            out[:, trial, row, column] = stress.ravel(), felt.ravel()
+            stress, felt, of_modes = self._code(patterns[pattern[0]], given)
+            found = [stress[:, None], felt[:, None], of_modes]
+            found = np.moveaxis(np.concatenate(found, axis=1), 1, -1)
+            out[trial, row, column] = found.reshape(-1, 6)
 
         pieces = []
         for number in range(len(patterns)):
@@ -146,4 +154,4 @@ class SteadySideBySide:
                 piece = slice(first, first + _AT_ONCE * LANES)
                 pieces.append((np.array([number]), trial[piece], state[piece]))
         in_threads(some, pieces, is_compiled=True)
-        return np.take_along_axis(out, np.broadcast_to(place, out.shape), axis=3)
+        return np.take_along_axis(out, place[None, :, :, None], axis=2)

@@ -25,15 +25,18 @@ from discover.forward.starts.approach import (
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
+from tensor_library.contraction import contracted
 
 _COUNTS = ("groups", "modes")
-_WIDE = ("rate", "shared", "mode", "flow", "stress", "felt", "scratch")
+_WIDE = ("rate", "shared", "mode", "flow", "stress", "felt", "of_modes", "scratch")
 _WHOLE = ("flags", "goes_on")
 _ARRAYS = (*_WIDE, *_WHOLE)
 
 # Where in the scratch array what stands that is carried from step to step; of each mode its state,
 # and behind that the number of its next step and how many were taken again
-_FELT, _INDEX, _ALIVE, _SUM, _MOVING, _LEVELS = range(6)
+_FELT, _INDEX, _ALIVE, _SUM, _MOVING = range(5)
+_TOTAL = range(5, 9)
+_LEVELS = _TOTAL.stop
 
 
 class SteadyStep(Step):
@@ -80,7 +83,7 @@ class SteadyStep(Step):
 
             def slipping():
                 # σ/γ̇ changes more slowly than σ: it converges however strong the slip
-                viscosity = self.beside(shared, on, flow, jnp.ones(()))
+                viscosity = self.beside(shared, on, flow and flow.driven, jnp.ones(()))
                 viscosity += sheared / jnp.where(felt == 0.0, 1.0, felt)
                 return rate / (1.0 + self._slip(shared, flow) * viscosity)
 
@@ -97,16 +100,17 @@ class SteadyStep(Step):
         return where_in_shear(flow, jnp.asarray(sum(slip for slip, _ in pairs)), jnp.zeros(()))
 
     def reached(self, shared, mode, on, flow, levels, felt, rate, way):
-        """Return what a mode adds to the recorded stress; not a number where it is not steady."""
+        """Return σ11, σ22, σ33, σ12 of a mode in Pa; not a number where it is not steady."""
         slow = self._factor("time_factor", shared, on, levels)
         change, weissenberg = self._of_way(shared, mode, on, flow, slow, felt, rate)
         end = arrived(change, Approach(way[:-2, None], way[-2:-1], way[-1:]), weissenberg)
-        return self.felt(mode, flow, end[:, 0])[1]
+        return mode.modulus * end[:4, 0]
 
     def recorded(self, shared, on, flow, levels, felt, of_modes):
-        """Return the recorded stress of all modes with what stands beside them."""
-        factor = self._factor("modulus_factor", shared, on, levels)
-        return factor * of_modes + self.beside(shared, on, flow, felt)
+        """Return the recorded stress with what stands beside the modes, and that of all modes."""
+        of_modes = self._factor("modulus_factor", shared, on, levels) * of_modes
+        recorded = of_modes[3] if flow is None else contracted(flow.recorded, of_modes)
+        return recorded + self.beside(shared, on, flow, felt), of_modes
 
 
 class SteadyCode(Code):
@@ -141,7 +145,10 @@ class SteadyCode(Code):
         self._make(fluid, found, flow)
 
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-        """Return the recorded stress before the signal and the felt rate, shape (groups, lanes).
+        """Return the recorded stress before the signal, the felt rate, and the stress of the modes.
+
+        The first two have the shape (groups, lanes), that of the modes is σ11, σ22, σ33, σ12, shape
+        (groups, 4, lanes).
 
         Parameters
         ----------
@@ -151,15 +158,16 @@ class SteadyCode(Code):
             Rates, modes, what these share, and flows, by name; groups first and lanes last.
         """
         groups, modes = given["mode"].shape[:2]
-        stress, felt = np.empty((2, groups, LANES))
+        (stress, felt), of_modes = np.empty((2, groups, LANES)), np.empty((groups, 4, LANES))
         scratch = np.empty((self._modes_at + modes * self._numbers, LANES))
         flags, goes_on = used.astype(np.int64), np.ones(1, np.int64)
         arrays = given | {
-            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on
+            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
+            "of_modes": of_modes,
         }  # fmt: skip
         laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
         self._call(groups, modes, *(array.ctypes.data for array in laid))
-        return stress, felt
+        return stress, felt, of_modes
 
     def _keep(self, value: Any, place: Any) -> None:
         value = value[()] if isinstance(value, np.ndarray) else value
@@ -231,13 +239,18 @@ class SteadyCode(Code):
             some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
             w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
         levels, felt = self._states(), self._kept(_FELT)
-        self._keep(0.0, _SUM)
+        for place in _TOTAL:
+            self._keep(0.0, place)
         with w.loop(modes) as number, a.apart():
             mode, way, _ = self._mode(group, number)
             found = write(step.reached, shared, mode, on, flow, levels, felt, rate, way)
-            self._keep(a.add(self._kept(_SUM), found[()]), _SUM)
-        found = write(step.recorded, shared, on, flow, levels, felt, self._kept(_SUM))
-        w.store(a.lanes(found[()]), "stress", group)
+            for place, value in zip(_TOTAL, found, strict=True):
+                self._keep(a.add(self._kept(place), value), place)
+        total = as_array([self._kept(place) for place in _TOTAL])
+        stress, of_modes = write(step.recorded, shared, on, flow, levels, felt, total)
+        w.store(a.lanes(stress[()]), "stress", group)
+        for i, value in enumerate(of_modes):
+            w.store(a.lanes(value), "of_modes", w.at((group, 4), (i, 1)))
         w.store(felt, "felt", group)
 
     def _states(self) -> tuple:

@@ -290,6 +290,10 @@ class Step:
             total = _if(on[f"state {effect.name}"], more, total)
         return total
 
+    def stiffness(self, shared, on, levels):
+        """Return the factor of the states on the moduli."""
+        return self._factor("modulus_factor", shared, on, levels)
+
     def _later(self, shared, on, levels, rate, stress, widths):
         """Return the states after steps of several widths; see `Dynamics.later`."""
         after = []
@@ -349,7 +353,7 @@ class Step:
     ):
         """Return the rate that series elements take; see `with_effects`."""
         slip, compliance = self._series(shared, flow, before)
-        viscous = self.beside(shared, on, flow, jnp.ones(()))
+        viscous = self.beside(shared, on, flow and flow.driven, jnp.ones(()))
         predicted, stiffness = scale * foreseen[0], scale * foreseen[1]
         compliance = compliance + 0.5 * slip * width
         predicted = predicted + viscous * (rates[2] + earlier)
@@ -361,7 +365,7 @@ class Step:
 
     def missing(self, shared, on, flow, rates, width, before, after, missing, taken):
         """Return what series elements have yet to take after a step."""
-        viscous = self.beside(shared, on, flow, jnp.ones(()))
+        viscous = self.beside(shared, on, flow and flow.driven, jnp.ones(()))
         torque = 0.5 * (before + after + viscous * (rates[0] + rates[2] + 2.0 * taken))
         slip, _ = self._series(shared, flow, torque)
         return missing + taken * width + slip * width * torque

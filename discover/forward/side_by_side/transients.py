@@ -24,6 +24,7 @@ from discover.forward.side_by_side.step import WEIGHTS, Flags
 from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
+from discover.protocols.kinematics import normal_stress_differences
 
 # Vectors of the same times from which on weights of the steps are worth a table
 _MANY = 8
@@ -174,8 +175,9 @@ class SideBySide:
         part: TransientFlows,
         judging: Records,
         runs: int,
-    ) -> Float[np.ndarray, "trials runs n"]:
-        """Return what is recorded of the first runs.
+        normal: bool,
+    ) -> Float[np.ndarray, "trials runs n kinds"]:
+        """Return what is recorded of the first runs, and N1 and N2 behind it if asked for.
 
         Parameters
         ----------
@@ -188,21 +190,23 @@ class SideBySide:
             Runs, and what was recorded of them.
         runs
             How many are asked for; those behind are padding.
+        normal
+            Whether N1 and N2 are.
         """
         flags = self._flags.of(thetas)
         order = np.lexsort([thetas[:, 1], *flags.T])
         laid_out = self._runs(part, judging)
         times, counts = np.unique(thetas[:, 1], return_counts=True)
         table = self._table(numbers, part, float(times[np.argmax(counts)]), int(np.max(counts)))
-        out = np.empty((len(thetas), runs, laid_out.sample.shape[1]))
+        out = np.empty((len(thetas), runs, laid_out.sample.shape[1], 3 if normal else 1))
 
         def eight(trials: np.ndarray) -> None:
             lanes = trials[np.minimum(np.arange(LANES), len(trials) - 1)]
             limit = np.where(np.arange(LANES) < len(trials), limits[lanes], -np.inf)
             used = np.any(flags[trials], axis=0)
             each = thetas[lanes], moduli[lanes], limit
-            found = self._eight(numbers, *each, part, laid_out, runs, used, table)
-            out[trials] = np.moveaxis(found, -1, 0)[: len(trials)]
+            found = self._eight(numbers, *each, part, laid_out, runs, used, table, normal)
+            out[trials] = found[: len(trials)]
 
         # to compile is behind a lock, so that no first call is needed alone
         in_threads(eight, np.split(order, range(LANES, len(order), LANES)), is_compiled=True)
@@ -219,8 +223,9 @@ class SideBySide:
         runs: int,
         used: np.ndarray,
         table: tuple[float, np.ndarray | None],
+        normal: bool,
     ) -> np.ndarray:
-        """Return what is recorded of eight vectors, shape (runs, n, lanes)."""
+        """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
         modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas, moduli))
         declared = len(numbers.modulus)
         if len(modes) > declared:
@@ -237,24 +242,28 @@ class SideBySide:
             tabled, declared = np.zeros(WEIGHTS), 0
         given = {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
         given |= {name: getattr(laid_out, name) for name in _OF_RUNS}
-        stress, felt, goes_on = self._kernel(runs, declared, used, given)
+        stress, felt, of_modes, goes_on = self._kernel(runs, declared, used, given, normal)
         if not goes_on:
             stress[:] = np.nan
-        rows = np.arange(runs)[:, None]
-        at_samples = stress[rows, laid_out.sample[:runs]]
+        places = np.arange(runs)[:, None], laid_out.sample[:runs]
+        at_samples, beside = stress[places], []
+        if normal:
+            flow = jax.tree.map(lambda leaf: leaf[:runs], part.kinematics)
+            own = (np.moveaxis(of, -1, 0) for of in (at_samples, of_modes[places]))
+            beside = [normal_stress_differences(flow, *own)]
         if not np.any(thetas[:, self._distorting]):
-            return at_samples
+            return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
         if np.any(laid_out.held > 1):
             # what alters a signal looks beyond its samples, at all steps of the grid
             given["held"] = np.ones_like(laid_out.held)
-            stress, felt, _ = self._kernel(runs, declared, used, given)
-            stress[:runs] += _between(at_samples - stress[rows, laid_out.sample[:runs]], part)
+            stress, felt, *_ = self._kernel(runs, declared, used, given)
+            stress[:runs] += _between(at_samples - stress[places], part)
         beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
         felt = np.where(beyond, in_lanes[:, ::2], felt)
         stress = np.where(beyond, 0.0, stress)
         first = (np.moveaxis(array, -1, 0) for array in (stress, felt))
         found = np.asarray(self._recorded(thetas, present, part, *first, tool_rate))
-        return np.moveaxis(found, 0, -1)[:runs]
+        return np.concatenate([found[:, :runs, :, None], *beside], axis=-1)
 
     def _runs(self, part: TransientFlows, judging: Records) -> _Runs:
         """Return runs as the kernel takes them, laid out once."""

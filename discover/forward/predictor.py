@@ -1,0 +1,224 @@
+"""What vectors of parameters predict of each part of a batch, in one kernel where there is one.
+
+All trial vectors go through the kernel of every effect; see `discover.forward.side_by_side`. Where
+there is none each vector is a call of its own, which leaves out the terms that it has at zero.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward.batches import (
+    Batch,
+    Flows,
+    PeriodicFlows,
+    Places,
+    Records,
+    StressFlows,
+    TransientFlows,
+)
+from discover.forward.batches.transient import Room
+from discover.forward.declared import DeclaredModel
+from discover.forward.program import Program
+from discover.forward.structure import Numbers
+from discover.programs import in_threads
+from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
+
+# Of the batches that were laid out for the program
+_KEPT = 8
+
+_NORMAL: tuple[RecordedQuantity, RecordedQuantity] = ("N1", "N2")
+
+
+class Trials(NamedTuple):
+    """Parameter vectors side by side, and the moduli and the limit of each."""
+
+    thetas: Float[np.ndarray, "trials p"]
+    moduli: Float[np.ndarray, "trials c"]
+    limits: Float[np.ndarray, " trials"]
+
+    def taken(self, which: np.ndarray) -> "Trials":
+        """Return some of them."""
+        return Trials(*(each[which] for each in self))
+
+
+_Piece = tuple[Flows, Records | None, int]
+"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
+no padding."""
+
+
+class Predictor:
+    """Predictions of a declared model with effects, part by part of a batch.
+
+    Parameters
+    ----------
+    declared
+        The declared model.
+    program, of_every_effect
+        What is compiled of it: of the effects that there are, and of all that there may be.
+    room
+        Of the fitted runs, into which others are laid out to share their program; None for none.
+    """
+
+    def __init__(
+        self,
+        declared: DeclaredModel,
+        program: Program,
+        of_every_effect: Program,
+        room: Room | None,
+    ):
+        self._declared, self._room = declared, room
+        self.program, self.of_every_effect = program, of_every_effect
+        self._last_weights: tuple[Any, float, Any] | None = None
+        self._laid_out: list[tuple[TransientFlows, Records, list[_Piece]]] = []
+
+    @cached_property
+    def _numbers(self) -> Numbers:
+        declared = self._declared
+        return Numbers(
+            declared.law,
+            jnp.asarray(declared.modulus),
+            jnp.asarray(declared.relaxation_time),
+            jnp.asarray(float(declared.solvent_viscosity)),
+        )
+
+    @cached_property
+    def _beside_every_effect(self) -> tuple[list[int], list[int], np.ndarray]:
+        """What of a vector counts, where it stands beside all effects, and all of them at rest."""
+        own, every = self.program.fluid, self.of_every_effect.fluid
+        at_rest = np.zeros(every.size)
+        for effect in every.structure.effects:
+            inner = [parameter.first_trial for parameter in effect.parameters[1:]]
+            at_rest[every.slices[effect.name]] = [0.0, *inner]
+        # no trial passes through a factor on the moduli that is not fitted
+        here = [*range(0 if self._declared.fit_modulus else 1, own.of_effects.start)]
+        there = [*here, *range(every.instants.start, every.instants.stop)]
+        here += range(own.instants.start, own.instants.stop)
+        for name, at in own.slices.items():
+            here += range(at.start, at.stop)
+            there += range(every.slices[name].start, every.slices[name].stop)
+        return here, there, at_rest
+
+    def of_part(
+        self, trials: Trials, batch: Batch, number: int, normal: bool = False
+    ) -> Float[np.ndarray, "trials rows n kinds"]:
+        """Return the records that a part of a batch holds, in the order of its rows.
+
+        Parameters
+        ----------
+        normal
+            Whether N1 and N2 are to stand behind what is recorded: not a number where a test has
+            none.
+        """
+        part = batch.parts[number]
+        if isinstance(part, PeriodicFlows):
+            found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)
+            found = found[..., None]
+            return np.pad(found, [*[(0, 0)] * 3, (0, 2 * normal)], constant_values=np.nan)
+        if not isinstance(part, TransientFlows):
+            return self._of_piece(trials, (part, None, 0), normal)
+        pieces = self._pieces(part, batch, batch.rows[number])
+        found = [self._of_piece(trials, piece, normal) for piece in pieces]
+        runs, samples = part.sample_index.shape
+        return np.concatenate(found, axis=1)[:, :runs, :samples]
+
+    def side_by_side(self, part: Flows) -> Any:
+        """Return what predicts many vectors of a part at once; None where nothing does."""
+        return self.of_every_effect.side_by_side(self._numbers, part)
+
+    def _of_piece(
+        self, trials: Trials, piece: _Piece, normal: bool
+    ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
+        program, (part, *judging) = self.program, piece
+        judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
+        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
+        kernel = self.side_by_side(part)
+        if kernel is None:
+            return self._one_by_one(trials, piece, normal)
+        here, there, at_rest = self._beside_every_effect
+        vectors = np.tile(at_rest, (len(trials.thetas), 1))
+        vectors[:, there] = trials.thetas[:, here]
+        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
+        if not np.any(alone):
+            return kernel.predict(self._numbers, *beside, part, *judging, normal)
+        found = self._one_by_one(trials.taken(alone), piece, normal)
+        out = np.empty((len(alone), *found.shape[1:]))
+        out[alone] = found
+        if not np.all(alone):
+            some = beside.taken(~alone)
+            out[~alone] = kernel.predict(self._numbers, *some, part, *judging, normal)
+        return out
+
+    def _one_by_one(
+        self, trials: Trials, piece: _Piece, normal: bool
+    ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
+        """Return what vectors predict in calls of its own for each."""
+        part, judging, _ = piece
+        if isinstance(part, PeriodicFlows):
+            return self._recorded_one_by_one(trials, part, judging)
+        found = [self._recorded_one_by_one(trials, part, judging)]
+        for quantity in _NORMAL if normal else ():
+            if isinstance(part, StressFlows):
+                found.append(np.full_like(found[0], np.nan))
+                continue
+            flow = kinematics_recording(part.kinematics, quantity, found[0].shape[1])
+            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow), judging))
+        return np.stack(found, axis=-1)
+
+    def _recorded_one_by_one(
+        self, trials: Trials, part: Flows, judging: Records | None
+    ) -> Float[np.ndarray, "trials runs *columns"]:
+        program = self.program
+
+        def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
+            theta, moduli, limit = trial
+            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
+            numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
+            used = program.fluid.in_use(theta)
+            weights = self._weights(theta, part)
+            return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
+
+        shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
+        found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
+        program.met.add(shape)
+        return np.stack(found)
+
+    def _weights(self, theta: np.ndarray, part: Flows):
+        """Return the weights of the steps, computed once for trials of the same times."""
+        known = self._last_weights
+        if known is None or known[0] is not part or known[1] != theta[1]:
+            known = (part, theta[1], self.program.weights(self._numbers, theta, part))
+            self._last_weights = known
+        return known[2]
+
+    def _pieces(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> list[_Piece]:
+        """Return runs, and what judges them, in the room of the fitted ones, laid out once."""
+        for known, records, pieces in self._laid_out:
+            if known is part and records is batch.records:
+                return pieces
+        inside = [part] if self._room is None else part.laid_out(self._room)
+        judging, pieces = batch.records.of_runs(rows, part.room.samples), []
+        for flows in inside:
+            size = flows.room
+            own = min(size.runs, len(judging))
+            pieces.append((flows, judging.padded(size.runs, size.samples), own))
+            judging = judging.of_runs(range(size.runs, len(judging)))
+        self._laid_out.append((part, batch.records, pieces))
+        del self._laid_out[:-_KEPT]
+        return pieces
+
+
+def _of_sweeps(
+    found: Float[np.ndarray, "trials states 2"], runs: Sequence[Places]
+) -> Float[np.ndarray, "trials rows n"]:
+    """Return the moduli of each run, of those of all states; zero behind a shorter run's last."""
+    out = np.zeros((len(found), len(runs), max(len(places) for _, places in runs)))
+    for row, (modulus, places) in enumerate(runs):
+        out[:, row, : len(places)] = found[:, list(places), modulus]
+    return out
