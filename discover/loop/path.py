@@ -29,7 +29,8 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     Of runs that no fit saw, with what all runs share: zero, drift and loading are of each run.
     """
     problem, linear, fitter = search.problem, fit.linear, search.fitter
-    found = problem.model.predictions([fit.theta], rows.batch)[0]
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may run away
+        found = problem.model.predictions([fit.theta], rows.batch)[0]
     if held_out:
         fitter = Fitter(problem, rows)
         each = 2 + bool(problem.loading)
@@ -73,8 +74,12 @@ class Path:
     @cached_property
     def fit(self) -> Fit:
         """The likeliest hypothesis, fitted to the fitted runs."""
-        told = self.posterior.explanations
-        found = self.fitted(told[0].members[0] if told and not self.without_fluid else ())
+        told, best = self.posterior.explanations, self.posterior.by_left_out
+        if self.without_fluid or not told:
+            return self.fitted(())
+        # where none of them is all there is, the one that predicts best
+        names = best[0][0].names if best and self.verdict == "unexplained" else told[0].members[0]
+        found = self.fitted(names)
         while found.at_an_end:  # what the runs held out asked for may be nothing in the fitted
             found = self.fitted(set(found.names) - set(found.at_an_end))
         return found
@@ -165,7 +170,7 @@ class Path:
         """Where 95 % of repeated measurements of the fitted runs should lie."""
         fitter = self.posterior.search.fitter
         weights, middles, variances = [], [], []
-        for fit, weight in self.posterior.fits or ((self.fit, 1.0),):
+        for fit, weight in self.posterior.relied_on or ((self.fit, 1.0),):
             record = fitter.record(fit)
             assert fit.jacobian is not None
             assert fit.covariance is not None

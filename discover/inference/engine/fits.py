@@ -1,7 +1,6 @@
 """Likeliest constants of hypotheses, by Gauss-Newton steps of many fits side by side."""
 
 from collections.abc import Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -57,6 +56,8 @@ class Fit:
         ends at zero or the law runs away.
     at_an_end
         Effects whose amplitude ended at zero.
+    without
+        A run whose rows the fit does not see; None for none.
     """
 
     names: tuple[str, ...]
@@ -71,6 +72,7 @@ class Fit:
     covariance: Float[np.ndarray, "n n"] | None = None
     log_evidence: float = -np.inf
     at_an_end: tuple[str, ...] = ()
+    without: int | None = None
     damping: float = 1e-2
     memory: dict = field(default_factory=dict)
 
@@ -109,14 +111,15 @@ class Fitter:
     def __init__(self, problem: Problem, rows: Rows):
         self.problem, self.rows = problem, rows
         self.noise = NoiseModel(rows, None, problem.noise)
+        self._without: dict[int | None, NoiseModel] = {None: self.noise}
         self._shifts = self._modulus_shifts()
         self.widths = self._widths()
 
-    def leaving_out(self, run: int) -> "Fitter":
-        """Return what fits the same rows without those of one run."""
-        other = copy(self)
-        other.noise = NoiseModel(self.rows, run, self.problem.noise)
-        return other
+    def noise_of(self, fit: Fit) -> NoiseModel:
+        """Return the likelihood of the rows that a fit sees."""
+        if fit.without not in self._without:
+            self._without[fit.without] = NoiseModel(self.rows, fit.without, self.problem.noise)
+        return self._without[fit.without]
 
     # what is linear ---------------------------------------------------------------------------
 
@@ -179,7 +182,7 @@ class Fitter:
         fit.predicted = predicted
         record = self.record(fit)
         left = self.rows.recorded - record
-        fit.log_likelihood, fit.noise = self.noise.log_likelihood(left, record)
+        fit.log_likelihood, fit.noise = self.noise_of(fit).log_likelihood(left, record)
         known = sum(
             p.log_density(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)
         )
@@ -259,7 +262,7 @@ class Fitter:
         assert fit.jacobian is not None
         record = self.record(fit)
         both = np.column_stack([fit.jacobian, self.rows.recorded - record])
-        white = self.noise.whitened(both, record, fit.noise)
+        white = self.noise_of(fit).whitened(both, record, fit.noise)
         columns, left = white[:, :-1], white[:, -1]
         curvature, gradient = columns.T @ columns, columns.T @ left
         n = len(fit.priors)

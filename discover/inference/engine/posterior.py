@@ -5,12 +5,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp, ndtr
-from scipy.stats import t as student
+from scipy.special import logsumexp
 
 from discover.effects.library_term import LibraryTerm
+from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.left_out import FEWEST_RUNS, by_first_order, by_left_out, left_out
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search, refitted
@@ -35,17 +36,6 @@ _NEAR = 6.0
 _NAMELESS = 0.5
 """Share that a term without a law keeps: it is as likely the first of a law nobody wrote down."""
 
-_RUNS_AWAY = 10.0
-"""Times the size of the largest record, which no sound prediction of another run exceeds."""
-
-_LEFT_OUT_ROUNDS = 5
-
-_MOST_MISSED = 1.0
-"""Over the size of a run: by more nothing is missed that is called a prediction."""
-
-_DRAWS = 12
-"""Pairs of draws of the constants of a hypothesis."""
-
 _SIZES = 400
 """Draws of the size of a discrepancy."""
 
@@ -58,15 +48,6 @@ class Explanation:
 
     members: tuple[tuple[str, ...], ...]
     probability: float
-
-
-@dataclass(frozen=True)
-class Band:
-    """A prediction of one run with its 95 % band, in Pa; all of shape (n,)."""
-
-    middle: Float[np.ndarray, " n"]
-    low: Float[np.ndarray, " n"]
-    high: Float[np.ndarray, " n"]
 
 
 @dataclass(frozen=True)
@@ -107,6 +88,9 @@ class Posterior:
         Hypotheses that are possible, fitted to the fitted runs, with their probabilities.
     left
         What the likeliest hypothesis leaves of the fitted runs; None where none can be followed.
+    by_left_out
+        Hypotheses to rely on where none is all there is, as they predict fitted runs that are left
+        out, with their weights.
     """
 
     problem: Problem
@@ -115,6 +99,7 @@ class Posterior:
     unexplained: float
     fits: tuple[tuple[Fit, float], ...]
     left: Discrepancy | None
+    by_left_out: tuple[tuple[Fit, float], ...] = ()
     memory: dict = field(default_factory=dict)
 
     @property
@@ -124,10 +109,20 @@ class Posterior:
             return "unexplained"
         return "effects_added" if self.explanations[0].members[0] else "no_effect_needed"
 
+    @property
+    def relied_on(self) -> tuple[tuple[Fit, float], ...]:
+        """Hypotheses that are possible and those that predict best, the weightiest first."""
+        none = self.unexplained if self.by_left_out else 0.0
+        found: dict[int, tuple[Fit, float]] = {}
+        for share, fits in ((1.0 - none, self.fits), (none, self.by_left_out)):
+            for fit, weight in fits:
+                found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
+        return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
+
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
         parts = []
-        for fit, probability in self.fits:
+        for fit, probability in self.relied_on:
             if position in fit.priors and fit.covariance is not None:
                 at = fit.free.index(position)
                 parts.append(
@@ -169,10 +164,13 @@ class Posterior:
         )
 
     def missed(self, fit: Fit) -> Float[np.ndarray, " runs"]:
-        """Return by how much of its size each fitted run is missed that is left out of a fit."""
+        """Return by how much more than noise each fitted run is missed that is left out of a fit.
+
+        Over its size.
+        """
         if "missed" not in fit.memory:
-            fit.memory["missed"] = left_out(self.search.fitter, fit)
-        return fit.memory["missed"]
+            fit.memory["missed"] = left_out(self.search.fitter, [fit])[0]
+        return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - fit.noise.common**2, 0.0))
 
     @in_one_thread
     def bands(self) -> list[Band]:
@@ -230,11 +228,27 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
     # constants and bands are those of the fitted runs
     own = np.array([search.rank(fit) for fit in near])
     share = np.exp(own - logsumexp(own)) if len(own) else own
-    left = Discrepancy(search.fitter, near[0], smallest(search, near[0])) if near else None
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
-    found = Posterior(problem, search, explanations, unexplained, fits, left)
+    found = Posterior(problem, search, explanations, unexplained, fits, None)
     found.memory["whole"] = whole, judged, beside
+    if near and unexplained > NEGLIGIBLE and len(problem.fitted.runs) >= FEWEST_RUNS:
+        found.by_left_out = _foretelling(found)
+    if near:
+        fit = found.relied_on[0][0]
+        found.left = Discrepancy(search.fitter, fit, smallest(search, fit))
     return found
+
+
+def _foretelling(posterior: Posterior) -> tuple[tuple[Fit, float], ...]:
+    """Return what predicts runs left out best, of what can be followed in the runs to predict."""
+    search, rows = posterior.search, posterior.problem.predicted
+    first = by_first_order(search.fitter, search.alive())
+    if rows is not None:
+        first = Predictions(posterior, rows).followed(first) or first
+    found = by_left_out(search.fitter, first)
+    for fit, _, missed in found:
+        fit.memory["missed"] = missed
+    return tuple((fit, weight) for fit, weight, _ in found)
 
 
 def smallest(search: Search, fit: Fit) -> float:
@@ -289,140 +303,3 @@ def _smallest_sets(members: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...],
 
 def _has_term(problem: Problem, names: Sequence[str]) -> bool:
     return any(isinstance(problem.effects[name], LibraryTerm) for name in names)
-
-
-class Predictions:
-    """Normal predictions of rows that were not fitted, one for each hypothesis."""
-
-    def __init__(self, posterior: Posterior, rows: Rows):
-        self.posterior, self.rows = posterior, rows
-        self.problem = posterior.problem
-        self.fitter = Fitter(self.problem, rows)
-        self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
-
-    def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
-        """Return weight, mean and variance of the rows, of each hypothesis."""
-        found: list[tuple[float, np.ndarray, np.ndarray]] = []
-        explained = 1.0 - self.posterior.unexplained
-        sound = [(f, p) for f, p in self.posterior.fits if self._ahead(f) is not None]
-        if not sound:  # where all that are likely run away, the likeliest that does not
-            others = self.posterior.search.alive()
-            sound = [(f, 1.0) for f in others if self._ahead(f) is not None][:1]
-        total = sum(p for _, p in sound)
-        for fit, probability in sound:
-            share = probability / total
-            if explained * share > 1e-4:
-                found.append((explained * share, *self._of_fit(fit)))
-            if (1.0 - explained) * share > 1e-3:
-                found.append(((1.0 - explained) * share, *self._of_none(fit)))
-        return found
-
-    def _ahead(self, fit: Fit) -> Float[np.ndarray, " rows"] | None:
-        """Return what the model of a fit predicts; None where it runs away."""
-        if "ahead" not in fit.memory:
-            predicted = self.fitter.predict([fit.theta])[0]
-            with np.errstate(invalid="ignore"):
-                sound = bool(np.all(np.abs(predicted) < self._largest))
-            fit.memory["ahead"] = predicted if sound else None
-        return fit.memory["ahead"]
-
-    def _jacobian(self, fit: Fit, predicted: np.ndarray):
-        """Return derivatives of the rows, and the variance of what each run has of its own."""
-        if "jacobian" in fit.memory:
-            return fit.memory["jacobian"]
-        ahead = self.fitter.start(fit.names, fit.theta)
-        ahead.predicted = predicted
-        self.fitter.linearise([ahead])
-        assert ahead.jacobian is not None
-        own = ahead.jacobian[:, : len(fit.priors)]
-        # of what is linear, only the gain and the moduli are those of the fitted runs
-        runs, q = len(self.problem.fitted.runs), len(fit.linear)
-        linear, each = self.fitter.linear_columns(predicted), 2 + bool(self.problem.loading)
-        shared = np.zeros((len(self.rows), q))
-        shared[:, 0] = linear[:, 0]
-        shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]
-        alone = slice(1, 1 + each * len(self.rows.runs))
-        apart = np.sum((linear[:, alone] * self.fitter.widths[alone]) ** 2, axis=1)
-        found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
-        fit.memory["jacobian"] = found
-        return found
-
-    def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-        predicted = self._ahead(fit)
-        assert predicted is not None
-        assert fit.covariance is not None
-        jacobian, apart = self._jacobian(fit, predicted)
-        middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
-        variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
-        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
-        return middle, variance + noise**2
-
-    def _of_none(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-        """Return what a hypothesis says of the rows where it is not all there is.
-
-        It misses them as it misses fitted runs that are left out in turn, by more where a run is
-        faster. Constants are drawn, for to first order what is far would grow without bound.
-        """
-        predicted = self._ahead(fit)
-        assert predicted is not None
-        assert fit.covariance is not None
-        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
-        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
-        drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
-        found = self.fitter.predict([fit.at(one) for one in drawn])
-        sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
-        spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
-        _, apart = self._jacobian(fit, predicted)
-        middle = predicted * (1.0 + fit.linear[0])
-        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
-        missed = self.missed(fit) * self.rows.size
-        return middle, spread + apart + missed**2 + noise**2
-
-    def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
-        """Return the deviation, over its size, by which each run may be missed."""
-        missed, fastest = self.posterior.missed(fit), self.problem.fitted.fastest
-        runs = len(missed)
-        # as few runs tell a deviation badly: of the next one Student's quantile is the wider
-        wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
-        # as far as the worst of them, and in proportion to the rate beyond the fastest
-        size = np.max(missed) * np.maximum(self.rows.fastest / np.max(fastest), 1.0)
-        return np.minimum(wider * size, _MOST_MISSED)[self.rows.run]
-
-
-def left_out(whole: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
-    """Return by how much of its size each fitted run is missed when it is left out of the fit."""
-    rows, problem, found = whole.rows, whole.problem, []
-    for i in range(len(rows.runs)):
-        fitter = whole.leaving_out(i)
-        start = fitter.start(fit.names, fit.theta, fit.linear)
-        # when a rate steps is read off its own record, and is no prediction
-        own = [step.place for step in rows.runs[i].rate_steps if step.place is not None]
-        held = {problem.model.instants.start + place for place in own}
-        start.priors = {at: prior for at, prior in start.priors.items() if at not in held}
-        part = fitter.fit([start], _LEFT_OUT_ROUNDS, derivatives=False)[0]
-        at = rows.run == i
-        with np.errstate(over="ignore", invalid="ignore"):  # without the run the law runs away
-            off = (rows.recorded - part.predicted)[at] / rows.size[at]
-            size = float(np.sqrt(max(float(np.mean(off**2)) - fit.noise.common**2, 0.0)))
-        found.append(min(size, _MOST_MISSED) if np.isfinite(size) else _MOST_MISSED)
-    return np.array(found)
-
-
-def quantiles(
-    weights: Float[np.ndarray, " parts"],
-    middle: Float[np.ndarray, "parts n"],
-    variance: Float[np.ndarray, "parts n"],
-    probabilities: Sequence[float],
-) -> list[Float[np.ndarray, " n"]]:
-    """Return quantiles of mixtures of normal distributions, by bisection."""
-    weights = weights / np.sum(weights)
-    spread = np.sqrt(np.maximum(variance, 1e-300))
-    out = []
-    for probability in probabilities:
-        low, high = np.min(middle - 9 * spread, axis=0), np.max(middle + 9 * spread, axis=0)
-        for _ in range(50):
-            half = 0.5 * (low + high)
-            below = weights @ ndtr((half - middle) / spread) < probability
-            low, high = np.where(below, half, low), np.where(below, high, half)
-        out.append(0.5 * (low + high))
-    return out

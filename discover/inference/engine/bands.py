@@ -1,0 +1,168 @@
+"""Bands of runs that were not fitted: mixtures over hypotheses, and what none of them holds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import ndtr
+from scipy.stats import t as student
+
+from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.left_out import MOST_MISSED
+from discover.inference.engine.rows import Rows
+
+if TYPE_CHECKING:
+    from discover.inference.engine.posterior import Posterior
+
+_RUNS_AWAY = 10.0
+"""Times the size of the largest record, which no sound prediction of another run exceeds."""
+
+_DRAWS = 12
+"""Pairs of draws of the constants of a hypothesis."""
+
+NEGLIGIBLE = 1e-3
+"""Probability below which nothing is made of it that none of the hypotheses is all there is."""
+
+_SEED = 20261128
+
+
+@dataclass(frozen=True)
+class Band:
+    """A prediction of one run with its 95 % band, in Pa; all of shape (n,)."""
+
+    middle: Float[np.ndarray, " n"]
+    low: Float[np.ndarray, " n"]
+    high: Float[np.ndarray, " n"]
+
+
+class Predictions:
+    """Normal predictions of rows that were not fitted, one for each hypothesis."""
+
+    def __init__(self, posterior: "Posterior", rows: Rows):
+        self.posterior, self.rows = posterior, rows
+        self.problem = posterior.problem
+        self.fitter = Fitter(self.problem, rows)
+        self._largest = _RUNS_AWAY * float(np.max(np.abs(self.problem.fitted.recorded)))
+
+    def parts(self) -> list[tuple[float, np.ndarray, np.ndarray]]:
+        """Return weight, mean and variance of the rows, of each hypothesis."""
+        none, posterior = self.posterior.unexplained, self.posterior
+        found = [
+            ((1.0 - none) * share, *self._of_fit(fit))
+            for fit, share in self._sound(posterior.fits)
+            if (1.0 - none) * share > 1e-4
+        ]
+        found += [
+            (none * share, *self._of_none(fit))
+            for fit, share in self._sound(posterior.by_left_out or posterior.fits)
+            if none * share > NEGLIGIBLE
+        ]
+        return found
+
+    def _sound(self, fits: Sequence[tuple[Fit, float]]) -> list[tuple[Fit, float]]:
+        """Return hypotheses that do not run away in these rows, their weights adding up to one."""
+        followed = {id(fit) for fit in self.followed([fit for fit, _ in fits])}
+        sound = [(f, p) for f, p in fits if id(f) in followed]
+        if not sound:  # where all that are likely run away, the likeliest that does not
+            sound = [(fit, 1.0) for fit in self.followed(self.posterior.search.alive())[:1]]
+        total = sum(p for _, p in sound)
+        return [(f, p / total) for f, p in sound]
+
+    def followed(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Return those of some fits that do not run away in these rows."""
+        new = [fit for fit in fits if "ahead" not in fit.memory]
+        found = self.fitter.predict([fit.theta for fit in new])
+        for fit, predicted in zip(new, found, strict=True):
+            with np.errstate(invalid="ignore"):
+                sound = bool(np.all(np.abs(predicted) < self._largest))
+            fit.memory["ahead"] = predicted if sound else None
+        return [fit for fit in fits if fit.memory["ahead"] is not None]
+
+    def _ahead(self, fit: Fit) -> Float[np.ndarray, " rows"] | None:
+        """Return what the model of a fit predicts; None where it runs away."""
+        self.followed([fit])
+        return fit.memory["ahead"]
+
+    def _jacobian(self, fit: Fit, predicted: np.ndarray):
+        """Return derivatives of the rows, and the variance of what each run has of its own."""
+        if "jacobian" in fit.memory:
+            return fit.memory["jacobian"]
+        ahead = self.fitter.start(fit.names, fit.theta)
+        ahead.predicted = predicted
+        self.fitter.linearise([ahead])
+        assert ahead.jacobian is not None
+        own = ahead.jacobian[:, : len(fit.priors)]
+        # of what is linear, only the gain and the moduli are those of the fitted runs
+        runs, q = len(self.problem.fitted.runs), len(fit.linear)
+        linear, each = self.fitter.linear_columns(predicted), 2 + bool(self.problem.loading)
+        shared = np.zeros((len(self.rows), q))
+        shared[:, 0] = linear[:, 0]
+        shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]
+        alone = slice(1, 1 + each * len(self.rows.runs))
+        apart = np.sum((linear[:, alone] * self.fitter.widths[alone]) ** 2, axis=1)
+        found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
+        fit.memory["jacobian"] = found
+        return found
+
+    def _of_fit(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        predicted = self._ahead(fit)
+        assert predicted is not None
+        assert fit.covariance is not None
+        jacobian, apart = self._jacobian(fit, predicted)
+        middle = predicted + jacobian[:, len(fit.priors) :] @ fit.linear
+        variance = np.einsum("ij,jk,ik->i", jacobian, fit.covariance, jacobian) + apart
+        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
+        return middle, variance + noise**2
+
+    def _of_none(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Return what a hypothesis says of the rows where it is not all there is.
+
+        It misses them as it misses fitted runs that are left out in turn, by more where a run is
+        faster. Constants are drawn, for to first order what is far would grow without bound.
+        """
+        predicted = self._ahead(fit)
+        assert predicted is not None
+        assert fit.covariance is not None
+        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
+        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
+        drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
+        found = self.fitter.predict([fit.at(one) for one in drawn])
+        sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
+        spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
+        _, apart = self._jacobian(fit, predicted)
+        middle = predicted * (1.0 + fit.linear[0])
+        noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
+        missed = self.missed(fit) * self.rows.size
+        return middle, spread + apart + missed**2 + noise**2
+
+    def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
+        """Return the deviation, over its size, by which each run may be missed."""
+        missed, fastest = self.posterior.missed(fit), self.problem.fitted.fastest
+        runs = len(missed)
+        # as few runs tell a deviation badly: of the next one Student's quantile is the wider
+        wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
+        # as far as the worst of them, and in proportion to the rate beyond the fastest
+        size = np.max(missed) * np.maximum(self.rows.fastest / np.max(fastest), 1.0)
+        return np.minimum(wider * size, MOST_MISSED)[self.rows.run]
+
+
+def quantiles(
+    weights: Float[np.ndarray, " parts"],
+    middle: Float[np.ndarray, "parts n"],
+    variance: Float[np.ndarray, "parts n"],
+    probabilities: Sequence[float],
+) -> list[Float[np.ndarray, " n"]]:
+    """Return quantiles of mixtures of normal distributions, by bisection."""
+    weights = weights / np.sum(weights)
+    spread = np.sqrt(np.maximum(variance, 1e-300))
+    out = []
+    for probability in probabilities:
+        low, high = np.min(middle - 9 * spread, axis=0), np.max(middle + 9 * spread, axis=0)
+        for _ in range(50):
+            half = 0.5 * (low + high)
+            below = weights @ ndtr((half - middle) / spread) < probability
+            low, high = np.where(below, half, low), np.where(below, high, half)
+        out.append(0.5 * (low + high))
+    return out
