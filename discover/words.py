@@ -3,7 +3,7 @@
 import difflib
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import PurePath
 
 _LONGEST = 80
@@ -96,6 +96,17 @@ def significant(value: float | None, digits: int = 4) -> str:
     return _digits(float(f"{value:.{digits}g}") / 10.0**power) + _times_ten(power)
 
 
+FIGURE_SYMBOLS = {
+    "sigma12": "σ₁₂",
+    "N1": "N₁",
+    "N2": "N₂",
+    "tensile_stress": "σ₁₁ − σ₂₂",
+    "strain": "γ",
+    "storage_modulus": "G′",
+    "loss_modulus": "G″",
+}
+"""Symbols of what is recorded, as figures write them."""
+
 _READABLE = (1e-3, 1e5)
 """Between which a number is written without a power of ten."""
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
@@ -151,6 +162,12 @@ def effect_title(name: str) -> str:
     if "sigma" in name or "gammadot" in name:
         return readable(name)
     return _EFFECTS.get(name, name.replace("_", " "))
+
+
+def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
+    """Return a set of effects as readers know it, and whether an instrument error goes with it."""
+    title = " + ".join(map(effect_title, names)) or "the declared model alone"
+    return f"{title}, with a small instrument error" if bench else title
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:

@@ -15,6 +15,14 @@ SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial exte
 
 _MOST_RUNS = 2
 
+A_TRANSIENT = (
+    "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
+)
+"""What to measure where nothing but states was."""
+
+IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 (3 % scatter)."
+"""What to say of runs that no law describes, of which nobody said it; for a section of a study."""
+
 
 def headline(answer: "Answer") -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""

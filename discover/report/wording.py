@@ -2,26 +2,19 @@
 
 import math
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+from discover.answer.sentences import A_TRANSIENT as A_TRANSIENT
+from discover.answer.sentences import IF_LOADINGS as IF_LOADINGS
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import MODULI
-from discover.words import effect_title, estimate, interval, percent_of, readable
+from discover.words import FIGURE_SYMBOLS, estimate, interval, percent_of, readable
+from discover.words import effect_title as effect_title
+from discover.words import effects_title as effects_title
 from discover.words import significant as significant
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
-
-FIGURE_SYMBOLS = {
-    "sigma12": "σ₁₂",
-    "N1": "N₁",
-    "N2": "N₂",
-    "tensile_stress": "σ₁₁ − σ₂₂",
-    "strain": "γ",
-    "storage_modulus": "G′",
-    "loss_modulus": "G″",
-}
-"""Symbols of what is recorded, as figures write them."""
 
 
 def recorded_symbol(quantities: Iterable[str]) -> str:
@@ -37,17 +30,6 @@ SMALL_FAULTS = (
     "run, and in the ranges of the torque"
 )
 """What an interval allows for."""
-
-A_TRANSIENT = (
-    "Measure a transient, such as a start-up or a step of the rate: steady and periodic states "
-    "alone do not tell a law from another, or from a structure that flow breaks down."
-)
-"""What to measure where nothing but states was."""
-
-IF_LOADINGS = (
-    "If each run is a loading of its own, say so: [{}] loading = 0.03 lets loadings differ by 3 %."
-)
-"""What to say of runs that nothing explains, of which nobody said it; for a section of a study."""
 
 _LEARNERS = {
     "tensor_sindy": "Sparse regression",
@@ -94,12 +76,6 @@ def percent_range(values: Sequence[float | None] | None) -> str:
         return f" ({lost})"
     text = f"{percent(min(told)).removesuffix(' %')} to {percent(max(told))}"
     return f" ({text})" if len(told) == len(values) else f" ({text}; {lost})"
-
-
-def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
-    """Return a set of effects as readers know it, and whether a bench is off beside it."""
-    title = " + ".join(map(effect_title, names)) or "the declared model alone"
-    return f"{title}, on a bench that is a little off" if bench else title
 
 
 def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> float | None:
