@@ -1,7 +1,9 @@
 """Lists and shares as sentences have them, for all rooms."""
 
 import difflib
-from collections.abc import Iterable, Sequence
+import math
+import re
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import PurePath
 
 _LONGEST = 80
@@ -82,3 +84,116 @@ def unknown_name(what: str, given: object, known: Iterable[str], owner: str = ""
     said = f"{owner} has no {what} {shown}." if owner else f"Unknown {what} {shown}."
     remedy = f"Write {'one of: ' if len(names) > 1 else ''}{', '.join(names)}."
     return f"{said}{did_you_mean(given, names)} {remedy if names else 'It has none; leave it out.'}"
+
+
+def significant(value: float | None, digits: int = 4) -> str:
+    """Return a number with so many digits; a dash where there is none."""
+    if value is None or math.isnan(value):
+        return "–"
+    if abs(value) < 1e-12 or not math.isfinite(value):
+        return "0" if abs(value) < 1e-12 else f"{value}".replace("-", "−")
+    power = _power(value)
+    return _digits(float(f"{value:.{digits}g}") / 10.0**power) + _times_ten(power)
+
+
+FIGURE_SYMBOLS = {
+    "sigma12": "σ₁₂",
+    "N1": "N₁",
+    "N2": "N₂",
+    "tensile_stress": "σ₁₁ − σ₂₂",
+    "strain": "γ",
+    "storage_modulus": "G′",
+    "loss_modulus": "G″",
+}
+"""Symbols of what is recorded, as figures write them."""
+
+_READABLE = (1e-3, 1e5)
+"""Between which a number is written without a power of ten."""
+_SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+
+
+def _power(value: float) -> int:
+    """Return the power of ten that is written apart; 0 where none is needed."""
+    low, high = _READABLE
+    return 0 if value == 0 or low <= abs(value) < high else math.floor(math.log10(abs(value)))
+
+
+def _times_ten(power: int) -> str:
+    return f" × 10{str(power).translate(_SUPERSCRIPTS)}" if power else ""
+
+
+def _digits(value: float) -> str:
+    return f"{value + 0.0:.12g}".replace("-", "−")
+
+
+_LETTERS = (
+    ("gammadot", "γ̇"),
+    ("sigma", "σ"),
+    ("epsilon", "ε"),
+    ("kappa", "κ"),
+    ("*", " "),
+)
+_WORDS = {"alpha": "α", "beta": "β", "eta s": "ηₛ", "tau": "τ", "xi": "ξ"}
+"""Letters that are also parts of English words."""
+
+
+def readable(term: str) -> str:
+    """Return a term in canonical spelling, or words with such terms, with the field's letters."""
+    # a full stop between tensors is a product; elsewhere it ends a sentence or is a decimal point
+    text = re.sub(r"(?<=sigma|madot)\.(?=sigma|gammadot)", "·", term)
+    for spelled, letter in _LETTERS:
+        text = text.replace(spelled, letter)
+    return re.sub(r"\b(alpha|beta|eta s|tau|xi)\b", lambda found: _WORDS[found[0]], text)
+
+
+_EFFECTS = {
+    "giesekus_mobility": "Giesekus mobility",
+    "non_affine_motion": "non-affine motion",
+    "ptt_linear": "linear PTT",
+    "ptt_exponential": "exponential PTT",
+}
+
+
+def effect_title(name: str) -> str:
+    """Return an effect as readers know it: its name in words, or its term in the field's letters.
+
+    Studies and JSON keep the name itself.
+    """
+    if "sigma" in name or "gammadot" in name:
+        return readable(name)
+    return _EFFECTS.get(name, name.replace("_", " "))
+
+
+def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
+    """Return a set of effects as readers know it, and whether an instrument error goes with it."""
+    title = " + ".join(map(effect_title, names)) or "the declared model alone"
+    return f"{title}, with a small instrument error" if bench else title
+
+
+def interval(bounds: Sequence[float | None] | None) -> str:
+    """Return an interval with as many digits as tell two of its width; a dash where none is known.
+
+    An interval of which an end is not known is none.
+    """
+    low, high = bounds or (None, None)
+    if low is None or high is None or math.isnan(low) or math.isnan(high):
+        return "–"
+    width = abs(high - low)
+    if not 0.0 < width < math.inf:
+        return f"{significant(low)} to {significant(high)}"
+    power = _power(max(abs(low), abs(high)))
+    decimals = min(1 - math.floor(math.log10(width)) + power, 8)
+    low, high = (_digits(round(end / 10.0**power, decimals)) for end in (low, high))
+    return f"({low} to {high}){_times_ten(power)}" if power else f"{low} to {high}"
+
+
+def estimate(value: float | None, bounds: Sequence[float | None] | None) -> str:
+    """Return a number with the digits that its interval leaves it, but no fewer than two."""
+    low, high = bounds or (None, None)
+    if value is None or low is None or high is None or not math.isfinite(value):
+        return significant(value)
+    width = abs(high - low)
+    if value == 0 or not 0.0 < width < math.inf:
+        return significant(value)
+    digits = 2 + math.floor(math.log10(abs(value))) - math.floor(math.log10(width))
+    return significant(value, min(max(digits, 2), 8))

@@ -16,6 +16,7 @@ from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
+from discover.loop.expected_errors import spread_of_laws
 from discover.loop.final_model import (
     Bounds,
     augmented_fluid,
@@ -114,6 +115,14 @@ class Ended(Path):
         """Size of what no hypothesis holds; None where no hypothesis can be followed."""
         size = None if self.without_fluid else self.posterior.discrepancy()
         return None if size is None else asdict(size)
+
+    @property
+    def left_out_error(self) -> float | None:
+        """Relative error of fitted runs left out in turn, rms; None without a hypothesis."""
+        if self.without_fluid or self.posterior.left is None:
+            return None
+        missed = self.posterior.missed(self.posterior.left.fit)
+        return float(np.sqrt(np.mean(missed**2))) if len(missed) > 1 else None
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
@@ -313,6 +322,8 @@ def result_of(
         next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
         laws=laws,
         discrepancy=ended.discrepancy,
+        spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
+        left_out_error=ended.left_out_error,
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
         states=states or (),

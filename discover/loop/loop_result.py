@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from discover.answer import TOLERANCE, Answer
 from discover.equations import (
     AugmentedLaw,
     Equation,
@@ -26,6 +27,8 @@ from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests
 from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
+from discover.loop.answering import loop_answer
+from discover.loop.expected_errors import Spread
 from discover.loop.parts import (
     CandidateScore,
     DeclaredEffect,
@@ -95,9 +98,14 @@ class LoopResult(PageView, HasEquation, SummaryView):
         The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
         Free functions of one variable that explain what named effects leave, the likeliest first.
-    discrepancy, adequate
-        Size of what no hypothesis holds, as the contract writes it, and whether that is good
-        enough; None where nothing is said of it.
+    discrepancy
+        Size of what no hypothesis holds, as the contract writes it; None where nothing is said.
+    spread_of_laws
+        By how much laws that describe the runs as well differ in σ12, N1, N2, uniaxial stress.
+    left_out_error
+        Root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    tolerance
+        Relative discrepancy that is good enough.
     folds
         The loops that left each run out in turn, where they were asked for; the held-out errors
         are then their means.
@@ -126,7 +134,9 @@ class LoopResult(PageView, HasEquation, SummaryView):
     laws: tuple[LawFit, ...] = ()
     free_form: tuple[FreeForm, ...] = ()
     discrepancy: Mapping[str, Any] | None = None
-    adequate: bool | None = None
+    spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
+    left_out_error: float | None = None
+    tolerance: float = TOLERANCE
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
@@ -156,7 +166,33 @@ class LoopResult(PageView, HasEquation, SummaryView):
         """Names of those of them that do."""
         return tuple(name for name, one in self.by_mode.items() if one.degree)
 
+    @cached_property
+    def answer(self) -> Answer:
+        """The law that one can use, how good it is, where, and what to measure next."""
+        return loop_answer(self)
+
+    @property
+    def use(self) -> dict[str, Any] | None:
+        """What a simulation needs: law, constants, modes, range, expected error."""
+        return self.answer.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
+        return self.answer.adequate
+
     def equation(self) -> Equation:
+        """Return the augmented fluid as an equation, with its error and range in the notes.
+
+        Raises
+        ------
+        InputError
+            If an effect gives the fluid a state that nobody wrote out, or adds what is no sum of
+            library terms, or if what it adds differs from mode to mode.
+        """
+        return self.answer.equation or self.without_answer()
+
+    def without_answer(self) -> Equation:
         """Return the augmented fluid as an equation, with the box in which it was tested.
 
         Raises
@@ -368,7 +404,8 @@ class LoopResult(PageView, HasEquation, SummaryView):
             "laws": self.laws,
             "free_form": self.free_form,
             "discrepancy": self.discrepancy,
-            "adequate": self.adequate,
+            "spread_of_laws": self.spread_of_laws,
+            **self.answer.to_json(),
             "folds": self.folds,
             "seconds": self.seconds,
             **self._law(),

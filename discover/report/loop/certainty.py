@@ -2,15 +2,15 @@
 
 from collections.abc import Iterator
 
-from discover.loop.loop_result import LoopResult
-from discover.protocols.kinematics import ONLY_STATES
-from discover.report.loop.asked import (
+from discover.loop.asked import (
     EXPLAINED,
     MOST_NAMES,
     doubted,
     several,
     untested_by,
 )
+from discover.loop.loop_result import LoopResult
+from discover.protocols.kinematics import ONLY_STATES
 from discover.report.wording import effect_title, percent, sentence
 from discover.words import listed
 

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
+from discover.loop.asked import doubted, several, untested_by
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit, Stage
 from discover.report.free_form_words import free_form_sentence
-from discover.report.loop.asked import doubted, several, untested_by
 from discover.report.wording import (
     effect_title,
     estimate,

@@ -1,9 +1,9 @@
 """The verdict on a closed loop: what was found, how sure, what to measure next."""
 
 from discover.loop.loop_result import LoopResult
+from discover.loop.next_test import what_to_measure_next
 from discover.report.loop.certainty import how_sure
 from discover.report.loop.found import what_was_found
-from discover.report.loop.next_step import what_to_measure_next
 
 
 def loop_verdict(result: LoopResult) -> list[str]:

@@ -1,8 +1,10 @@
-"""What all three answers of a loop's verdict ask of its result."""
+"""Questions that several sentences on a closed loop ask of its result."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from discover.loop.loop_result import LoopResult
+if TYPE_CHECKING:
+    from discover.loop.loop_result import LoopResult
 
 MOST_NAMES = 3
 
@@ -19,16 +21,16 @@ def several(names: Sequence[str], word: str) -> str:
     return f" {word} ".join(shown)
 
 
-def untested_by(result: LoopResult) -> str:
-    """Return why nothing tested what explains the records; empty where it was tested."""
+def untested_by(result: "LoopResult") -> str:
+    """Return why no run could have refuted what fits the runs; empty where one could."""
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
 
 
-def doubted(result: LoopResult) -> float | None:
-    """Return how probable what was added is, where that is less than even; None otherwise.
+def doubted(result: "LoopResult") -> float | None:
+    """Return the probability of what was added, where that is less than even; None otherwise.
 
     Effects each of which is likelier there than not are not doubted, however many others may stand
-    beside them.
+    with them.
     """
     if result.verdict != "effects_added":
         return None

@@ -1,0 +1,25 @@
+"""The answer: a law that one can use, how good it is, where, and what to measure next."""
+
+from discover.answer.answer import (
+    QUANTITIES,
+    TOLERANCE,
+    Answer,
+    Constant,
+    Discrepancy,
+    ExpectedError,
+    Mode,
+    Range,
+    Suspect,
+)
+
+__all__ = [
+    "QUANTITIES",
+    "TOLERANCE",
+    "Answer",
+    "Constant",
+    "Discrepancy",
+    "ExpectedError",
+    "Mode",
+    "Range",
+    "Suspect",
+]

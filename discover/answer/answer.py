@@ -1,0 +1,341 @@
+"""A law that one can use: constants, modes, how well it describes, where, and how far off it is."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from discover.answer import sentences
+from discover.equations.equation import Equation
+from discover.plain_json import plain
+from discover.words import effect_title, estimate, interval, readable
+
+TOLERANCE = 0.05
+"""Relative discrepancy that is good enough where nobody says otherwise."""
+
+QUANTITIES = ("sigma12", "N1", "N2", "uniaxial")
+"""Quantities of which an expected error is given, in the order of the table."""
+
+Span = tuple[float, float]
+"""Least and largest value."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """Constant of a law or of an effect.
+
+    Attributes
+    ----------
+    name
+        As studies spell it, such as ``alpha``.
+    value, ci95, unit
+        With its 95 % interval, None for one that was declared; ``"1"`` if dimensionless.
+    determined
+        Whether the data determine it.
+    """
+
+    name: str
+    value: float
+    ci95: Span | None = None
+    unit: str = "1"
+    determined: bool = True
+
+    @property
+    def symbol(self) -> str:
+        """Letter of the field, such as α."""
+        name = self.name.rpartition(".")[2]
+        return readable(_SYMBOLS.get(name, name).replace("_", " "))
+
+    @property
+    def number(self) -> str:
+        """Value to as many digits as the interval leaves it, with its unit."""
+        if not self.determined:
+            return "not determined"
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"{self._rounded(self.value) or estimate(self.value, self.ci95)}{unit}"
+
+    @property
+    def interval(self) -> str:
+        """95 % interval, or a dash."""
+        low, high = self.ci95 or (math.nan, math.nan)
+        first, last = self._rounded(low), self._rounded(high)
+        if first and last:
+            return f"{first} to {last}" if low < 0.0 else f"{first}–{last}"
+        return interval(self.ci95)
+
+    def _rounded(self, value: float) -> str:
+        """Return a number to two digits of the interval's width; empty where it needs a power."""
+        if self.ci95 is None or not 0.0 < (width := self.ci95[1] - self.ci95[0]) < math.inf:
+            return ""
+        largest = max(map(abs, (*self.ci95, self.value)))
+        decimals = 1 - math.floor(math.log10(width))
+        if not 1e-3 <= largest < 1e5 or decimals > 6:
+            return ""
+        text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
+        return text.replace("-", _MINUS)
+
+    @property
+    def text(self) -> str:
+        """Symbol, value and interval."""
+        if not self.determined:
+            return f"{self.symbol} not determined"
+        return f"{self.symbol} = {self.number}{self._ends}"
+
+    @property
+    def _ends(self) -> str:
+        return "" if self.ci95 is None else f" (95 %: {self.interval})"
+
+
+_MINUS = "−"
+_SYMBOLS = {
+    "modulus_Pa": "G",
+    "relaxation_time_s": "λ",
+    "modulus_factor": "factor on G",
+    "relaxation_time_factor": "factor on λ",
+    "eta_s": "eta s",
+    "L2": "L²",
+    "q": "q",
+}
+
+
+@dataclass(frozen=True)
+class Mode:
+    """Relaxation mode."""
+
+    modulus_Pa: float
+    relaxation_time_s: float
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """Effect of the instrument or of the flow, which is no part of the fluid.
+
+    Attributes
+    ----------
+    effect
+        Name as studies spell it.
+    constants
+        Its constants with their intervals.
+    """
+
+    effect: str
+    constants: tuple[Constant, ...] = ()
+
+    @property
+    def text(self) -> str:
+        """Name and constants."""
+        constants = ", ".join(one.text for one in self.constants)
+        return f"{effect_title(self.effect)}{f', {constants}' if constants else ''}"
+
+
+@dataclass(frozen=True)
+class Range:
+    """Flows in which a law was fitted or tested.
+
+    Attributes
+    ----------
+    weissenberg, deborah
+        With the mean relaxation time; None where there is none.
+    strain, rate_1_s
+        Largest strain and rate of the runs, least to largest; None where not known.
+    flows
+        Kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
+    """
+
+    weissenberg: Span | None = None
+    deborah: Span | None = None
+    strain: Span | None = None
+    rate_1_s: Span | None = None
+    flows: tuple[str, ...] = ("shear",)
+
+
+@dataclass(frozen=True)
+class ExpectedError:
+    """Relative error that a prediction of one quantity is expected to have.
+
+    Attributes
+    ----------
+    inside, beyond
+        Inside the range of the data and beyond it (rates up to twice as fast); None where unknown.
+    missing
+        What stands in place of a number that is unknown.
+    note
+        In a few words why, or on what the numbers rest: ``if Giesekus; networks differ by 1.3 %``.
+    """
+
+    inside: float | None = None
+    beyond: float | None = None
+    missing: Literal["untested", "not determined"] = "untested"
+    note: str = ""
+
+    @property
+    def is_known(self) -> bool:
+        """Whether there is a number."""
+        return self.inside is not None or self.beyond is not None
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """Size of what no law describes, over the root mean square of the records.
+
+    Attributes
+    ----------
+    size, ci95
+        Of all fitted runs.
+    by_run
+        By name of the run.
+    grows_with_rate
+        Power of the shear rate with which it grows; None where the data do not tell.
+    """
+
+    size: float
+    ci95: Span
+    by_run: Mapping[str, float] = field(default_factory=dict)
+    grows_with_rate: float | None = None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Answer of a comparison, of a closed loop, of a fit: the law that one can use.
+
+    Page, JSON, summary and text on the console are written from it.
+
+    Attributes
+    ----------
+    title
+        Law by name, as a rheologist writes it; empty where there is no law to use.
+    law
+        Key of `discover.laws.LAWS`; None for a law without a name.
+    constants
+        Of the law, dimensionless or with units; moduli and times that were fitted among them.
+    modes, solvent_viscosity_Pa_s
+        Linear part of the fluid.
+    error, noise
+        Relative misfit of the fitted runs, and relative noise, mean over runs.
+    fits_to_the_noise
+        Whether what the law leaves is noise.
+    discrepancy
+        Size of what it leaves beside noise; None where unknown.
+    range
+        Where it may be used.
+    expected_error
+        By quantity of `QUANTITIES`; one that is missing is untested.
+    next_test
+        What to measure next, one sentence without *Next:*.
+    suspects
+        Effects of the instrument that were found or are suspected.
+    equation
+        Law written out; None where it cannot be.
+    failed
+        A test that the law failed, one short sentence; empty where none.
+    instead
+        First line where there is no law to use, such as for pure noise.
+    tolerance
+        Relative discrepancy that is good enough.
+
+    Examples
+    --------
+    >>> answer = Answer(
+    ...     "Giesekus", "giesekus", (Constant("alpha", 0.2, (0.199, 0.201)),), (Mode(1.0, 1.0),),
+    ...     error=0.01, noise=0.01, fits_to_the_noise=True,
+    ...     range=Range((1.0, 2.0), (0.25, 1.0)),
+    ... )
+    >>> answer.headline.partition(". ")[0]
+    'Giesekus, α = 0.2000 (95 %: 0.1990–0.2010)'
+    >>> answer.adequate
+    True
+    """
+
+    title: str
+    law: str | None = None
+    constants: tuple[Constant, ...] = ()
+    modes: tuple[Mode, ...] = ()
+    solvent_viscosity_Pa_s: float = 0.0
+    error: float | None = None
+    noise: float | None = None
+    fits_to_the_noise: bool = False
+    discrepancy: Discrepancy | None = None
+    range: Range = Range()
+    expected_error: Mapping[str, ExpectedError] = field(default_factory=dict)
+    next_test: str = ""
+    suspects: tuple[Suspect, ...] = ()
+    equation: Equation | None = field(default=None, repr=False)
+    failed: str = ""
+    instead: str = ""
+    tolerance: float = TOLERANCE
+
+    @property
+    def size(self) -> float | None:
+        """Relative discrepancy; None where unknown."""
+        if self.discrepancy is not None:
+            return self.discrepancy.size
+        return 0.0 if self.fits_to_the_noise else self.error
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where it is unknown."""
+        if not self.title or self.size is None:
+            return None
+        return self.size <= self.tolerance
+
+    def expected(self, quantity: str) -> ExpectedError:
+        """Return the expected error of a quantity."""
+        return self.expected_error.get(quantity, ExpectedError())
+
+    def within_tolerance(self, quantity: str) -> bool | None:
+        """Return whether a quantity is expected within the tolerance; None where unknown."""
+        inside = self.expected(quantity).inside
+        return None if inside is None else inside <= self.tolerance
+
+    @property
+    def use(self) -> dict[str, Any] | None:
+        """What a simulation needs, as the contract writes it; None where there is no law."""
+        if not self.title:
+            return None
+        flows = self.range
+        return plain(
+            {
+                "law": self.law or self.title,
+                "constants": {
+                    one.name: {"value": one.value, "ci95": one.ci95, "unit": one.unit}
+                    for one in self.constants
+                },
+                "modes": self.modes,
+                "solvent_viscosity_Pa_s": self.solvent_viscosity_Pa_s,
+                "range": {
+                    "weissenberg": flows.weissenberg,
+                    "deborah": flows.deborah,
+                    "strain": flows.strain,
+                    "rate_1_s": flows.rate_1_s,
+                    "flows": flows.flows,
+                },
+                "expected_error": {name: self.expected(name).inside for name in QUANTITIES},
+                "expected_error_beyond": {name: self.expected(name).beyond for name in QUANTITIES},
+                "why_unknown": {
+                    name: f"{one.missing}{f': {one.note}' if one.note else ''}"
+                    for name in QUANTITIES
+                    if not (one := self.expected(name)).is_known
+                },
+                "suspects": {
+                    suspect.effect: {
+                        one.name: {"value": one.value, "ci95": one.ci95, "unit": one.unit}
+                        for one in suspect.constants
+                    }
+                    for suspect in self.suspects
+                },
+            }
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return ``use``, ``adequate`` and ``tolerance`` as result files hold them."""
+        return {"use": self.use, "adequate": self.adequate, "tolerance": self.tolerance}
+
+    @property
+    def headline(self) -> str:
+        """First line: law, constants, how well it describes, where to use it."""
+        return sentences.headline(self)
+
+    @property
+    def lines(self) -> list[str]:
+        """Answer in a few lines of text, for a terminal and for headers of exported files."""
+        return sentences.lines(self)

@@ -1,0 +1,60 @@
+"""Laws by name: which named law a sum of terms is, with its constants."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from discover.equations.equation import Equation
+from discover.laws.registry import LAWS, starting_values
+from tensor_library.law_terms import LawTerm
+
+_SAME = 1e-6
+"""Relative deviation of coefficients up to which two laws are one."""
+
+
+def named_law(equation: Equation) -> tuple[str, dict[str, float]] | None:
+    """Return the named law that an equation is, with its constants; None where it is none.
+
+    Of constants that differ from mode to mode, those of the first mode.
+
+    Examples
+    --------
+    >>> named_law(Equation((LawTerm("sigma.sigma", 0.2),)))[0]
+    'giesekus'
+    """
+    if equation.states or not equation.linear_relaxation:
+        return None
+    if equation.named is not None:
+        known = equation.named.law, dict(equation.named.of_mode(0))
+        return None if equation.terms else known
+    return _of_terms(equation.terms)
+
+
+def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, float]] | None:
+    names = sorted(term.term for term in terms)
+    wanted = _numbers(terms)
+    for name, law in LAWS.items():
+        start = starting_values(name)
+        own = law.build(*start.values()).as_terms()
+        if own is None or sorted(term.term for term in own) != names:
+            continue
+        if not start:
+            return name, {}
+        low, high = np.transpose(list(law.parameters.values()))
+
+        def off(values, law=law):
+            found = _numbers(law.build(*map(float, values)).as_terms() or ())
+            return found - wanted if len(found) == len(wanted) else np.full(len(wanted), 1.0)
+
+        inside = np.clip(list(start.values()), low + 1e-9, high - 1e-9)
+        found = least_squares(off, inside, bounds=(low, high), xtol=1e-12, ftol=1e-14, gtol=1e-14)
+        if np.max(np.abs(found.fun)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-3):
+            return name, dict(zip(start, map(float, found.x), strict=True))
+    return None
+
+
+def _numbers(terms: Sequence[LawTerm]) -> np.ndarray:
+    """Return coefficients and inner constants, in the order of the terms' names."""
+    ordered = sorted(terms, key=lambda term: term.term)
+    return np.array([v for t in ordered for v in (t.coefficient, *t.inner.values())], dtype=float)

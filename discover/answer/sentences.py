@@ -1,0 +1,145 @@
+"""Sentences of an answer: at most sixty words on a first screen."""
+
+from typing import TYPE_CHECKING
+
+from discover.words import counted, listed, percent_of, significant
+
+if TYPE_CHECKING:
+    from discover.answer.answer import Answer, ExpectedError, Span
+
+_MOST_CONSTANTS = 3
+"""Constants that a first line names; the table has all."""
+
+SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
+"""Quantities as text writes them."""
+
+_MOST_RUNS = 2
+
+A_TRANSIENT = (
+    "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
+)
+"""What to measure where nothing but states was."""
+
+IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 (3 % scatter)."
+"""What to say of runs that no law describes, of which nobody said it; for a section of a study."""
+
+
+def headline(answer: "Answer") -> str:
+    """Return the first line: law, constants, how well it describes, where to use it."""
+    if not answer.title:
+        return answer.instead
+    title = answer.title[:1].upper() + answer.title[1:]
+    named = [one.text for one in answer.constants if one.name not in _OF_MODES]
+    named = named[:_MOST_CONSTANTS]
+    if len(answer.modes) > 1:
+        named.append(counted(len(answer.modes), "mode"))
+    elif len(named) < _MOST_CONSTANTS:
+        named += [one.text for one in answer.constants if one.name in _OF_MODES]
+    return " ".join([f"{', '.join([title, *named])}.", description(answer), where(answer)]).strip()
+
+
+_OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
+
+
+def description(answer: "Answer") -> str:
+    """Return how well the law describes the runs."""
+    noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
+    if answer.fits_to_the_noise:
+        return f"Fits to the noise{noise}."
+    if answer.discrepancy is None or not answer.discrepancy.size:
+        return "" if answer.error is None else f"Misfit {percent_of(answer.error)}{noise}."
+    low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
+    size = percent_of(answer.discrepancy.size)
+    text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
+    return f"{text}, above the noise{noise}." if noise else f"{text}."
+
+
+def flows(answer: "Answer") -> str:
+    """Return the kinds of flow, in words."""
+    return listed([_FLOWS.get(one, one) for one in answer.range.flows])
+
+
+_FLOWS = {
+    "uniaxial": "uniaxial extension",
+    "planar": "planar extension",
+    "biaxial": "biaxial extension",
+}
+
+
+def where(answer: "Answer") -> str:
+    """Return where the law may be used; in numbers without units where the modes have none."""
+    found = []
+    one = answer.range
+    plain = [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
+    if plain and one.weissenberg is not None:
+        found.append(f"Wi ≤ {_three(one.weissenberg[1])}")
+        found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
+    elif one.rate_1_s is not None:
+        found.append(f"{span(one.rate_1_s)} 1/s")
+    return f"Use in {', '.join([flows(answer), *found])}." if found else ""
+
+
+def span(ends: "Span") -> str:
+    """Return a range in numbers of three digits."""
+    low, high = map(_three, ends)
+    return low if low == high else f"{low}–{high}"
+
+
+def _three(value: float) -> str:
+    return significant(value, 3)
+
+
+def tolerance(answer: "Answer") -> str:
+    """Return whether the tolerance is met, where, and for which quantities."""
+    if answer.adequate is None:
+        return ""
+    asked = percent_of(answer.tolerance)
+    met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
+    missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
+    of = f" for {listed(met)}" if met else ""
+    parts = [
+        f"Meets the tolerance of {asked}{of}"
+        if answer.adequate
+        else f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"
+    ]
+    if missed:
+        parts.append(f"not for {listed(missed)}")
+    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
+    over = sorted((n for n in by_run if by_run[n] > answer.tolerance), key=lambda n: -by_run[n])
+    if over and len(over) < len(by_run):
+        names = [f"{name} ({percent_of(by_run[name])})" for name in over[:_MOST_RUNS]]
+        if more := len(over) - len(names):
+            names.append(f"{more} more")
+        parts.append(f"exceeded in {listed(names)}")
+    return f"{'; '.join(parts)}."
+
+
+def expected(one: "ExpectedError", place: str) -> str:
+    """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
+    value = one.inside if place == "inside" else one.beyond
+    if value is not None:
+        return percent_of(value)
+    return "untested" if one.is_known else one.missing
+
+
+def suspects(answer: "Answer") -> str:
+    """Return what is suspected of the instrument; empty where nothing is."""
+    named = listed([one.text for one in answer.suspects[:_MOST_CONSTANTS]])
+    return f"Instrument: {named}." if named else ""
+
+
+def lines(answer: "Answer") -> list[str]:
+    """Return the answer as lines of text."""
+    found = [headline(answer)]
+    if answer.title:
+        parts = []
+        for name, symbol in SYMBOLS.items():
+            one = answer.expected(name)
+            text = f"{symbol} {expected(one, 'inside')}"
+            if one.beyond is not None:
+                text += f", {percent_of(one.beyond)} beyond"
+            parts.append(f"{text} ({one.note})" if one.note else text)
+        found.append(f"Expected error: {'; '.join(parts)}.")
+    found += [suspects(answer), tolerance(answer), answer.failed]
+    found.append(f"Next: {answer.next_test}" if answer.next_test else "")
+    return [line for line in found if line]

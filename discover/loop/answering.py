@@ -1,0 +1,242 @@
+"""The answer of a closed loop: the law that one can use."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from discover.answer import (
+    Answer,
+    Constant,
+    Discrepancy,
+    ExpectedError,
+    Mode,
+    Range,
+    Suspect,
+)
+from discover.answer.naming import named_law
+from discover.equations import Equation
+from discover.errors import InputError
+from discover.inference.by_mode.constants import StageParameter
+from discover.laws.registry import LAWS
+from discover.loop.asked import EXPLAINED, untested_by
+from discover.loop.next_test import what_to_measure_next
+from discover.loop.run_record import RunRecord
+from discover.words import effect_title, percent_of
+
+if TYPE_CHECKING:
+    from discover.loop.loop_result import LoopResult
+
+_APART = 0.2
+"""Relative difference between laws from which on a quantity is not determined."""
+
+_WORTH_SAYING = 0.05
+"""Relative difference between laws that is told of a quantity that nothing tested."""
+
+_FASTER = 1.01
+"""Rate over the fastest fitted one, from which on a run lies beyond the range."""
+
+_NOT_TESTED = {
+    "flows": "Fitted, not tested: no run was held out.",
+    "states": "Fitted, not tested: only steady or periodic states were measured.",
+}
+
+
+def loop_answer(result: "LoopResult") -> Answer:
+    """Return the answer of a closed loop."""
+    following = what_to_measure_next(result)
+    if result.verdict == "no_signal":
+        return Answer(
+            "", instead="No signal: these runs hold no more than noise, so no law is given.",
+            noise=result.noise_floor, next_test=following, tolerance=result.tolerance,
+        )  # fmt: skip
+    try:
+        equation = result.without_answer()
+    except InputError:
+        equation = None
+    linear = equation or result.declared_law
+    law, title, constants = _law(result, equation)
+    answer = Answer(
+        title,
+        law,
+        constants,
+        () if linear is None else tuple(map(Mode, linear.modulus, linear.relaxation_time)),
+        0.0 if linear is None else float(linear.solvent_viscosity),
+        result.error_after.fit,
+        result.noise_floor,
+        result.verdict in EXPLAINED,
+        None if result.discrepancy is None else Discrepancy(**result.discrepancy),
+        _range(result, equation),
+        _expected(result, title),
+        following,
+        tuple(
+            Suspect(stage.effect, _constants(stage.parameters, stage.left_open))
+            for stage in result.stages
+            if stage.kind != "constitutive"
+        ),
+        failed=_failed(result),
+        tolerance=result.tolerance,
+    )
+    if equation is None:
+        return answer
+    return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+
+def _failed(result: "LoopResult") -> str:
+    """Return what the law was not tested by, or failed."""
+    if untested := untested_by(result):
+        return _NOT_TESTED[untested]
+    chance = result.remaining.get("probability")
+    if result.verdict == "unexplained" and chance is not None and chance < 0.05:
+        return (
+            f"The residual is systematic (p {'< 0.001' if chance < 1e-3 else f'= {chance:.2g}'})."
+        )
+    return ""
+
+
+def _law(
+    result: "LoopResult", equation: Equation | None
+) -> tuple[str | None, str, tuple[Constant, ...]]:
+    """Return name, title and constants of the law."""
+    in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
+    found: list[Constant] = list(_constants(result.declared_parameters))
+    for stage in in_fluid:
+        found += _constants(stage.parameters, stage.left_open)
+    for known in result.declared_effects:
+        if known.kind == "constitutive":
+            found += _constants(known.parameters)
+    named = None if equation is None else named_law(equation)
+    solvent = equation is not None and equation.solvent_viscosity > 0.0
+    if named is None:
+        base = None if result.declared_law is None else named_law(result.declared_law)
+        added = [effect_title(stage.effect) for stage in in_fluid]
+        title = LAWS[base[0]].title if base else "law"
+        if base is not None:  # constants that were declared
+            found = _beside(base[1], found)
+        return None, f"{title} with {' and '.join(added)}" if added else title, tuple(found)
+    name, values = named
+    title = LAWS[name].title + (" with solvent" if solvent else "")
+    return name, title, tuple(_beside(values, found))
+
+
+def _beside(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:
+    """Return the constants of a law first, with the intervals of those that were fitted."""
+    left, own = list(found), []
+    for name, value in values.items():
+        close = [
+            one for one in left
+            if one.name == name or np.isclose(one.value, value, rtol=1e-6, atol=0.0)
+        ]  # fmt: skip
+        if close:
+            left.remove(close[0])
+            own.append(replace(close[0], name=name))
+        else:
+            own.append(Constant(name, value))
+    return [*own, *left]
+
+
+def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Constant, ...]:
+    return tuple(
+        Constant(
+            name,
+            one.value,
+            one.ci95,
+            one.unit or "1",
+            name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
+        )
+        for name, one in parameters.items()
+    )
+
+
+def _range(result: "LoopResult", equation: Equation | None) -> Range:
+    fitted = [record for record in result.records if not record.held_out]
+    rates = [rate for record in fitted if (rate := _fastest(record)) > 0.0]
+    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
+    box = None if equation is None or equation.tested is None else equation.tested.learned_in
+    return Range(
+        None if box is None else box.weissenberg,
+        None if box is None else box.deborah,
+        (0.0, max(strains)) if strains else None,
+        (min(rates), max(rates)) if rates else None,
+        tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",),
+    )
+
+
+def _fastest(record: RunRecord) -> float:
+    return float(np.max(np.abs(record.rate)))
+
+
+def _expected(result: "LoopResult", title: str) -> dict[str, ExpectedError]:
+    """Return expected errors: of what was measured, else by how far equally good laws differ."""
+    found = {"sigma12": _of_stress(result)}
+    for kind in ("N1", "N2", "uniaxial"):
+        measured = _measured(result, kind)
+        if measured is not None:
+            found[kind] = measured
+            continue
+        spread = result.spread_of_laws.get(kind)
+        apart = None if spread is None else spread.inside
+        differ = "" if apart is None else f"laws differ by {percent_of(apart)}"
+        if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
+            name = title.partition(" with ")[0]
+            beyond = None if spread is None else spread.beyond
+            found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
+        elif kind == "N1":
+            found[kind] = ExpectedError(missing="not determined", note=differ)
+        elif kind == "N2":
+            told = (
+                f"{differ} of N1"
+                if apart and apart > _WORTH_SAYING
+                else "shear stress does not fix it"
+            )
+            found[kind] = ExpectedError(missing="not determined", note=told)
+        else:
+            found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
+    return found
+
+
+def _only(result: "LoopResult", kind: str) -> bool:
+    """Return whether nothing but linear response was measured."""
+    return all(record.control == "oscillation" for record in result.records)
+
+
+def _of_stress(result: "LoopResult") -> ExpectedError:
+    fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
+    held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
+    slow = [r for r in held if _fastest(r) <= _FASTER * fastest]
+    fast = [r for r in held if _fastest(r) > _FASTER * fastest]
+    inside, beyond = _mean(slow), _mean(fast)
+    spread = result.spread_of_laws.get("sigma12")
+    if beyond is None and spread is not None and spread.beyond is not None:
+        beyond = max(spread.beyond, inside or result.left_out_error or 0.0)
+    if result.folds and result.error_after.held_out is not None:
+        return ExpectedError(result.error_after.held_out, beyond, note="runs left out in turn")
+    if inside is None and result.left_out_error is not None:
+        return ExpectedError(result.left_out_error, beyond, note="runs left out in turn")
+    return ExpectedError(inside, beyond, note="unseen runs" if held else "")
+
+
+def _measured(result: "LoopResult", kind: str) -> ExpectedError | None:
+    """Return the error of what was measured, unseen runs before fitted ones."""
+    own = [record for record in result.records if _is(record, kind)]
+    if not own:
+        return None
+    held = [record for record in own if record.held_out]
+    fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
+    fast = [record for record in held if _fastest(record) > _FASTER * fastest]
+    slow = [record for record in (held or own) if _fastest(record) <= _FASTER * fastest]
+    return ExpectedError(_mean(slow), _mean(fast), note="unseen runs" if held else "fitted")
+
+
+def _is(record: RunRecord, kind: str) -> bool:
+    if kind == "uniaxial":
+        return record.flow == "uniaxial" and record.quantity == "tensile_stress"
+    if kind == "sigma12":
+        return record.flow == "shear" and record.quantity in ("sigma12", "strain")
+    return record.flow == "shear" and record.quantity == kind
+
+
+def _mean(records: Sequence[RunRecord]) -> float | None:
+    errors = [float(record.errors[-1]) for record in records]
+    return float(np.mean(errors)) if errors and np.all(np.isfinite(errors)) else None

@@ -1,0 +1,155 @@
+"""Expected error of what was not fitted: how far laws that describe the runs as well differ."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.dataset import Run
+from discover.forward import make_batch
+from discover.inference.engine import Posterior
+from discover.inference.engine.fits import Fit
+from discover.linear_algebra_threads import in_one_thread
+from discover.protocols import FlowProtocol, in_flow, start_up
+from discover.protocols.kinematics import RecordedQuantity
+from discover.protocols.protocol import recording, shear_rates
+from discover.statistics.projection import rms
+
+BEYOND = 2.0
+"""Rates beyond the fastest fitted one, at which errors beyond the range are given."""
+
+_LAWS, _DRAWS = 12, 4
+_SAMPLES = 81
+_STRAIN, _HENCKY = 20.0, 3.0
+_LEAST_LIKELY = 1e-3
+_SEED = 20261128
+
+_SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Root-mean-square difference between laws that describe the runs as well.
+
+    Attributes
+    ----------
+    inside, beyond
+        Over the rms of the quantity (N2: of N1), in flows inside and beyond the fitted rates; None
+        where a law diverges.
+    """
+
+    inside: float | None
+    beyond: float | None
+
+
+@in_one_thread
+def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
+    """Return by how much σ12, N1, N2 and uniaxial stress differ between equally good laws.
+
+    Laws are weighed by their evidence where one of them is all there is. Otherwise they miss the
+    runs by what they have in common along each, so each run counts once: a weight of
+    exp(−R (e² − e₀²)/2e₀²), R runs, relative misfit e, e₀ that of the best.
+
+    Parameters
+    ----------
+    posterior
+        What the runs say.
+    best
+        The law that is reported, from which differences are counted.
+    """
+    runs = posterior.problem.fitted.runs
+    weighed = _weighed(posterior)
+    rates = [float(np.max(np.abs(run.rate))) for run in runs]
+    rates = [rate for rate in rates if rate > 0.0]
+    if not weighed or not rates or best.covariance is None:
+        return {}
+    lot = np.random.default_rng(_SEED)
+    thetas, weights = [best.theta], []
+    for fit, weight in weighed:
+        assert fit.covariance is not None
+        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
+        normal = lot.standard_normal((_DRAWS, root.shape[1]))
+        thetas += [fit.at(fit.coordinates + root @ one) for one in normal]
+        weights += [weight / _DRAWS] * _DRAWS
+    inside = [_observing(one, q) for one in _flows_inside(runs, rates) for q in _SHEAR]
+    fast = start_up(BEYOND * max(rates))
+    times = np.linspace(0.0, _STRAIN / (BEYOND * max(rates)), _SAMPLES)
+    beyond = [_observing((fast, times), q) for q in _SHEAR]
+    pulled = []
+    for rate in (max(rates), BEYOND * max(rates)):
+        flow = in_flow(start_up(rate), "uniaxial")
+        pulled.append(_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES)))
+    tests = [*inside, *beyond, *pulled]
+    with np.errstate(all="ignore"):
+        found = posterior.problem.model.predictions(np.array(thetas), make_batch(tests))
+    kinds = [*_SHEAR * (len(inside) // 3 + 1), "uniaxial", "uniaxial"]
+    places = ["inside"] * len(inside) + ["beyond"] * len(beyond) + ["inside", "beyond"]
+    own: dict[str, dict[str, list[float]]] = {}
+    for i, (kind, place, test) in enumerate(zip(kinds, places, tests, strict=True)):
+        of_n1 = i - 1 if kind == "N2" else i
+        size = rms(found[0, of_n1, : len(test)])
+        off = found[1:, i, : len(test)] - found[0, i, : len(test)]
+        square = float(np.array(weights) @ np.mean(off**2, axis=1))
+        value = float(np.sqrt(square)) / size if size > 0.0 else np.nan
+        own.setdefault(kind, {}).setdefault(place, []).append(value)
+    return {kind: Spread(*(_largest(of[place]) for place in ("inside", "beyond")))
+            for kind, of in own.items()}  # fmt: skip
+
+
+def _largest(values: Sequence[float]) -> float | None:
+    return float(np.max(values)) if np.all(np.isfinite(values)) else None
+
+
+def _weighed(posterior: Posterior) -> list[tuple[Fit, float]]:
+    """Return laws that describe the runs about as well, with weights that add up to one."""
+    if posterior.unexplained < 0.5:
+        pairs = list(posterior.fits)
+    else:
+        fitter = posterior.search.fitter
+        found = [f for f in posterior.search.found.values() if f.covariance is not None]
+        found = [f for f in found if np.isfinite(f.log_likelihood) and not f.at_an_end]
+        if not found:
+            return []
+        left = [(fitter.rows.recorded - fitter.record(f)) / fitter.rows.size for f in found]
+        squares = np.array([np.mean(one**2) for one in left])
+        least = max(float(np.min(squares)), 1e-300)
+        runs = len(fitter.rows.runs)
+        share = np.exp(-0.5 * runs * (squares - least) / least)
+        pairs = list(zip(found, map(float, share), strict=True))
+    pairs = sorted(pairs, key=lambda pair: -pair[1])[:_LAWS]
+    pairs = [(f, p) for f, p in pairs if f.covariance is not None and p > _LEAST_LIKELY]
+    total = sum(p for _, p in pairs)
+    return [(fit, p / total) for fit, p in pairs]
+
+
+def _flows_inside(
+    runs: Sequence[Run], rates: Sequence[float]
+) -> list[tuple[FlowProtocol, Float[np.ndarray, " n"]]]:
+    """Return a slow and a fast flow of the fitted runs; start-ups where these were other tests."""
+    own = [run for run in runs if run.protocol.control == "rate" and run.flow == "shear"]
+    own = [run for run in own if run.quantity == "sigma12" and np.any(run.rate)]
+    if own:
+        own.sort(key=lambda run: float(np.max(np.abs(run.rate))))
+        some = [own[0], own[-1]] if len(own) > 1 else own
+        return [(run.protocol, _thinned(run.time)) for run in some]
+    ends = sorted({min(rates), max(rates)})
+    return [(start_up(rate), np.linspace(0.0, _STRAIN / rate, _SAMPLES)) for rate in ends]
+
+
+def _thinned(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
+    at = np.unique(np.linspace(0, len(times) - 1, _SAMPLES).astype(int))
+    return times[at]
+
+
+def _run(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Run:
+    nothing = np.zeros(len(times))
+    rates = np.asarray(shear_rates(protocol, times))
+    return Run("flow", times, protocol, rates, nothing, nothing, nothing)
+
+
+def _observing(
+    flow: tuple[FlowProtocol, Float[np.ndarray, " n"]], quantity: RecordedQuantity
+) -> Run:
+    protocol, times = flow
+    return _run(recording(protocol, quantity), times)
