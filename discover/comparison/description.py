@@ -1,11 +1,10 @@
 """A comparison's data and known part in words."""
 
-from discover.comparison.instrument.known import Known
-from discover.comparison.outcomes.constant import in_words as in_words_of
+from discover.comparison.known_part import Frame
 from discover.laws.registry import LAWS
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from discover.study.declared_model import DeclaredModel
 from discover.study.schema import Study
 
 
@@ -30,20 +29,14 @@ def _runs(number: int) -> str:
     return f"{number} run{'' if number == 1 else 's'}"
 
 
-def known_in_words(declared: DeclaredModel, known: Known, study: Study) -> str:
-    """Return what was known before, and what was fitted along."""
-    model = known.before.model
-    text = _law_and_modes(model, study)
-    of_law = [name for name in declared.free if name not in MODE_CONSTANTS]
-    if of_law:
-        text += f" ({', '.join(of_law)} fitted with this law alone, then held)"
-    fixed = [effect.text for effect in known.effects if not effect.free]
-    if fixed:
-        text += f", {', '.join(fixed)}"
-    if known.along is not None:
-        one_mode = len(model.modulus) == 1
-        names = ", ".join(in_words_of(name, one_mode) for name in known.along.constants.positions)
-        text += f"; fitted along with each learner: {names}"
+def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
+    """Return what was known before, and what was fitted with the likeliest hypothesis."""
+    text = _law_and_modes(frame.model, study)
+    if declared.free_constants:
+        text += f" ({', '.join(declared.free_constants)} fitted)"
+    if frame.effects:
+        taken = ", ".join(effect.text for effect in frame.effects)
+        text += f"; taken out of the records: {taken}"
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 

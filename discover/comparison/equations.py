@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, relative_errors
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.flows import QUANTITIES, Flow, relative_errors
+from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, Tested, combined, law_parts
 from discover.equations.box import box_of, flow_numbers
 from discover.errors import InputError

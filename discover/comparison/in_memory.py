@@ -1,11 +1,9 @@
 """A comparison of estimators, or on data, that a program holds."""
 
 from collections.abc import Iterable, Mapping, Sequence, Sized
-from dataclasses import replace
 from typing import Any, overload
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.fitting.training import searched
 from discover.comparison.run_comparison import compare as compare_study
 from discover.dataset import Dataset
 from discover.errors import InputError
@@ -13,7 +11,6 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.learners.files.provenance import fingerprint_of
 from discover.learners.known_part import known_part
-from discover.learners.results.result import LearnerResult
 from discover.learners.run_prediction import RunPrediction
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
@@ -136,7 +133,7 @@ def compare(
         "learners": list(estimators),
         "use_normal_stresses": bool(getattr(sparse, "use_normal_stresses", False)),
     }
-    made = {name: (_result(e), e.fluid_) for name, e in estimators.items()}
+    made = {name: (e.result_, e.fluid_) for name, e in estimators.items()}
     library = getattr(sparse, "library_", None)
     return compare_study(
         _study(data, model, asked), seed, say, data=data, declared=model, made=made, library=library
@@ -222,9 +219,3 @@ def _same_fluid(one: Fluid, other: Fluid) -> bool:
     import equinox as eqx
 
     return bool(eqx.tree_equal(one, other, rtol=1e-12))
-
-
-def _result(estimator: Any) -> LearnerResult:
-    if hasattr(estimator, "laws_that_fit"):
-        return replace(estimator.result_, weighted=estimator.laws_that_fit())
-    return searched(estimator) if hasattr(estimator, "search_") else estimator.result_

@@ -5,14 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from discover.comparison.at_once import at_once
-from discover.comparison.fitting.sampled_rates import with_sampled_rates
-from discover.comparison.fitting.training import train
-from discover.comparison.instrument import Learned
-from discover.comparison.instrument.known import Known
-from discover.comparison.judging.identifiability import (
-    physics_of,
-)
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.known_part import Frame
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.rivals import physics_of
+from discover.comparison.training import train
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.registry import BUILT_IN
@@ -34,28 +30,23 @@ class Learning:
         Where finished learners are kept and found again.
     made
         Learners that are fitted already: what they found, by learner.
-    prefix
-        Of the names under which they are kept.
     """
 
     study: Study
     seed: int
     store: RunFolder | None = None
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
-    prefix: str = ""
 
     def outcomes(
-        self, learners: Sequence[str], known: Known, progress: Progress
+        self, learners: Sequence[str], frame: Frame, progress: Progress
     ) -> dict[str, LearnerOutcome]:
         """Return what each learner finds, those of this package side by side.
 
         Whether another one may share a process with threads is not known, so they come after.
         """
-        if known.along is not None:
-            _ = known.along.twins  # once, and not in every thread
 
         def part(learner: str) -> Callable[[Progress], LearnerOutcome]:
-            return lambda say: self.outcome(learner, known, say)
+            return lambda say: self.outcome(learner, frame, say)
 
         ours = [one for one in learners if one in BUILT_IN]
         others = [[one] for one in learners if one not in BUILT_IN]
@@ -70,62 +61,39 @@ class Learning:
         return {learner: found[learner] for learner in learners}
 
     def outcome(
-        self, learner: str, known: Known, progress: Progress, part: str = ""
+        self, learner: str, frame: Frame, progress: Progress, part: str = ""
     ) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works.
 
         Parameters
         ----------
-        known
-            The known part, and the flows of the page.
+        frame
+            The known part, the runs to learn from and the flows of the page.
         progress
             Called with what is going on and the fraction done.
         part
             Of a sweep, the name under which it is kept; its outcomes are looked at in one flow.
         """
-        store, made = self.store, self.made
-        name = f"{self.prefix}{part or learner}"
+        store, made, flows = self.store, self.made, frame.flows
+        name = part or learner
         kept = None if store is None else store.load(name)
-        if kept is not None and all(flow.key in kept["predictions"] for flow in known.flows):
+        if kept is not None and all(flow.key in kept["predictions"] for flow in flows):
             return LearnerOutcome.from_state(kept)
         progress("starting", 0.0)
-        frame, constants = known.before, {}
         if made is not None:
             result, fluid = made[learner]
-        elif known.along is not None:
-            found = known.along.learn(
-                lambda model, data, library: train(
-                    learner, self.study, model, data.fit.runs, self.seed, progress, library
-                )
-            )
-            result, fluid, constants = _told_of_constants(found), found.fluid, found.constants
-            frame = known.frame_of({one.name: one.raw for one in constants.values()})
         else:
             result, fluid = train(
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
-        flows = frame.flows
-        outcome = replace(LearnerOutcome.of(result, fluid, flows), constants=constants)
+        outcome = LearnerOutcome.of(result, fluid, flows)
         if not part:
             outcome = replace(outcome, physics=physics_of(fluid, flows))
-            outcome = with_sampled_rates(outcome, fluid, frame.model.fluid, flows)
         if store is not None:
             store.save(name, outcome.to_state())
             # the same route as after an interruption, so that both give the same files
             return LearnerOutcome.from_state(outcome.to_state())
         return outcome
-
-
-def _told_of_constants(found: Learned) -> LearnerResult:
-    """Return a result that says how constants were fitted along with it."""
-    times = "once" if found.rounds == 1 else f"{found.rounds} times"
-    ended = "had settled" if found.settled else "had not settled, so they may still be off"
-    message = found.result.message.rstrip(".")
-    return replace(
-        found.result,
-        message=f"{message}; it learned {times} with constants fitted along, which {ended}.",
-        details={**found.result.details, "rounds": found.rounds, "settled": found.settled},
-    )
 
 
 def require_teacher(study: Study) -> None:

@@ -1,41 +1,42 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
 
+from discover.comparison.bands import flow_bands
+from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.description import data_in_words, known_in_words
 from discover.comparison.equations import known_equation
-from discover.comparison.fitting.prepared import (
-    prepared,
-    require_one_known_law,
-    settled_by,
-    thinned_to,
-    with_each_run,
-    without_spikes_in_fit,
-)
-from discover.comparison.fitting.step_instants import with_step_instants
-from discover.comparison.fitting.training import study_library
-from discover.comparison.instrument.known import Known, known_part
+from discover.comparison.flows import DRAWN
+from discover.comparison.hypotheses import search_hypotheses, terms_of, with_proposals
+from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher
-from discover.comparison.outcomes.truth import true_terms
-from discover.comparison.own_loadings import judged, with_own_loadings
-from discover.comparison.own_noise import learned_by_noise
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.predictive_check import expectation_of, lacks_of_fit
+from discover.comparison.prepared import prepared, require_one_known_law, settled_by, thinned_to
+from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
+from discover.comparison.statements import make_statements
 from discover.comparison.sweep import sweep_points, sweep_studies
-from discover.dataset import Dataset
+from discover.comparison.training import study_library
+from discover.comparison.truth import true_terms
 from discover.dataset.conditions import material_and_temperature
 from discover.errors import InputError
-from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.multimode import Fluid
 from discover.learners.results.result import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
+from discover.loop.loop import Found
 from discover.progress import Progress, silent
 from discover.study.data import StudyData, load_study_data
-from discover.study.declared_model import DeclaredModel, declared_model, forward_model
+from discover.study.declared_model import DeclaredModel, declared_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.law_terms import LawTerm
 from tensor_library.library import TermLibrary
+
+_SEARCH = 0.15
+"""Share of the time that the search among hypotheses takes, about."""
 
 
 @in_one_thread
@@ -44,14 +45,17 @@ def compare(
     seed: int | None = None,
     progress: Progress = silent,
     store: RunFolder | None = None,
-    fit_constants: Callable[[DeclaredModel, Dataset], DeclaredModel] | None = None,
     *,
     data: StudyData | None = None,
     declared: DeclaredModel | None = None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
     library: TermLibrary | None = None,
 ) -> Comparison:
-    """Run a study's learners on identical data and look at what each found.
+    """Run a study's learners on identical data, and weigh what each found with a search's findings.
+
+    The posterior over laws, effects and terms comes first. What is declared as fitted has the
+    values of its likeliest hypothesis, and what that holds of the instrument is taken out of the
+    records, so that learners learn the fluid. Then each learner's law is a hypothesis too.
 
     Parameters
     ----------
@@ -63,8 +67,6 @@ def compare(
         Called with what is going on and the fraction done.
     store
         Where finished learners are kept and found again.
-    fit_constants
-        Fits what the declared law leaves open; without it, open parameters are an error.
     data, declared
         Data and known part that are at hand, in place of the study's.
     made
@@ -79,98 +81,132 @@ def compare(
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)
-    of_spikes = ""
     if made is None:  # estimators that are fitted already saw every sample
-        data, of_spikes = without_spikes_in_fit(data)
         data = thinned_to(data, options.most_samples)
-        data = with_own_loadings(data, options.loading)
     require_teacher(study)
     sweep = sweep_studies(study)
     declared = declared_model(study, data.dataset) if declared is None else declared
     require_one_known_law(declared)
-    of_scatter = unfelt_scatter(forward_model(declared), data.fit.runs)
-    if of_scatter:
-        data = with_each_run(data, smoothed)
-    data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
-    next_flows = options.next.weissenberg_numbers, options.next.deborah_numbers
-    pipkin = list(itertools.product(*next_flows))
-    library = study_library(study) if library is None else library
-    undated = data
-    data, of_steps = with_step_instants(declared, data, library)
-
-    def known_in(some: StudyData) -> Known:
-        grid = options.high_deborah, pipkin
-        return known_part(declared, some, library, *grid, fit_constants)
-
-    known = known_in(data)
-    if sweep and (known.along is not None or declared.effects):
+    if sweep and (declared.free_constants or declared.effects):
         raise InputError(
             "compare.sweep computes data that hold no instrument, so [model] can have neither "
             'effects nor constants to be fitted along with it. Write numbers instead of "fit".'
         )
+    data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
+    pipkin = list(itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers))
+    library = study_library(study) if library is None else library
     learning = Learning(study, options.seed if seed is None else seed, store, made)
-    n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation) + 1
 
-    def learn(text: str, fraction: float) -> None:
-        progress(text, fraction * len(options.learners) / n_parts)
-
-    own = learning.outcomes(options.learners, known, learn)
-    if made is None:
-        known, own = learned_by_noise(study, learning, data, (known, own), known_in, learn)
-    model = known.before.model
+    progress("searching among laws, effects and terms", 0.0)
+    found = search_hypotheses(
+        study, data, declared, library, lambda line: progress(line, 0.5 * _SEARCH)
+    )
+    frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
+    n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation)
 
     def at(done: int, title: str) -> Progress:
-        return lambda text, fraction: progress(f"{title}: {text}", (done + fraction) / n_parts)
+        def say(text: str, fraction: float) -> None:
+            share = (done + fraction) / n_parts
+            progress(f"{title}: {text}" if title else text, _SEARCH + (0.95 - _SEARCH) * share)
 
-    points = sweep_points(sweep, learning, model, seed, lambda i, title: at(len(own) + i, title))
-    done = (1 + len(sweep)) * len(options.learners)
+        return say
 
-    def say(text: str) -> None:
-        progress(text, done / n_parts)
+    def learn(text: str, fraction: float) -> None:
+        at(0, "")(text, fraction * len(options.learners))
 
-    deviation = options.loading if made is None else None
-    seen = judged(
-        study, (known, own), (data, undated), known_in, library, learning.seed, say, deviation
-    )
-    known, found = seen.known, seen.judgement
-    distillations = distilled(study, data.truth, store, at(done, "distillation"))
-    progress("done", 1.0)
-    return Comparison(
+    own = learning.outcomes(options.learners, frame, learn)
+    done = len(own)
+    points = sweep_points(sweep, learning, frame.model, seed, lambda i, title: at(done + i, title))
+    distillations = distilled(study, data.truth, store, at((1 + len(sweep)) * done, "distillation"))
+    progress("weighing what was found", 0.95)
+    outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
+    found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
+    silent_ = found.ended().verdict == "no_signal"
+    outcomes = {
+        name: _told(replace(one, terms=proposed[name].terms), silent_)
+        for name, one in outcomes.items()
+    }
+    comparison = Comparison(
         name=study.name,
-        data_summary=data_in_words(data, study)
-        + (_TAKEN_OUT if known.along is None and known.effects else "")
-        + "".join(f". {text}" for text in (of_scatter, of_steps, of_spikes) if text)
-        + (_BY_LOADING if seen.loadings is not None else "")
-        + (_BY_NOISE if any(flow.weight != 1.0 for flow in known.flows) else ""),
-        known_part=known_in_words(declared, known, study),
-        flows=seen.flows,
-        before=known.alone(),
-        outcomes=found.outcomes,
-        truth=_truth(study, model),
+        data_summary=data_in_words(data, study),
+        known_part=known_in_words(declared, frame, study),
+        flows=frame.shown,
+        before=frame.alone(),
+        outcomes=outcomes,
+        posterior=replace(found.result(), title=study.name),
+        shares={name: one.share for name, one in proposed.items()},
+        lack_of_fit=lacks_of_fit(
+            outcomes, frame.shown, expectation_of(study, declared, data),
+            options.use_normal_stresses,
+        ),
+        truth=_truth(study, declared),
         noise=None if study.data.synthetic is None else study.data.synthetic.noise,
-        rivals=found.rivals,
-        statements=found.statements,
-        structure=found.structure,
         sweep=points,
         distillations=distillations,
-        next_measurement=found.next_measurement,
         seed=learning.seed,
-        known=known_equation(model),
-        known_of={name: known_equation(frame.model) for name, frame in seen.frames.items()},
-        known_effects=known.effects,
+        known=known_equation(frame.model),
+        known_effects=frame.effects,
         conditions=material_and_temperature(data.dataset, study.data.material),
-        stood_for=() if known.along is None else known.along.twins,
-        explanation=found.explanation,
-        classical=found.classical,
-        warnings=found.warnings,
-        by_mode=found.by_mode,
-        loadings=seen.loadings,
+    )  # fmt: skip
+    comparison = _with_what_is_open(comparison, found, frame, data, study, library)
+    progress("done", 1.0)
+    return comparison
+
+
+def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
+    """Return an outcome without terms where the records hold no signal."""
+    if not is_silent:
+        return outcome
+    message = "The records hold no signal, so what was fitted to them is no law"
+    return replace(outcome, terms=(), message=message, details={})
+
+
+def _with_what_is_open(
+    comparison: Comparison,
+    found: Found,
+    frame: Frame,
+    data: StudyData,
+    study: Study,
+    library: TermLibrary,
+) -> Comparison:
+    """Return a comparison with bands, classical laws, rivals, and what is determined."""
+    if comparison.verdict == "no_signal":
+        statements = make_statements("no_signal", frame.shown, {}, None, {})
+        return replace(comparison, statements=statements)
+    runs = {run.name: run for run in data.dataset}
+    drawn = [flow for flow in frame.shown if flow.kind in DRAWN]
+    bands = flow_bands(found, drawn, runs)
+    best = found.posterior.fits[0][0] if found.posterior.fits else None
+    terms = None if best is None else terms_of(best, found)
+    if terms is None:
+        sparse = comparison.outcomes.get("tensor_sindy")
+        terms = () if sparse is None else tuple(term.in_law for term in sparse.terms)
+    structure = None
+    if any(flow.in_shear for flow in frame.flows if flow.kind == "training"):
+        normal = study.compare.use_normal_stresses
+        structure = structure_of(terms, frame.data.fit.runs, library, frame.model, normal)
+    twins: list[Rival] = []
+    if comparison.verdict == "explained":
+        twins = exact_twins(terms, frame.model, frame.flows, library)
+    others = explanations_apart(found, drawn, runs)
+    spread = comparison.posterior.spread_of_laws
+    statements = make_statements(
+        comparison.verdict,
+        frame.shown,
+        bands,
+        structure,
+        {name: one.inside for name, one in spread.items()},
+        study.compare.use_normal_stresses,
+        len(terms),
     )
-
-
-_BY_NOISE = ". Records differ in noise, and each weighs by its own"
-_BY_LOADING = ". The fitted records are shown without the factor of their loading"
-_TAKEN_OUT = ". What the known instrument did is taken out of the records"
+    return replace(
+        comparison,
+        bands=bands,
+        classical=fit_classical_laws(found, frame, study.compare.laws),
+        rivals=(*twins, *others),
+        statements=statements,
+        structure=structure,
+    )
 
 
 def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:

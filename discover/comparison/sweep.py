@@ -4,11 +4,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from discover.comparison.comparison import SweepPoint
-from discover.comparison.fitting.prepared import thinned_to
-from discover.comparison.instrument import Frame
-from discover.comparison.instrument.known import Known
+from discover.comparison.flows import comparison_flows
+from discover.comparison.known_part import Frame
 from discover.comparison.learning import Learning
-from discover.comparison.outcomes.flows import comparison_flows
+from discover.comparison.prepared import thinned_to
 from discover.errors import InputError
 from discover.laws.registry import LAWS, make_law
 from discover.progress import Progress
@@ -71,7 +70,7 @@ def sweep_points(
     for i, (law, value, other) in enumerate(asked):
         data = thinned_to(load_study_data(other, seed), options.most_samples)
         flow = comparison_flows(data, ())[len(data.fit)]
-        alone = Known(Frame(model, data, [flow]), None, [flow])
+        alone = Frame(model, data, [flow], [flow])
         elsewhere, found = replace(learning, study=other, made=None), {}
         for j, learner in enumerate(options.learners):
             part = f"sweep_{law}_{value:g}_{learner}"

@@ -59,7 +59,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
         The law that is reported, from which differences are counted.
     """
     runs = posterior.problem.fitted.runs
-    weighed = _weighed(posterior)
+    weighed = weighed_laws(posterior)
     rates = [float(np.max(np.abs(run.rate))) for run in runs]
     rates = [rate for rate in rates if rate > 0.0]
     if not weighed or not rates or best.covariance is None:
@@ -101,7 +101,7 @@ def _largest(values: Sequence[float]) -> float | None:
     return float(np.max(values)) if np.all(np.isfinite(values)) else None
 
 
-def _weighed(posterior: Posterior) -> list[tuple[Fit, float]]:
+def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
     """Return laws that describe the runs about as well, with weights that add up to one."""
     if posterior.unexplained < 0.5:
         pairs = list(posterior.fits)

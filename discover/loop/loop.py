@@ -107,6 +107,71 @@ def run_loop(
         runs.
     """
     started = time.perf_counter()
+    found = search_runs(
+        dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
+        laws, progress, loading,
+    )  # fmt: skip
+    found.task.say("bands, intervals and the next test")
+    return found.result(explanations, time.perf_counter() - started)
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found in runs, before it is reported.
+
+    Attributes
+    ----------
+    task
+        What was searched.
+    posterior
+        Over the hypotheses that were fitted.
+    tried
+        The search with each law that the declared one was chosen from.
+    order
+        Names of the runs of the data set.
+    spikes
+        Times of samples set aside as outliers, by run.
+    of_rates
+        That rates were read with noise which the fluid did not feel; empty where not.
+    """
+
+    task: "Task"
+    posterior: Posterior
+    tried: Mapping[str, Search]
+    order: Sequence[str]
+    spikes: Mapping[str, Sequence[float]]
+    of_rates: str
+
+    def ended(self, explanations: int = MOST_LISTED) -> Ended:
+        """Return what is reported of the posterior, with so many explanations at most."""
+        posterior = self.posterior
+        return Ended(posterior, without_fluid(posterior), self.order, explanations)
+
+    def result(self, explanations: int = MOST_LISTED, seconds: float = 0.0) -> LoopResult:
+        """Return the result of a closed loop."""
+        lines = self.task.lines(self.tried) if self.tried else ()
+        return result_of(self.ended(explanations), lines, self.spikes, self.of_rates, seconds)
+
+
+def search_runs(
+    dataset: Dataset,
+    declared: DeclaredModel,
+    fit: Sequence[str] | None = None,
+    held_out: Sequence[str] = (),
+    effects: Sequence[str | AbstractEffect] | str | None = None,
+    max_effects: int = 3,
+    strain: tuple[float, float] | None = None,
+    noise: float | None = None,
+    most_samples: int = MOST_SAMPLES,
+    laws: Sequence[str] = (),
+    progress: Say | None = None,
+    loading: float | None = None,
+    computed: bool = False,
+) -> Found:
+    """Search among hypotheses on what a declared model lacks; parameters as in `run_loop`.
+
+    Runs that were computed know no instrument, a sound one either.
+    """
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
     say = progress or (lambda line: None)
@@ -120,13 +185,10 @@ def run_loop(
     of_rates = unfelt_scatter(declared, fitted)
     if of_rates:
         fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
-    task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say)
+    task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say, computed)
     declared, tried = task.choose(declared, laws)
     posterior = _by_mode(task, task.explained(declared))
-    say("bands, intervals and the next test")
-    ended = Ended(posterior, without_fluid(posterior), dataset.names, explanations)
-    lines = task.lines(tried) if tried else ()
-    return result_of(ended, lines, spikes, of_rates, time.perf_counter() - started)
+    return Found(task, posterior, tried, dataset.names, spikes, of_rates)
 
 
 @dataclass(frozen=True)
@@ -143,6 +205,8 @@ class Task:
         Largest number of effects.
     say
         Called with a line of text now and then.
+    computed
+        Whether runs were computed, without an instrument.
     """
 
     candidates: Sequence[AbstractEffect]
@@ -152,6 +216,7 @@ class Task:
     loading: float
     most: int
     say: Say
+    computed: bool = False
 
     def problem(self, declared: DeclaredModel) -> Problem:
         """Return the problem that a declared model makes of the runs."""
@@ -159,7 +224,8 @@ class Task:
         known = {effect.name for effect in declared.effects}
         candidates = [e for e in self.candidates if admitted(e) and e.name not in known]
         return Problem(
-            declared, candidates, self.fitted, self.held_out, self.loading, self.noise
+            declared, candidates, self.fitted, self.held_out, self.loading, self.noise,
+            self.computed,
         )  # fmt: skip
 
     def explained(self, declared: DeclaredModel) -> Posterior:

@@ -23,6 +23,9 @@ _DAMPINGS = (0.1, 3.0, 100.0)
 _ENOUGH = 0.01
 """Gain of log posterior of a step below which a fit has ended."""
 
+_NEXT_TO_NONE = 1e-9
+"""Width of what there is none of."""
+
 LOG_2PI = float(np.log(2.0 * np.pi))
 
 
@@ -140,9 +143,9 @@ class Fitter:
         """Return the prior deviations of what is linear, all about zero."""
         runs, loading = len(self.rows.runs), self.problem.loading
         loadings = [loading] * runs if loading else []
-        return np.array(
-            [SOUND_GAIN, *[SOUND_ZERO] * (2 * runs), *loadings, *[1.0] * self._shifts.shape[1]]
-        )
+        sound = np.array([SOUND_GAIN, *[SOUND_ZERO] * (2 * runs)])
+        sound = np.full_like(sound, _NEXT_TO_NONE) if self.problem.computed else sound
+        return np.array([*sound, *loadings, *[1.0] * self._shifts.shape[1]])
 
     def linear_columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows q"]:
         """Return what one of each does to the records, in Pa."""

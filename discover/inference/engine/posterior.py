@@ -207,8 +207,13 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
     say
         Called with a line of text now and then.
     """
-    search = Search(Fitter(problem, problem.fitted), most, say).run()
-    alive = search.alive()
+    return posterior_of(Search(Fitter(problem, problem.fitted), most, say).run())
+
+
+@in_one_thread
+def posterior_of(search: Search) -> Posterior:
+    """Return the posterior over hypotheses that were fitted, wherever they come from."""
+    problem, alive = search.problem, search.alive()
     best = search.rank(alive[0]) if alive else 0.0
     near = [fit for fit in alive if search.rank(fit) > best - WINDOW][:_MOST]
     whole, judged = search, near

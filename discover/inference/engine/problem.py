@@ -94,6 +94,8 @@ class Problem:
         Relative deviation by which loadings of the sample differ, if each run is its own.
     noise
         Of the records, relative to their size, where it is known.
+    computed
+        Whether the records were computed, without what every sound instrument has a little of.
     """
 
     def __init__(
@@ -104,11 +106,12 @@ class Problem:
         predicted: Sequence[Run] = (),
         loading: float = 0.0,
         noise: float | None = None,
+        computed: bool = False,
     ):
         names = {e.name for e in candidates} | {e.name for e in declared.effects}
         beside = [make_effect(n.effect) for n in NUISANCES if n.effect not in names]
         self.declared, self.candidates = declared, tuple(candidates)
-        self.loading, self.noise = loading, noise
+        self.loading, self.noise, self.computed = loading, noise, computed
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
         effects = [*candidates, *beside]
@@ -138,13 +141,14 @@ class Problem:
         declared = {known.name for known in model.declared.effects}
         for name in (*declared, *(p.name for p in model.declared.free_parameters)):
             found |= self._by_mode(name)
-        found.setdefault(1, Prior("normal", 0.0, SOUND_CLOCK))
+        if not self.computed:
+            found.setdefault(1, Prior("normal", 0.0, SOUND_CLOCK))
         for nuisance in NUISANCES:
             effect = self.effects[nuisance.effect]
             first = effect.parameters[0]
             unit = ({"one": 1.0} | self.scales)[first.scale]
             position = model.positions(effect.name)[0]
-            if position in found or effect.name in declared:
+            if self.computed or position in found or effect.name in declared:
                 continue
             found[position] = Prior(
                 "normal", 0.0, nuisance.sound * first.first_trial * unit,

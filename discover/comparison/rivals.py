@@ -11,8 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
+from discover.comparison.bands import flow_run
+from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
+from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
+from discover.forward import make_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.identify import (
     LawStructure,
@@ -25,7 +28,9 @@ from discover.identify import (
 from discover.identify.soundness.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
+from discover.loop.loop import Found
 from discover.study.declared_model import DeclaredModel
+from discover.words import percent_of
 from tensor_library.law_terms import LawTerm, LawTerms, spell
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
@@ -37,6 +42,9 @@ SEPARATED = 1e-2
 """Relative difference that an experiment can be expected to see."""
 
 MOST_RIVALS = 8
+
+_POSSIBLE = 0.01
+"""Probability from which on a hypothesis is a rival."""
 
 FOUND = "the law found"
 """Name of the chosen law among those at which the structure is analysed."""
@@ -85,64 +93,88 @@ class Rival:
         }
 
 
-def find_rivals(
+def exact_twins(
     terms: Sequence[LawTerm],
-    met: Iterable[Mapping[str, Any]],
     model: DeclaredModel,
     flows: Sequence[Flow],
     library: TermLibrary | None = None,
-    predictions: Mapping[str, Stresses | None] | None = None,
 ) -> list[Rival]:
-    """Return rivals of a law: exact twins first, then what the data do not rule out, closest first.
+    """Return laws that give the same σ12 in every shear flow, the law found put aside.
 
     Parameters
     ----------
-    met
-        Rivals that the sparse search met: ``support``, ``coefficients``, ``inner``, ``text``.
+    terms
+        Of the law found.
     model
         The known part.
     flows
-        Training flows, which the rivals have to fit, and tests, which may separate them.
+        Training and test flows.
     library
-        Terms that the search had. Twins are sought beyond them too, in the basis with up to one
-        invariant: the fluid need not keep to the library that somebody chose.
-    predictions
-        Of the chosen law, by the key of the flow, where they are known already.
+        The terms that were searched; a twin may be outside.
     """
     chosen = LawTerms.of(terms)
-    searched = () if library is None else library.terms
     basis = build_library(degree=1)
+    searched = [] if library is None else list(library.terms)
     library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    flows = [*seen, *unseen]
-    reference = predictions
-    if reference is None:
-        reference = _simulate(chosen, model, flows)
-    candidates: dict[frozenset[str], Rival] = {}
     twins = find_twins(library, chosen, model.law)
     twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
-    met = list(met)
-    # all of them in one program, each with zeros for the terms of the others
-    supports = [*(twin.law.coefficients for twin in twins), *(row["support"] for row in met)]
-    names = list(dict.fromkeys(name for support in supports for name in support))
-    for twin in twins:
+    if not twins:
+        return []
+    reference = _simulate(chosen, model, [*seen, *unseen])
+    names = list(dict.fromkeys(name for twin in twins for name in twin.law.coefficients))
+    found: dict[frozenset[str], Rival] = {}
+    for twin in twins[:MOST_RIVALS]:
         beyond = [name for name in twin.law.coefficients if parse_term(name) not in searched]
         rival = _rival_of(twin, beyond if searched else [])
-        predictions = _simulate(rival.law, model, flows, names)
-        rival = _judge(rival, reference, predictions, seen, unseen)
-        if rival is not None and (rival.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
-            candidates.setdefault(frozenset(twin.law.coefficients), rival)
-    for row in met:
-        other = LawTerms.from_json(row)
-        if frozenset(other.coefficients) in candidates or len(candidates) >= MOST_RIVALS:
+        predictions = _simulate(rival.law, model, [*seen, *unseen], names)
+        judged = judge_rival(rival, reference, predictions, seen, unseen)
+        if judged is not None and (judged.errors_to_chosen["sigma12"] or 0.0) <= EXACT:
+            found.setdefault(frozenset(twin.law.coefficients), judged)
+    return list(found.values())
+
+
+def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> list[Rival]:
+    """Return the other laws that the posterior holds possible, the likeliest first.
+
+    Those whose effects of the fluid are no sum of library terms have no spelling and are left out.
+
+    Parameters
+    ----------
+    flows
+        Those in which they are told from the likeliest.
+    runs
+        Runs as recorded, by name.
+    """
+    fits = [(f, p) for f, p in found.posterior.fits if p >= _POSSIBLE][: 1 + MOST_RIVALS]
+    named = [(f, p, t) for f, p in fits[1:] if (t := terms_of(f, found)) is not None]
+    if not named:
+        return []
+    best, own = fits[0][0], terms_of(fits[0][0], found)
+    asked = [flow_run(flow, found, runs) for flow in flows]
+    with np.errstate(all="ignore"):
+        thetas = [best.theta, *(fit.theta for fit, _, _ in named)]
+        predicted = found.posterior.problem.model.observables(thetas, make_batch(asked))
+    told = [
+        {
+            flow.key: dict(zip(QUANTITIES, rows[: len(flow.times)].T, strict=True))
+            for flow, rows in zip(flows, law, strict=True)
+        }
+        for law in predicted
+    ]
+    seen = [flow for flow in flows if flow.kind == "training"]
+    unseen = [flow for flow in flows if flow.kind != "training"]
+    rivals = []
+    for (_, share, terms), predictions in zip(named, told[1:], strict=True):
+        law = LawTerms.of(terms)
+        if own is not None and law.coefficients.keys() == LawTerms.of(own).coefficients.keys():
             continue
-        reason = row.get("text") or "The data fit it as well within their noise."
-        predictions = _simulate(other, model, flows, names)
-        rival = _judge(Rival(other, reason), reference, predictions, seen, unseen)
+        reason = f"Its probability beside these runs is {percent_of(share)}."
+        rival = judge_rival(Rival(law, reason), told[0], predictions, seen, unseen)
         if rival is not None:
-            candidates[frozenset(other.coefficients)] = rival
-    return list(candidates.values())
+            rivals.append(rival)
+    return rivals
 
 
 def _concerns_shear(twin: Twin, size: int) -> bool:
@@ -172,7 +204,8 @@ def _simulate(
     return {flow.key: predict(fluid, flow) for flow in flows}
 
 
-def _judge(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
+def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | None:
+    """Return a rival with its differences from the law found; None if it cannot be followed."""
     worst: dict[str, float | None] = dict.fromkeys(QUANTITIES)
     separation, place = 0.0, None
     for flow in [*seen, *unseen]:

@@ -1,20 +1,16 @@
 """What one learner found and predicts, in a form that can be kept in a file."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Real
 
-from discover.comparison.outcomes.constant import Constant
-from discover.comparison.outcomes.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
-from discover.forward.enough_steps import in_enough_steps
-from discover.forward.grids.flow_batch import lay_out
+from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.results.term_tables import TermTables
-from discover.learners.results.weighted_laws import WeightedLaws
 from discover.plain_json import plain
 
 Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
@@ -40,18 +36,12 @@ class LearnerOutcome(TermTables):
     message
         One sentence on how the fit ended.
     predictions
-        By the key of the flow; None where the law runs away. Where weighted laws make a band, its
-        middle.
+        By the key of the flow; None where the law runs away.
     physics
         Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
     bands
-        By the key of the flow: lowest and highest prediction of each quantity over the laws that
-        fit as well; of weighted laws their 95 % band. None for a flow in which one of them, or half
-        of the weight, runs away; empty where there is one law.
-    resolution
-        Relative misfit of the training runs that arithmetic may leave.
-    constants
-        Constants that were fitted along, by name.
+        By the key of the flow: lowest and highest prediction of each quantity over the members of
+        an ensemble. None for a flow in which one of them runs away; empty where there is one law.
     """
 
     learner: str
@@ -63,8 +53,6 @@ class LearnerOutcome(TermTables):
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, Limits | None] = field(default_factory=dict)
-    resolution: float = 0.0
-    constants: Mapping[str, Constant] = field(default_factory=dict)
 
     def half_widths(self, flow: Flow) -> dict[str, float]:
         """Return the root-mean-square half-width of each band over that of the prediction.
@@ -85,11 +73,6 @@ class LearnerOutcome(TermTables):
     def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
         """Return the outcome of a fit, with the fluid it found simulated in every flow."""
         predictions = {flow.key: predict(fluid, flow) for flow in flows}
-        if result.weighted is None:
-            bands = _bands(result, fluid, flows)
-        else:
-            middle, bands = _weighted_bands(result.weighted, fluid, flows)
-            predictions |= middle
         return cls(
             result.learner,
             result.terms,
@@ -98,7 +81,7 @@ class LearnerOutcome(TermTables):
             result.details,
             result.message,
             predictions,
-            bands=bands,
+            bands=_bands(result, fluid, flows),
         )
 
     def to_state(self) -> dict[str, Any]:
@@ -121,8 +104,6 @@ class LearnerOutcome(TermTables):
                 else {q: [v.tolist() for v in pair] for q, pair in b.items()}
                 for name, b in self.bands.items()
             },
-            "resolution": self.resolution,
-            "constants": {name: asdict(constant) for name, constant in self.constants.items()},
         }
 
     @classmethod
@@ -149,15 +130,7 @@ class LearnerOutcome(TermTables):
                 else {q: (np.asarray(low), np.asarray(high)) for q, (low, high) in b.items()}
                 for name, b in state.get("bands", {}).items()
             },
-            float(state.get("resolution", 0.0)),
-            {
-                name: Constant(**{**row, "ci95": row["ci95"] and tuple(row["ci95"])})
-                for name, row in state.get("constants", {}).items()
-            },
         )
-
-
-_STRAIN_STEP = 0.2
 
 
 def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
@@ -178,26 +151,3 @@ def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, 
             rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
             bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
     return bands
-
-
-def _weighted_bands(
-    weighted: WeightedLaws, fluid: Fluid, flows: list[Flow]
-) -> tuple[dict[str, Stresses], dict[str, Limits | None]]:
-    """Return the middle of the band of every flow, and its limits."""
-    shown = [flow for flow in flows if flow.kind in DRAWN]
-    if not shown:
-        return {}, {}
-    protocols, times = [flow.protocol for flow in shown], [flow.times for flow in shown]
-    limits = {"strain_step": _STRAIN_STEP, "relaxation_time": fluid.settling_time}
-    found = weighted.bands(
-        (fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity),
-        in_enough_steps(fluid, lay_out(protocols, times, **limits)),
-        [len(t) for t in times],
-    )
-    middle, bands = {}, {}
-    for flow, band in zip(shown, found, strict=True):
-        bands[flow.key] = None
-        if band is not None:
-            middle[flow.key] = {q: band[q][1] for q in QUANTITIES}
-            bands[flow.key] = {q: (band[q][0], band[q][2]) for q in QUANTITIES}
-    return middle, bands

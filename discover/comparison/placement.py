@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.flows import Flow
 
 MARGIN = 1.05
 """What exceeds the fitted flows by less than this factor is inside: samples of one cycle hit its

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.comparison.instrument.absorbed import ONLY_LOOP
+from discover.comparison.absorbed import ONLY_LOOP
 from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Record, SignalEffect
 from discover.errors import InputError
 from discover.forward import TransientFlows, make_batch

@@ -1,0 +1,248 @@
+"""What a posterior predicts of any flow: σ12, N1 and N2 with their 95 % bands."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import t as student
+
+from discover.comparison.flows import MEASURED, Flow, columns_of
+from discover.dataset import Run
+from discover.effects import ConstitutiveEffect
+from discover.forward import make_batch
+from discover.inference.engine.bands import quantiles
+from discover.inference.engine.fits import Fit
+from discover.inference.engine.problem import NUISANCES
+from discover.linear_algebra_threads import in_one_thread
+from discover.loop.expected_errors import weighed_laws
+from discover.loop.loop import Found
+
+_DRAWS = 6
+"""Pairs of draws of the constants of a hypothesis."""
+
+_LEAST = 1e-3
+"""Weight below which a hypothesis changes no band."""
+
+_RUNS_AWAY = 1e3
+"""Times the largest stress recorded or predicted by the known part, which no sound law exceeds."""
+
+_MOST_MISSED = 1.0
+_LOST = 0.5
+"""Weight of hypotheses that may run away in a flow in which the others still make a band."""
+
+_RATIO = -2.0 / 7.0
+"""Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
+at small strain with independent alignment; measured ratios lie between that and zero]."""
+
+_SEED = 20261128
+
+
+@dataclass(frozen=True)
+class Band:
+    """σ12 (or what is recorded), N1 and N2 of one flow with their 95 % bands, in Pa.
+
+    Attributes
+    ----------
+    middle, low, high
+        By quantity, shape (n,); not finite where no claim can be made.
+    """
+
+    middle: Mapping[str, Float[np.ndarray, " n"]]
+    low: Mapping[str, Float[np.ndarray, " n"]]
+    high: Mapping[str, Float[np.ndarray, " n"]]
+
+    def half_widths(self) -> dict[str, float]:
+        """Return the root-mean-square half-width of each over that of its middle, N2's of N1's."""
+        found = {}
+        for quantity in self.middle:
+            size = np.linalg.norm(self.middle["N1" if quantity == "N2" else quantity])
+            width = np.linalg.norm(self.high[quantity] - self.low[quantity])
+            found[quantity] = float(0.5 * width / size) if size > 0.0 else np.nan
+        return found
+
+    def claiming(self, quantities: Sequence[str]) -> "Band":
+        """Return the band with limits for some quantities alone."""
+
+        def of(limits: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+            return {
+                name: values if name in quantities else np.full_like(values, np.nan)
+                for name, values in limits.items()
+            }
+
+        return replace(self, low=of(self.low), high=of(self.high))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One hypothesis with its weight; `is_none` where it is not all there is."""
+
+    fit: Fit
+    weight: float
+    is_none: bool
+
+
+@in_one_thread
+def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
+    """Return the band of each flow, by its key; those in which most hypotheses run away have none.
+
+    Hypotheses are weighed by their evidence, their constants drawn. Where none is all there is, all
+    that describe the runs as well count, N1 and N2 may differ as these do, every stress is missed
+    by what runs left out are, in proportion to the rate beyond the fastest, and N2 is as likely
+    anything from −2/7 N1 to zero. Measured runs are predicted as recorded, flaws of the instrument
+    included, other flows for the fluid alone.
+
+    Parameters
+    ----------
+    runs
+        Runs as recorded, by name.
+    """
+    parts = _parts(found)
+    if not parts or not flows:
+        return {}
+    asked = [flow_run(flow, found, runs) for flow in flows]
+    as_recorded = [flow.kind in MEASURED for flow in flows]
+    out: dict[str, Band] = {}
+    for recorded in (True, False):
+        at = [i for i, one in enumerate(as_recorded) if one is recorded]
+        if at:
+            some = [asked[i] for i in at]
+            bands = _bands(found, parts, some, recorded)
+            for i, band in zip(at, bands, strict=True):
+                if band is not None:
+                    out[flows[i].key] = band
+    return out
+
+
+def _parts(found: Found) -> list[_Part]:
+    posterior = found.posterior
+    none = posterior.unexplained
+    parts = [_Part(fit, (1.0 - none) * share, False) for fit, share in posterior.fits]
+    parts += [_Part(fit, none * share, True) for fit, share in weighed_laws(posterior)]
+    return [part for part in parts if part.weight > _LEAST and part.fit.covariance is not None]
+
+
+def flow_run(flow: Flow, found: Found, runs: Mapping[str, Run]) -> Run:
+    """Return the run that a flow asks for; one at hand with its steps placed where they are."""
+    run = runs.get(flow.name) if flow.kind in MEASURED else None
+    if run is None:
+        return run_of(flow)
+    placed = [one for one in (*found.task.fitted, *found.task.held_out) if one.name == run.name]
+    return replace(run, rate_steps=placed[0].rate_steps) if placed else run
+
+
+def run_of(flow: Flow) -> Run:
+    """Return a flow as a run of which nothing is recorded."""
+    nothing = np.zeros(len(flow.times))
+    return Run(flow.name, flow.times, flow.protocol, flow.rate, nothing)
+
+
+def _bands(
+    found: Found, parts: Sequence[_Part], runs: Sequence[Run], as_recorded: bool
+) -> list[Band | None]:
+    problem = found.posterior.problem
+    batch = make_batch(runs)
+    drawn = [_drawn(found, part.fit, as_recorded) for part in parts]
+    thetas = np.concatenate([one[0] for one in drawn])
+    moduli = np.concatenate([one[1] for one in drawn])
+    gains = np.concatenate([one[2] for one in drawn])
+    with np.errstate(all="ignore"):
+        predicted = np.array(problem.model.observables(thetas, batch, moduli))
+        plain = np.array(problem.model.observables([problem.zero], batch))[0]
+    predicted[..., 0] *= gains[:, None, None]
+    largest = float(np.max(np.abs(problem.fitted.recorded)))
+    each, bands = 1 + 2 * _DRAWS, []
+    for i, run in enumerate(runs):
+        n = len(run)
+        values = predicted[:, i, :n].reshape(len(parts), each, n, 3)
+        known = np.nan_to_num(np.abs(plain[i, :n]), nan=0.0, posinf=0.0)
+        limit = _RUNS_AWAY * max(largest, float(np.max(known, initial=0.0)))
+        bands.append(_band(found, parts, values, run, limit))
+    return bands
+
+
+def _drawn(found: Found, fit: Fit, as_recorded: bool):
+    """Return constants, moduli and gains of a hypothesis: the likeliest, then pairs of draws."""
+    problem = found.posterior.problem
+    assert fit.covariance is not None
+    root = np.linalg.cholesky(fit.covariance)
+    lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(root)))
+    moved = np.concatenate([np.zeros((1, len(root))), lot, -lot]) @ root.T
+    p, runs = len(fit.priors), len(problem.fitted.runs)
+    thetas = np.array([fit.at(fit.coordinates + one[:p]) for one in moved])
+    linear = fit.linear + moved[:, p:]
+    gains = 1.0 + linear[:, 0] if as_recorded else np.ones(len(moved))
+    moduli = np.tile(problem.moduli, (len(moved), 1))
+    if problem.modulus_root is not None:
+        shifts = linear[:, 1 + (2 + bool(problem.loading)) * runs :] @ problem.modulus_root.T
+        moduli[:, : shifts.shape[1]] += shifts
+    if not as_recorded:
+        thetas[:, _of_bench(found)] = problem.zero[_of_bench(found)]
+    return thetas, moduli, gains
+
+
+def _of_bench(found: Found) -> list[int]:
+    """Return positions of constants of the instrument, of the clock too where it is not fitted."""
+    problem, model = found.posterior.problem, found.posterior.problem.model
+    names = {n for n, e in problem.effects.items() if not isinstance(e, ConstitutiveEffect)}
+    names |= {nuisance.effect for nuisance in NUISANCES}
+    at = [place for name in names for place in model.positions(name)]
+    return at if 1 in problem.declared.free_positions else [1, *at]
+
+
+def _band(
+    found: Found,
+    parts: Sequence[_Part],
+    values: Float[np.ndarray, "parts draws n 3"],
+    run: Run,
+    limit: float,
+) -> Band | None:
+    """Return the mixture of the hypotheses that can be followed."""
+    kept, weights, middles, variances = 0.0, [], [], []
+    first = values[:, 0]
+    with np.errstate(invalid="ignore"):
+        sound = np.all(np.abs(values[..., 0]) < limit, axis=2)
+    for part, own, main, fine in zip(parts, values, first, sound, strict=True):
+        if not fine[0]:
+            continue
+        kept += part.weight
+        off = own[1:][fine[1:]] - main
+        variance = np.mean(off**2, axis=0) if len(off) else np.zeros_like(main)
+        size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]]
+        if part.is_none:
+            variance = variance + (_missed(found, part.fit, run) * size) ** 2
+            prior = main.copy()
+            prior[:, 2] = 0.5 * _RATIO * main[:, 1]
+            wide = variance.copy()
+            wide[:, 2] += (_RATIO * main[:, 1]) ** 2 / 12.0
+            for middle, own_variance in ((main, variance), (prior, wide)):
+                weights.append(0.5 * part.weight)
+                middles.append(middle)
+                variances.append(own_variance)
+            continue
+        weights.append(part.weight)
+        middles.append(main)
+        variances.append(variance)
+    total = sum(part.weight for part in parts)
+    if not weights or kept < _LOST * total:
+        return None
+    shape = middles[0].shape
+    flat = [np.array(one).reshape(len(weights), -1) for one in (middles, variances)]
+    told = np.all(np.isfinite(flat[0]), axis=0) & np.all(np.isfinite(flat[1]), axis=0)
+    limits = np.full((3, flat[0].shape[1]), np.nan)
+    parts_told = (np.array(weights), flat[0][:, told], flat[1][:, told])
+    limits[:, told] = np.array(quantiles(*parts_told, (0.025, 0.5, 0.975)))
+    low, middle, high = limits.reshape(3, *shape)
+    return Band(columns_of(middle), columns_of(low), columns_of(high))
+
+
+def _missed(found: Found, fit: Fit, run: Run) -> float:
+    """Return the deviation, over its size, by which a run may be missed.
+
+    As few runs tell a deviation badly, Student's quantile is the wider.
+    """
+    missed, fastest = found.posterior.missed(fit), found.posterior.problem.fitted.fastest
+    runs = len(missed)
+    wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
+    beyond = max(float(np.max(np.abs(run.rate))) / float(np.max(fastest)), 1.0)
+    return float(min(wider * np.max(missed) * beyond, _MOST_MISSED))

@@ -1,0 +1,214 @@
+"""The classical laws fitted to the same runs, each a hypothesis beside the same instrument."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from discover.comparison.flows import Flow, columns_of, of_recorded, relative_errors
+from discover.comparison.known_part import Frame
+from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
+from discover.forward import DeclaredModel, make_batch
+from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.problem import Problem
+from discover.laws import LAWS
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.loop.loop import Found, with_law
+
+_AS_EFFECTS = {
+    "ucm": (),
+    "johnson_segalman": ("non_affine_motion",),
+    "giesekus": ("giesekus_mobility",),
+    "ptt_linear": ("ptt_linear",),
+    "ptt_exponential": ("ptt_exponential",),
+}
+"""Effects that make each law of upper convected Maxwell."""
+
+CLASSICAL = tuple(_AS_EFFECTS)
+"""Laws that every comparison is held against."""
+
+_STARTS = (0.03, 0.3)
+"""Shares of the range of a constant from which its fits start."""
+
+
+@dataclass(frozen=True)
+class ClassicalFit:
+    """A classical law fitted to the training runs, with the effects of the instrument found.
+
+    Attributes
+    ----------
+    law
+        Key of `LAWS`.
+    parameters
+        Its constants; empty where it cannot be integrated.
+    ci95
+        Their 95 % intervals.
+    misfit
+        Relative misfit of the fitted runs, mean over runs; None where it cannot be integrated.
+    criterion
+        −2 times the log evidence, above that of the best of these laws; None likewise.
+    errors
+        Relative errors of what is recorded by flow, in flows that no fit saw.
+    """
+
+    law: str
+    parameters: dict[str, float]
+    ci95: dict[str, tuple[float, float]]
+    misfit: float | None
+    criterion: float | None
+    errors: dict[str, dict[str, float | None]]
+
+    @property
+    def title(self) -> str:
+        """Name as a rheologist writes it, with the constants."""
+        return LAWS[self.law].described(self.parameters)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fit as ``comparison.json`` holds it."""
+        return {
+            "parameters": self.parameters,
+            "ci95": self.ci95,
+            "misfit": self.misfit,
+            "criterion": self.criterion,
+            "errors": self.errors,
+        }
+
+
+def fit_classical_laws(
+    found: Found, frame: Frame, further: Sequence[str] = ()
+) -> tuple[ClassicalFit, ...]:
+    """Fit the classical laws to the training runs and judge them in flows that no fit saw.
+
+    The declared law is set aside; modes, solvent and known effects stay.
+
+    Parameters
+    ----------
+    found
+        The search among hypotheses, whose runs are fitted.
+    frame
+        The flows that judge.
+    further
+        Names of more laws.
+    """
+    judged = [flow for flow in frame.shown if flow.kind in ("held_out", "test")]
+    best = found.posterior.fits[0][0] if found.posterior.fits else None
+    effects = found.posterior.problem.effects
+    bench = [] if best is None else [
+        effects[name] for name in best.names if not isinstance(effects[name], ConstitutiveEffect)
+    ]  # fmt: skip
+    tried = _beside_maxwell(found, bench)
+    for name in dict.fromkeys(further):
+        if name not in tried:
+            tried[name] = _of_law(found, name, bench)
+    least = min(
+        (-2.0 * fit.log_evidence for _, fit in tried.values() if _is_sound(fit)), default=0.0
+    )
+    return tuple(_result(name, *one, judged, least) for name, one in tried.items())
+
+
+def _beside_maxwell(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
+    """Return the classical laws as effects beside upper convected Maxwell, fitted side by side."""
+    problem = found.posterior.problem
+    declared = problem.declared
+    is_maxwell = isinstance(declared.law, UpperConvectedMaxwell) and declared.law.linear_relaxation
+    if declared.by_mode or not is_maxwell or not _holds_classical(problem):
+        bare = with_law(replace(declared, by_mode=()), "ucm")
+        known = {effect.name for effect in (*declared.effects, *bench)}
+        names = {name for some in _AS_EFFECTS.values() for name in some} - known
+        problem = _problem(found, bare, [*map(make_effect, sorted(names)), *bench])
+    fitter = Fitter(problem, problem.fitted)
+    names = [effect.name for effect in bench]
+    owners, starts = [], []
+    for law, own in _AS_EFFECTS.items():
+        for share in _STARTS if own else (0.0,):
+            theta = problem.zero.copy()
+            for name in own:
+                at = problem.model.positions(name)[0]
+                theta[at] = share * min(float(problem.model.high[at]), 1.0)
+            owners.append(law)
+            starts.append(fitter.start((*own, *names), theta))
+    best: dict[str, tuple[Fitter, Fit]] = {}
+    for law, fit in zip(owners, fitter.fit(starts), strict=True):
+        if law not in best or fit.log_evidence > best[law][1].log_evidence:
+            best[law] = fitter, fit
+    return best
+
+
+def _holds_classical(problem: Problem) -> bool:
+    candidates = {effect.name for effect in problem.candidates}
+    return all(set(own) <= candidates for own in _AS_EFFECTS.values())
+
+
+def _problem(found: Found, declared: DeclaredModel, effects: Sequence[AbstractEffect]) -> Problem:
+    task = found.task
+    return Problem(declared, effects, task.fitted, (), task.loading, task.noise, task.computed)
+
+
+def _of_law(found: Found, name: str, bench: Sequence[AbstractEffect]) -> tuple[Fitter, Fit]:
+    """Return any named law in place of the declared one."""
+    declared = with_law(replace(found.posterior.problem.declared, by_mode=()), name)
+    problem = _problem(found, declared, bench)
+    fitter = Fitter(problem, problem.fitted)
+    names = [effect.name for effect in bench]
+    starts = [problem.zero]
+    for share in _STARTS:
+        moved = problem.zero.copy()
+        for i, parameter in enumerate(problem.model.declared.free_parameters):
+            low, high = float(parameter.low), float(parameter.high)
+            if np.isfinite(high):
+                moved[2 + i] = low + share * (high - low)
+        starts.append(moved)
+    fits = fitter.fit([fitter.start(names, theta) for theta in starts])
+    return fitter, max(fits, key=lambda fit: fit.log_evidence)
+
+
+def _is_sound(fit: Fit) -> bool:
+    return bool(np.isfinite(fit.log_evidence))
+
+
+def _result(
+    name: str, fitter: Fitter, fit: Fit, judged: Sequence[Flow], least: float
+) -> ClassicalFit:
+    if not _is_sound(fit):
+        nothing = {flow.name: of_recorded(relative_errors(None, flow.reference), flow)
+                   for flow in judged}  # fmt: skip
+        return ClassicalFit(name, {}, {}, None, None, nothing)
+    model, rows = fitter.problem.model, fitter.rows
+    assert fit.covariance is not None
+    values, ends = {}, {}
+    places = {p.name: 2 + i for i, p in enumerate(model.declared.free_parameters)}
+    for effect in _AS_EFFECTS.get(name, ()):
+        own = fitter.problem.effects[effect].parameters
+        places |= {p.name: at for p, at in zip(own, model.positions(effect), strict=True)}
+    for constant, at in places.items():
+        if constant not in LAWS[name].parameters:
+            continue
+        prior, place = fit.priors[at], fit.free.index(at)
+        half = 1.96 * float(np.sqrt(fit.covariance[place, place]))
+        middle = fit.coordinates[place]
+        low, high = (prior.to_value(float(np.clip(end, *prior.ends)))
+                     for end in (middle - half, middle + half))  # fmt: skip
+        values[constant], ends[constant] = float(fit.theta[at]), (low, high)
+    off = (rows.recorded - fitter.record(fit)) / rows.size
+    misfit = float(np.mean(rows.rms_by_run(off)))
+    return ClassicalFit(
+        name, values, ends, misfit, float(-2.0 * fit.log_evidence - least),
+        _errors(fitter, fit, judged),
+    )  # fmt: skip
+
+
+def _errors(fitter: Fitter, fit: Fit, judged: Sequence[Flow]) -> dict:
+    from discover.comparison.bands import run_of
+
+    if not judged:
+        return {}
+    batch = make_batch([run_of(flow) for flow in judged])
+    with np.errstate(all="ignore"):
+        predicted = fitter.problem.model.observables([fit.theta], batch)[0]
+    errors = {}
+    for flow, rows in zip(judged, predicted, strict=True):
+        values = rows[: len(flow.times)]
+        told = columns_of(values) if np.all(np.isfinite(values[:, 0])) else None
+        errors[flow.name] = of_recorded(relative_errors(told, flow.reference), flow)
+    return errors

@@ -1,0 +1,220 @@
+"""The posterior of a comparison: a search's hypotheses and what the learners propose, weighed."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discover.effects import AbstractEffect, ConstitutiveEffect, named_effects
+from discover.effects.library_term import library_term
+from discover.inference.engine.fits import Fit
+from discover.inference.engine.posterior import posterior_of
+from discover.learners.results.recovered_term import RecoveredTerm
+from discover.loop.loop import Found, Say, search_runs
+from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel, forward_model
+from discover.study.schema import Study
+from tensor_library.law_terms import LawTerm
+from tensor_library.library import TermLibrary
+
+_EFFECTS = {
+    "sigma.sigma": ("giesekus_mobility", 1.0),
+    "sigma.gammadot+gammadot.sigma": ("non_affine_motion", 2.0),
+    "tr(sigma)*sigma": ("ptt_linear", 1.0),
+}
+"""Terms that are effects with a name, and the constant of the effect over the coefficient."""
+
+_EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
+_NEAR = 0.3
+"""Distance of a coefficient from one within which the exponential term is exponential PTT."""
+
+MOST_EFFECTS = 3
+_HALF_BAND = 1.959963984540054
+
+
+def search_hypotheses(
+    study: Study, data: StudyData, declared: DeclaredModel, library: TermLibrary, say: Say
+) -> Found:
+    """Return the posterior over what a search finds beside the known part.
+
+    Candidates are every effect with a name, of fluid and instrument, and every library term.
+
+    Parameters
+    ----------
+    data
+        Runs as recorded.
+    declared
+        The known part; what of it is to be fitted is fitted with every hypothesis.
+    library
+        Candidate terms of the study.
+    say
+        Called with a line of text now and then.
+    """
+    dataset = data.dataset
+    runs = {run.name: run for run in dataset.runs}
+    fit = list(data.fit.names)
+    if study.compare.use_normal_stresses:
+        for name in data.fit.names:
+            for quantity in ("N1", "N2"):
+                if getattr(runs[name], _COLUMNS[quantity]) is not None:
+                    also = runs[name].observing(quantity)
+                    dataset = replace(dataset, runs=(*dataset.runs, also))
+                    fit.append(also.name)
+    known = {effect.name for effect in declared.effects}
+    named = [e for e in named_effects().values() if not e.on_request and e.name not in known]
+    terms = [
+        library_term(term)
+        for term in library.terms
+        if term.closed_form is None and term.name not in _EFFECTS
+    ]
+    return search_runs(
+        dataset,
+        forward_model(declared),
+        fit,
+        list(data.held_out.names),
+        [*named, *terms],
+        MOST_EFFECTS,
+        noise=study.loop.noise,
+        most_samples=study.compare.most_samples,
+        progress=say,
+        loading=study.compare.loading,
+        computed=study.data.synthetic is not None,
+    )
+
+
+_COLUMNS = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
+
+
+@dataclass(frozen=True)
+class Proposed:
+    """What a learner proposed, as a hypothesis fitted with all that is free.
+
+    Attributes
+    ----------
+    terms
+        Its terms with coefficients and intervals of that fit; as the learner had them where the
+        hypothesis cannot be fitted.
+    share
+        Posterior probability of the hypothesis among all that were fitted, were one of them all
+        there is; zero where it was not fitted.
+    fit
+        The hypothesis; None where a term is none that the engine knows.
+    """
+
+    terms: tuple[RecoveredTerm, ...]
+    share: float = 0.0
+    fit: Fit | None = None
+
+
+def with_proposals(
+    found: Found, terms: Mapping[str, Sequence[RecoveredTerm]]
+) -> tuple[Found, dict[str, Proposed]]:
+    """Return the posterior over the search's hypotheses and those of learners, and each of these.
+
+    A learner's terms stand beside what the likeliest hypothesis holds of the instrument.
+
+    Parameters
+    ----------
+    terms
+        By learner.
+    """
+    search, problem = found.posterior.search, found.posterior.problem
+    alive = search.alive()
+    if not alive:
+        return found, {name: Proposed(tuple(some)) for name, some in terms.items()}
+    best = alive[0]
+    of_fluid = [n for n in best.names if isinstance(problem.effects[n], ConstitutiveEffect)]
+    bench = [name for name in best.names if name not in of_fluid]
+    keys, starts = {}, []
+    for learner, some in terms.items():
+        values = _as_effects(some, problem.effects)
+        if values is None:
+            continue
+        theta = problem.without(best.theta, *of_fluid)
+        for name, value in values.items():
+            theta[problem.model.positions(name)] = value
+        names = tuple(sorted({*values, *bench}))
+        keys[learner] = frozenset(names)
+        if keys[learner] not in search.found and keys[learner] not in {
+            frozenset(start.names) for start in starts
+        }:
+            starts.append(search.fitter.start(names, theta, best.linear))
+    search.add(starts)
+    if any(np.isfinite(search.found[frozenset(s.names)].log_evidence) for s in starts):
+        memory = found.posterior.memory.get("by_mode")
+        found = replace(found, posterior=posterior_of(search))
+        if memory is not None:
+            found.posterior.memory["by_mode"] = memory
+    shares = {frozenset(fit.names): share for fit, share in found.posterior.fits}
+    proposed = {}
+    for learner, some in terms.items():
+        fit = search.found.get(keys[learner]) if learner in keys else None
+        if fit is None or fit.covariance is None or not np.isfinite(fit.log_posterior):
+            proposed[learner] = Proposed(tuple(some))
+            continue
+        share = shares.get(keys[learner], 0.0)
+        proposed[learner] = Proposed(_refitted(some, fit, found), share, fit)
+    return found, proposed
+
+
+def _as_effects(
+    terms: Sequence[RecoveredTerm], effects: Mapping[str, AbstractEffect]
+) -> dict[str, list[float]] | None:
+    """Return constants of the effects that terms are, by name; None where one is no effect."""
+    found = {}
+    for term in terms:
+        name, factor = _EFFECTS.get(term.term, (term.term, 1.0))
+        values = [factor * term.coefficient]
+        if term.term == _EXPONENTIAL:
+            if abs(term.coefficient - 1.0) > _NEAR:
+                return None
+            name, values = "ptt_exponential", [term.inner["epsilon"]]
+        effect = effects.get(name)
+        if effect is None or len(effect.parameters) != len(values):
+            return None
+        pairs = zip(effect.parameters, values, strict=True)
+        if any(not p.low <= value <= p.high for p, value in pairs):
+            return None
+        found[name] = values
+    return found
+
+
+def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[RecoveredTerm, ...]:
+    """Return terms with the coefficients of a fit and their 95 % intervals."""
+    model, out = found.posterior.problem.model, []
+    assert fit.covariance is not None
+    for term in terms:
+        name, factor = _EFFECTS.get(term.term, (term.term, 1.0))
+        name = "ptt_exponential" if term.term == _EXPONENTIAL else name
+        at = model.positions(name)[0]
+        prior, place = fit.priors[at], fit.free.index(at)
+        half = _HALF_BAND * float(np.sqrt(fit.covariance[place, place]))
+        middle = fit.coordinates[place]
+        ends = (np.clip(middle - half, *prior.ends), np.clip(middle + half, *prior.ends))
+        low, high = (prior.to_value(float(end)) / factor for end in ends)
+        value = float(fit.theta[at]) / factor
+        if term.term == _EXPONENTIAL:
+            inner = {"epsilon": value}
+            out.append(
+                replace(term, coefficient=1.0, inner=inner, inner_ci95={"epsilon": (low, high)})
+            )
+        else:
+            out.append(replace(term, coefficient=value, ci95=(low, high)))
+    return tuple(out)
+
+
+def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
+    """Return what a hypothesis adds to the law as library terms; None where it is no sum of these.
+
+    Effects of the instrument add nothing.
+    """
+    problem, terms = found.posterior.problem, []
+    for name in fit.names:
+        effect = problem.effects[name]
+        if not isinstance(effect, ConstitutiveEffect):
+            continue
+        added = effect.as_terms([float(v) for v in fit.theta[problem.model.positions(name)]])
+        if added is None:
+            return None
+        terms += added
+    return tuple(terms)

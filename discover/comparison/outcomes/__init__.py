@@ -1,1 +1,0 @@
-"""What each learner gave, on flows that neither saw."""

@@ -1,0 +1,190 @@
+"""What the data say of N1 and N2, which learners seldom see: open, or on which condition not.
+
+No data say that the law is in the library. So the best that can be said of a quantity that was not
+measured is conditional, and nothing is said where no law describes the data to the noise.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from discover.comparison.bands import Band
+from discover.comparison.flows import MEASURED, QUANTITIES, Flow
+from discover.comparison.rivals import law_structure
+from discover.identify import Structure
+from discover.protocols.kinematics import LINEAR_STRAIN, ONLY_STATES
+from discover.words import percent_of
+
+Determined = Literal["no", "if_the_law_is_in_the_library"]
+
+IN_LIBRARY: Determined = "if_the_law_is_in_the_library"
+
+NARROW = 0.1
+"""Relative half-width of a 95 % band up to which a quantity is said to be determined."""
+
+_NORMAL_STRESSES = ("N1", "N2")
+_NO_SIGNAL = "The records hold no signal, so they say nothing of {}."
+_ONLY_EXTENSION = "Only extension was measured, which does not say what a fluid does in shear."
+_UNEXPLAINED = "No law describes these runs to the noise{}."
+_FEW = (
+    "The law has {} terms and {} flows tested it. So many terms can follow so few flows of any "
+    "fluid. Fit more runs."
+)
+_TITLES = {"sigma12": "σ12"}
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What the data say of a quantity.
+
+    Attributes
+    ----------
+    quantity
+        One of `QUANTITIES`.
+    determined
+        On which condition the data decide it.
+    text
+        The reason, for a reader.
+    of_transients
+        Whether it is about transients alone, and not about steady and periodic states.
+    """
+
+    quantity: str
+    determined: Determined
+    text: str
+    of_transients: bool = False
+
+    @property
+    def title(self) -> str:
+        """The quantity as a reader knows it."""
+        if self.of_transients:
+            return "σ12 in transients"
+        return _TITLES.get(self.quantity, self.quantity)
+
+    @property
+    def undetermined(self) -> bool:
+        """Whether the data do not decide it."""
+        return self.determined == "no"
+
+    def leaves_open(self, quantity: str, flow: Flow) -> bool:
+        """Return whether it says that a quantity is not determined in a flow."""
+        if not self.undetermined or self.quantity != quantity:
+            return False
+        return not (self.of_transients and flow.is_of_states)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the statement as ``comparison.json`` holds it."""
+        return {
+            "quantity": self.quantity,
+            "undetermined": self.undetermined,
+            "determined": self.determined,
+            "text": self.text,
+        }
+
+
+def make_statements(
+    verdict: str,
+    flows: Sequence[Flow],
+    bands: Mapping[str, Band],
+    structure: Structure | None,
+    spread: Mapping[str, float | None],
+    normal_stresses_used: bool = False,
+    terms: int = 0,
+) -> list[Statement]:
+    """Return what the training data say of N1 and N2, with the reason.
+
+    Parameters
+    ----------
+    verdict
+        Of the comparison.
+    bands
+        By the key of the flow.
+    structure
+        What σ12 could say of the library at the law found.
+    spread
+        Relative difference of N1 and N2 between laws that describe the runs as well, where known.
+    normal_stresses_used
+        Whether measured normal stresses were part of the fit.
+    terms
+        Of the law found.
+    """
+    asked = [q for q in _NORMAL_STRESSES if not (normal_stresses_used and _is_measured(q, flows))]
+    if verdict == "no_signal":
+        return [Statement(q, "no", _NO_SIGNAL.format(q)) for q in asked]
+    training = [flow for flow in flows if flow.kind == "training"]
+    if training and not any(flow.in_shear for flow in training):
+        return [Statement(q, "no", _ONLY_EXTENSION) for q in QUANTITIES]
+    found = [Statement("sigma12", "no", ONLY_STATES, True)] if only_states(flows) else []
+    return [*found, *(_said_of(q, verdict, flows, bands, structure, spread, terms) for q in asked)]
+
+
+def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> Statement:
+    """Return the statement on one quantity; parameters as in `make_statements`."""
+    differ, of_n1 = spread.get(quantity), " of N1" if quantity == "N2" else ""
+    if verdict == "unexplained":
+        said = "" if differ is None else f"; laws as good differ by {percent_of(differ)}{of_n1}"
+        return Statement(quantity, "no", _UNEXPLAINED.format(said))
+    if only_states(flows):
+        return Statement(quantity, "no", ONLY_STATES)
+    at = law_structure(structure)
+    algebra = (
+        None if at is None else next((q for q in at.quantities if q.quantity == quantity), None)
+    )
+    if algebra is not None and algebra.verdict != "measured" and algebra.open:
+        return Statement(quantity, "no", algebra.text)
+    tested = flows_measured(flows)
+    if terms and tested <= terms:
+        return Statement(quantity, "no", _FEW.format(terms, tested))
+    half_width = _widest(quantity, flows, bands)
+    if half_width is None:
+        return Statement(quantity, "no", "In some flow the laws that fit run away.")
+    width = f"± {percent_of(max(half_width, 1e-5))}{of_n1} (95 %)"
+    if half_width > NARROW:
+        return Statement(quantity, "no", f"Its band is {width} at the widest.")
+    text = f"{width} at the widest, if the law is in the library."
+    return Statement(quantity, IN_LIBRARY, text)
+
+
+def _widest(quantity: str, flows: Sequence[Flow], bands: Mapping[str, Band]) -> float | None:
+    """Return the largest relative half-width in flows that no fit saw; None where one has none."""
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out") and flow.in_shear]
+    judged = judged or [flow for flow in flows if flow.kind == "training" and flow.in_shear]
+    widths = []
+    for flow in judged:
+        if not flow.records_shear_stress:
+            continue
+        band = bands.get(flow.key)
+        width = np.nan if band is None else band.half_widths()[quantity]
+        if not np.isfinite(width):
+            return None
+        widths.append(width)
+    return max(widths, default=None)
+
+
+def _is_measured(quantity: str, flows: Sequence[Flow]) -> bool:
+    return any(
+        flow.kind == "training" and quantity in flow.reference and not flow.is_truth
+        for flow in flows
+    )
+
+
+def only_states(flows: Sequence[Flow]) -> bool:
+    """Return whether all that was measured are steady or periodic states, and no transient."""
+    measured = [flow for flow in flows if flow.kind in MEASURED]
+    return bool(measured) and all(flow.is_of_states for flow in measured)
+
+
+def flows_measured(flows: Sequence[Flow]) -> int:
+    """Return how many flows were measured that a law could fail in.
+
+    Each state of a table is one, but none of an oscillation so small that it is linear.
+    """
+    return sum(_flows_in(flow) for flow in flows if flow.kind in MEASURED)
+
+
+def _flows_in(flow: Flow) -> int:
+    if flow.protocol.control == "oscillation":
+        return int(np.count_nonzero(np.asarray(flow.strain) > LINEAR_STRAIN))
+    return len(flow.times) if flow.is_of_states else 1
