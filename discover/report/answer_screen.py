@@ -38,6 +38,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 "symbol": symbol,
                 "inside": expected(one, "inside"),
                 "beyond": expected(one, "beyond"),
+                "known": one.is_known,
                 "note": one.note,
             }
             for symbol, one in rows
