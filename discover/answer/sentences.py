@@ -72,7 +72,7 @@ def where(answer: "Answer") -> str:
     one = answer.range
     plain = [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
     if plain and one.weissenberg is not None:
-        found.append(f"Wi ≤ {_three(one.weissenberg[1])}")
+        found.append(f"Wi\u00a0≤\u00a0{_short(one.weissenberg[1])}")
         found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
@@ -80,13 +80,13 @@ def where(answer: "Answer") -> str:
 
 
 def span(ends: "Span") -> str:
-    """Return a range in numbers of three digits."""
-    low, high = map(_three, ends)
+    """Return a range in numbers of two digits."""
+    low, high = map(_short, ends)
     return low if low == high else f"{low}–{high}"
 
 
-def _three(value: float) -> str:
-    return significant(value, 3)
+def _short(value: float) -> str:
+    return significant(value, 2)
 
 
 def tolerance(answer: "Answer") -> str:
@@ -119,7 +119,7 @@ def expected(one: "ExpectedError", place: str) -> str:
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
         return percent_of(value)
-    return "untested" if one.is_known else one.missing
+    return "–" if one.is_known else one.missing
 
 
 def suspects(answer: "Answer") -> str:

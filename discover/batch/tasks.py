@@ -11,7 +11,8 @@ from discover.precision import enable_x64
 from discover.progress import Progress, by_shares
 from discover.study.read import fingerprint, read_study
 from discover.study.run_folder import RunFolder
-from discover.study.schema import Study
+from discover.study.schema import Study, Verdict
+from discover.validation import validated
 from discover.words import counted
 
 _LOOP_SHARES = {"loading": 0.05, "search": 0.69, "drawing": 0.26}
@@ -50,12 +51,21 @@ class TaskResult:
 
 
 def _begin(
-    task: str, path: Path, out: Path, seed: int | None, overwrite: bool, note: Note
+    task: str,
+    path: Path,
+    out: Path,
+    seed: int | None,
+    overwrite: bool,
+    note: Note,
+    tolerance: float | None,
 ) -> tuple[Study, RunFolder, TaskResult | None]:
     """Read a study and open its folder; the last is what the folder holds if that is complete."""
     enable_x64()
     enable_compilation_cache()
     study = read_study(path)
+    if tolerance is not None:
+        verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
+        study = study.model_copy(update={"verdict": verdict})
     note(study)
     folder = RunFolder(out, fingerprint(study, task, seed), overwrite)
     if not (folder.complete and folder.holds(_PAGE, _JSON_FILES[task])):
@@ -83,6 +93,7 @@ def run_compare(
     overwrite: bool,
     progress: Progress,
     note: Note = nothing_to_note,
+    tolerance: float | None = None,
 ) -> TaskResult:
     """Run both learners of a study and write the comparison report.
 
@@ -98,13 +109,15 @@ def run_compare(
         Called with what is going on and the fraction done.
     note
         Called with the study once it was read.
+    tolerance
+        Overrides the relative discrepancy that the study calls good enough.
 
     Raises
     ------
     InputError
         If the study, its data or the folder is wrong.
     """
-    study, folder, there = _begin("compare", path, out, seed, overwrite, note)
+    study, folder, there = _begin("compare", path, out, seed, overwrite, note, tolerance)
     if there is not None:
         return there
     from discover.comparison.run_comparison import compare
@@ -140,18 +153,18 @@ def run_close_loop(
     overwrite: bool,
     progress: Progress,
     note: Note = nothing_to_note,
+    tolerance: float | None = None,
 ) -> TaskResult:
     """Close the loop on a study and write its report.
 
     Parameters and errors as in `run_compare`; a seed only changes synthetic noise.
     """
-    study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
+    study, folder, there = _begin("close-loop", path, out, seed, overwrite, note, tolerance)
     if there is not None:
         return there
     from discover.dataset.conditions import material_and_temperature
     from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
-    from discover.report.loop.verdict import loop_verdict
     from discover.report.overlay import loop_overlays, read_overlays
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model, forward_model
@@ -164,6 +177,7 @@ def run_close_loop(
     declared = forward_model(model)
     asked = dict(study.loop)
     result = run_loop_on(data_of_study, declared, part("search"), laws=model.choice, **asked)
+    result = replace(result, tolerance=study.verdict.tolerance)
     each = data_of_study.each
     part("drawing")("drawing", 0.0)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
@@ -182,7 +196,7 @@ def run_close_loop(
     write_loop(
         result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays
     )
-    ended = _end("close-loop", folder, loop_verdict(result))
+    ended = _end("close-loop", folder, result.answer.lines)
     progress("done", 1.0)
     return ended
 

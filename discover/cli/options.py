@@ -23,3 +23,12 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JS
 OverwriteOption = Annotated[
     bool, typer.Option("--overwrite", help="Start again instead of resuming.")
 ]
+ToleranceOption = Annotated[
+    float | None,
+    typer.Option(
+        "--tolerance",
+        min=0.0,
+        max=1.0,
+        help="Relative discrepancy that is good enough, in place of the study's; default: 0.05.",
+    ),
+]

@@ -15,6 +15,7 @@ from discover.cli.options import (
     QuietOption,
     SeedOption,
     StudyArgument,
+    ToleranceOption,
 )
 
 if TYPE_CHECKING:  # --help needs no studies
@@ -29,11 +30,12 @@ def compare(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
+    tolerance: ToleranceOption = None,
 ) -> None:
     """Run both learners on the same data and write a comparison report."""
     from discover.batch.tasks import run_compare
 
-    _run_task(run_compare, study, out, seed, quiet, as_json, overwrite)
+    _run_task(run_compare, study, out, seed, quiet, as_json, overwrite, tolerance)
 
 
 @guarded
@@ -44,11 +46,12 @@ def close_loop(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
+    tolerance: ToleranceOption = None,
 ) -> None:
     """Fit a model, find what it lacks, add that, and test the result on held-out runs."""
     from discover.batch.tasks import run_close_loop
 
-    _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite)
+    _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite, tolerance)
 
 
 @guarded
@@ -109,13 +112,20 @@ def demo(
 
 
 def _run_task(
-    task, study: Path, out: Path | None, seed: int | None, quiet: bool, as_json: bool, over: bool
+    task,
+    study: Path,
+    out: Path | None,
+    seed: int | None,
+    quiet: bool,
+    as_json: bool,
+    over: bool,
+    tolerance: float | None,
 ) -> None:
     from discover.batch.run import folder_names
 
     folder = out or Path("results") / folder_names([study])[0]
     with progress_bar(quiet) as report:
-        result = task(study, folder, seed, over, report, _tell_of_folder)
+        result = task(study, folder, seed, over, report, _tell_of_folder, tolerance)
     if as_json:
         typer.echo(result.json_file.read_text("utf-8"))
         return

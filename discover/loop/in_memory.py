@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from discover.answer import TOLERANCE
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -14,7 +15,7 @@ from discover.loop.loop_result import LoopResult
 from discover.progress import Progress, checked
 from discover.study.declared_model import forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
-from discover.study.schema import Loop
+from discover.study.schema import Loop, Verdict
 from discover.validation import validated
 from discover.words import counted, unknown_name
 
@@ -31,6 +32,7 @@ def close_loop(
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
     known_effects: Mapping[str, Any] | None = None,
+    tolerance: float = TOLERANCE,
     progress: Progress | None = None,
     **options: Any,
 ) -> LoopResult:
@@ -56,6 +58,8 @@ def close_loop(
         Effects that are known beside the base, as ``[model] effects`` in a study, such as
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
         model and not proposed again.
+    tolerance
+        Relative discrepancy that is good enough.
     progress
         Called now and then with a line of text and about what fraction is done.
     **options
@@ -82,6 +86,7 @@ def close_loop(
     if unknown:
         raise InputError(unknown_name("option", unknown[0], sorted(_OPTIONS), "close_loop"))
     asked = _checked(options)
+    good_enough = validated(Verdict, {"tolerance": tolerance}, "close_loop()").tolerance
     divided = data_in_memory(data, held_out)
     fluid = declared_fluid(base, data)
     declared = forward_model(with_known(fluid, known_effects, free, by_mode))
@@ -92,7 +97,7 @@ def close_loop(
         f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
         f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
     ).strip()
-    return replace(result, title=data.name, described=summary)
+    return replace(result, title=data.name, described=summary, tolerance=good_enough)
 
 
 def _checked(options: Mapping[str, Any]) -> Loop:

@@ -71,6 +71,8 @@ def fingerprint(study: Study, *extra: object) -> str:
     """
     # a page without overlays is what it was before there were any
     left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}
+    if study.verdict == type(study.verdict)():  # and without a tolerance of its own
+        left_out["verdict"] = True
     for part in ("loop", "compare"):  # and so is a task without loadings of its own
         if getattr(study, part).loading is None:
             left_out[part] = {"loading"}

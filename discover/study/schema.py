@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from discover.answer import TOLERANCE
 from discover.dataset.linear_viscoelasticity import MOST_MODES
 from discover.dataset.loading import LARGEST
 from discover.effects.known import known_effects
@@ -286,6 +287,13 @@ class Report(Section):
     """Curves beside those of the report."""
 
 
+class Verdict(Section):
+    """What is good enough."""
+
+    tolerance: Annotated[float, Field(gt=0, le=1)] = TOLERANCE
+    """Relative discrepancy that is good enough; 0.05 means 5 %."""
+
+
 class Study(Section):
     """One study: data, declared model, and what to do with them."""
 
@@ -299,6 +307,8 @@ class Study(Section):
     """What `discover compare` runs."""
     report: Report = Report()
     """What the page shows besides."""
+    verdict: Verdict = Verdict()
+    """What is good enough."""
     _path: Path | None = PrivateAttr(default=None)
     _text: str = PrivateAttr(default="")
 

@@ -114,28 +114,63 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
     return f"<math>{term_mathml(name, inner)}</math>"
 
 
+class InUnitsNotation(MathmlNotation):
+    """The same in units, for each mode: s for σ/G, and λ before γ̇.
+
+    Parameters
+    ----------
+    modes
+        How many there are; of several each symbol has the index k.
+    """
+
+    def __init__(self, modes: int):
+        index = "<msub>{}<mi>k</mi></msub>" if modes > 1 else "{}"
+        self.stress = index.format(_BOLD.format("s"))
+        self.time, self.modulus = index.format("<mi>λ</mi>"), index.format("<mi>G</mi>")
+
+    def tensor(self, name: str) -> str:
+        """Return a bold letter."""
+        if name == "sigma":
+            return self.stress
+        return f"{self.time}{_TENSORS[name]}" if name == "gammadot" else _TENSORS[name]
+
+
 _SIGN = "<mo form='infix'>{}</mo>"
 """Of a summand that begins an element of its own, where it would be spaced as a prefix."""
 
 
 def law_element(
-    terms: Sequence[LawTerm], linear_relaxation: bool, named: NamedPart | None = None
+    terms: Sequence[LawTerm],
+    linear_relaxation: bool,
+    named: NamedPart | None = None,
+    modes: int = 0,
+    solvent: bool = False,
 ) -> str:
-    """Return the whole dimensionless law, displayed; a long one goes on in the next line.
+    """Return the whole law, displayed; a long one goes on in the next line.
 
     Browsers do not break a `math` element, so each summand is one of its own.
+
+    Parameters
+    ----------
+    terms, linear_relaxation, named
+        As in `law_latex`.
+    modes
+        Of a law in Pa and s how many there are; 0 for a dimensionless one.
+    solvent
+        Whether a law in Pa and s has a solvent.
     """
-    stress, rate = _TENSORS["sigma"], _TENSORS["gammadot"]
+    notation = InUnitsNotation(modes) if modes else MathmlNotation()
+    stress, rate = notation.tensor("sigma"), notation.tensor("gammadot")
     convected = f"<mover><mrow>{stress}</mrow><mo style='font-size:70%'>▽</mo></mover>"
     relaxation = f"<mo>+</mo>{stress}" if linear_relaxation else ""
     extra = [
         _SIGN.format("+" if t.coefficient >= 0 else "−")
-        + term_mathml(t.term, t.inner, abs(t.coefficient))
+        + parse_term(t.term).spell(notation, abs(t.coefficient), t.inner)
         for t in terms
     ]
     where = []
     if named is not None:
-        notation, function = MathmlNotation(), named.function
+        function = named.function
         names = (*function.constants, *function.where, *function.rates)
         letters = {n: notation.letter(n) for n in names}
         defined, summands = function.spell(notation, letters)
@@ -151,8 +186,19 @@ def law_element(
             for left, value in [*rates, *((letters[n], value) for n, value in [*defined, *fixed])]
         ]
     # all on the left, so that each term has the sign that tables and files give it
-    parts = [f"{convected}{relaxation}", *extra]
+    time = notation.time if isinstance(notation, InUnitsNotation) else ""
+    parts = [f"{time}{convected}{relaxation}", *extra]
     parts[-1] += f"<mo form='infix'>=</mo>{rate}"
     parts += where
+    if isinstance(notation, InUnitsNotation):
+        parts.append(_whole_stress(notation, modes, solvent))
     law = "<wbr/>".join(f"<math displaystyle='true'><mrow>{part}</mrow></math>" for part in parts)
     return f'<div class="law" style="text-align:center;margin:.6em 0">{law}</div>'
+
+
+def _whole_stress(notation: InUnitsNotation, modes: int, solvent: bool) -> str:
+    """Return how the stress follows from the modes."""
+    total = "<munder><mo>∑</mo><mi>k</mi></munder>" if modes > 1 else ""
+    added = f"<mo>+</mo><msub><mi>η</mi><mi>s</mi></msub>{_TENSORS['gammadot']}" if solvent else ""
+    stress = f"{_TENSORS['sigma']}<mo>=</mo>{total}{notation.modulus}{notation.stress}{added}"
+    return f"<mo>,</mo><mspace width='1em'/>{stress}"

@@ -6,6 +6,7 @@ from pathlib import Path
 from discover.loop.loop_result import LoopResult
 from discover.plain_json import json_text
 from discover.protocols.kinematics import in_words
+from discover.report.answer_screen import answer_screen
 from discover.report.loop import tables
 from discover.report.loop.verdict import loop_verdict
 from discover.report.overlay import Overlay
@@ -80,6 +81,7 @@ def write_loop(
         name=f"{name}, {conditions}" if conditions else name,
         summary=summary,
         result=result,
+        screen=answer_screen(result.answer),
         questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=tables.error_rows(result)

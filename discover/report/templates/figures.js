@@ -60,3 +60,21 @@ for (const link of document.querySelectorAll("a.data")) {
   if (kept) link.href = URL.createObjectURL(new Blob([JSON.parse(kept.textContent)]));
   link.download = name;
 }
+for (const button of document.querySelectorAll("button[data-copy]")) {
+  const kept = [...document.querySelectorAll("script.copy")].find((e) => e.dataset.name === button.dataset.copy);
+  if (!kept) continue;
+  button.addEventListener("click", async () => {
+    const text = JSON.parse(kept.textContent), name = button.dataset.copy;
+    try { await navigator.clipboard.writeText(text); }
+    catch { // a file opened from disk may have no clipboard
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      document.execCommand("copy");
+      area.remove();
+    }
+    button.textContent = "copied";
+    setTimeout(() => { button.textContent = name; }, 1500);
+  });
+}
