@@ -129,7 +129,7 @@ def run_compare(
 
     sources = read_overlays(study)
     part = by_shares(progress, _COMPARE_SHARES)
-    comparison = compare(study, seed, part("comparing"), folder, fit_constants=fit_declared)
+    comparison = compare(study, seed, part("comparing"), folder)
     part("drawing")("drawing", 0.0)
     overlays = ()
     if sources:

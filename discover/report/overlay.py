@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, predict
+from discover.comparison.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
 from discover.dataset.tables.table import read_table, shown
 from discover.errors import InputError

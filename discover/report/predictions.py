@@ -7,8 +7,7 @@ import numpy as np
 import pandas as pd
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
-from discover.learners.registry import BANDS_ONLY
+from discover.comparison.flows import QUANTITIES, Flow
 from discover.loop import LoopResult, RunRecord
 from discover.report.overlay import Overlay
 from discover.study.run_folder import RunFolder
@@ -29,8 +28,8 @@ COLUMNS = (
 
 PREDICTIONS = "predictions.csv"
 
-BY_MODE = "constants_by_mode"
-"""Source of what a law predicts whose constants differ from mode to mode."""
+POSTERIOR = "posterior"
+"""Source of what all laws that the data allow predict together, with its band."""
 
 _ROLES = {"training": "fit", "held_out": "held_out", "test": "prediction"}
 _ROLES["high_deborah"] = "prediction"
@@ -40,10 +39,11 @@ _SOURCES = {"before": "declared"}
 def comparison_predictions(
     comparison: Comparison, overlays: Sequence[Overlay] = ()
 ) -> pd.DataFrame:
-    """Return the curves of a comparison: the declared law's and each learner's, in every flow.
+    """Return the curves of a comparison: declared law, learners and posterior, in every flow.
 
-    Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` hold what the data leave
-    open, rivals included; they are NaN where no claim is made, ``measured`` where nothing was.
+    Times in s, rates in 1/s, stresses in Pa. ``low95`` and ``high95`` are the 95 % band of the
+    posterior; the sparse law has it where the quantity is determined, else NaN, as has ``measured``
+    where nothing was.
     A law that cannot be integrated through a flow has no line there.
 
     Parameters
@@ -55,9 +55,7 @@ def comparison_predictions(
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}
-    curves[BY_MODE] = {
-        key: columns_of(band.chosen) for key, band in comparison.bands_by_mode.items()
-    }
+    curves[POSTERIOR] = {key: band.middle for key, band in comparison.bands.items()}
     curves |= {overlay.label: overlay.curves for overlay in overlays}
     parts = []
     for flow in comparison.flows:
@@ -134,18 +132,16 @@ def _record_parts(record: RunRecord, overlays: Sequence[Overlay]) -> Iterator[pd
 
 
 def _limits(comparison: Comparison, who: str, flow: Flow) -> Mapping[str, tuple[Any, Any]]:
-    """Return the band of a learner's predictions in a flow, by quantity; empty for no claim."""
-    if who in BANDS_ONLY:
-        return comparison.outcomes[who].bands.get(flow.key) or {}
-    bands = {
-        "tensor_sindy": comparison.next_measurement.bands,
-        BY_MODE: comparison.bands_by_mode,
-    }
-    band = bands.get(who, {}).get(flow.key)
+    """Return the band of predictions in a flow, by quantity; empty for no claim."""
+    if who == POSTERIOR:
+        band = comparison.bands.get(flow.key)
+    elif who == "tensor_sindy" and comparison.determined_terms:
+        band = comparison.claimed(flow)
+    else:
+        band = None
     if band is None:
         return {}
-    low, high = columns_of(band.rivals_low), columns_of(band.rivals_high)
-    return {quantity: (low[quantity], high[quantity]) for quantity in QUANTITIES}
+    return {quantity: (band.low[quantity], band.high[quantity]) for quantity in band.middle}
 
 
 def _measured(flow: Flow, quantity: str) -> Any:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from discover.answer.sentences import A_TRANSIENT as A_TRANSIENT
 from discover.answer.sentences import IF_LOADINGS as IF_LOADINGS
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import MODULI
 from discover.words import FIGURE_SYMBOLS, estimate, interval, percent_of, readable
@@ -90,21 +90,9 @@ def terms_text(outcome: LearnerOutcome) -> str:
         return "nothing beside the known part"
     parts = []
     for term in outcome.terms:
-        equal, declared = term.ci95_given_equal_modes, term.ci95_given_declared
-        narrow = equal or declared or term.ci95
-        text = f"{estimate(term.coefficient, narrow)} {_factor(readable(term.term))}"
-        if term.ci95 is not None and equal is not None:
-            text += (
-                f" (95 % interval {interval(equal)} if it is the same in all modes, else "
-                f"{interval(term.ci95)} at the mean relaxation time)"
-            )
-        elif term.ci95 is not None and declared is not None:
-            text += (
-                f" (95 % interval {interval(declared)} with the declared modes, "
-                f"{interval(term.ci95)} with these or others)"
-            )
-        elif term.ci95 is not None:
-            text += f" (95 % interval {interval(term.ci95)})"
+        text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
+        if term.ci95 is not None:
+            text += f" (95 %: {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)
 

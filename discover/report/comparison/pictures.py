@@ -6,10 +6,8 @@ from functools import partial
 from discover.comparison.comparison import Comparison
 from discover.report.overlay import Overlay
 from discover.report.parts import Missing, attempt
-from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.comparison.flows import flow_picture, start_up_picture, training_picture
-from discover.report.plots.comparison.next_experiment import next_picture
-from discover.report.plots.comparison.pipkin import error_map_picture, identifiability_picture
+from discover.report.plots.comparison.pipkin import error_map_picture
 from discover.report.plots.comparison.selection import selection_picture
 from discover.report.plots.comparison.studies import (
     high_deborah_picture,
@@ -37,21 +35,13 @@ def comparison_pictures(
         found.append(runs)
     found += [
         ("The map of errors", partial(error_map_picture, comparison)),
-        ("The map of identifiability", partial(identifiability_picture, comparison)),
-        ("The picture of constants by mode", partial(_by_mode_picture, comparison)),
         ("The map of residuals", partial(comparison_residual_map, comparison)),
         ("The picture of the selection", partial(selection_picture, details)),
-        ("The picture of the next experiment", partial(next_picture, comparison)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
         ("The picture of the sweep", partial(sweep_picture, comparison)),
     ]
     loss = ("The picture of the loss", partial(loss_picture, comparison))
     return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
-
-
-def _by_mode_picture(comparison: Comparison) -> Picture | None:
-    law = comparison.by_mode
-    return None if law is None else by_mode_picture(law.constants, not law.explains, law.left_out)
 
 
 def _drawn(pictures: Sequence[tuple[str, Callable[[], Picture | None]]]) -> list[Drawn]:

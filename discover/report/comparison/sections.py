@@ -13,23 +13,19 @@ from discover.report.comparison import tables
 from discover.report.comparison.table_of_laws import law_rows
 from discover.report.page import render
 from discover.report.parts import Missing, attempt
-from discover.report.told_by import told_by_table
-from discover.report.wording import SMALL_FAULTS, readable
-from discover.statistics import Told
 
 Content = Mapping[str, Any]
 
 _STANDING = {
     "explained": "",
-    "unexplained": "None of these laws explains the data. They are the best descriptions in "
-    "their class, and no finding.",
+    "unexplained": "None of these laws describes the data to the noise. They are the best "
+    "descriptions in their class.",
     "no_signal": "The records hold no signal, so no law is reported.",
 }
 _CONDITION = {
-    True: "The intervals hold if the law is in the library. Of measured runs they allow "
-    f"{SMALL_FAULTS}.",
-    False: "The intervals would hold if the law were in the library, and no law that was tried "
-    "explains these data.",
+    True: "The intervals hold if the law is in the library, with what every sound instrument has a "
+    "little of fitted along.",
+    False: "The intervals hold for this law alone, which is not the likeliest.",
 }
 _NO_TERM = {
     "explained": "No term: the known part alone explains the data.",
@@ -113,7 +109,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             "columns": tables.learner_columns(comparison),
             "term_rows": tables.term_rows(comparison),
             "network_interval": interval,
-            "condition": _CONDITION[comparison.explanation.in_library],
+            "condition": _CONDITION[comparison.determined_terms],
             "no_term": _NO_TERM[comparison.verdict],
         }
 
@@ -136,22 +132,10 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             else None
         )
 
-    def constants() -> Content | None:
-        rows = tables.constant_rows(comparison)
-        twins = ", ".join(readable(name) for name in comparison.stood_for)
-        searched = f"Not searched, since the constants stand for it: {twins}." if twins else ""
-        return {"constant_rows": rows, "searched": searched} if rows else None
-
-    def loadings() -> Content | None:
-        return None if comparison.loadings is None else tables.loadings(comparison.loadings)
-
-    def told_by() -> Content | None:
-        table = told_by_table([Told.from_json(row) for row in comparison.told_by])
-        return (
-            {"told_by": table, "is_unexplained": comparison.verdict == "unexplained"}
-            if table
-            else None
-        )
+    def explanations() -> Content | None:
+        rows = tables.explanation_rows(comparison)
+        left = comparison.posterior.explanations.unexplained_probability
+        return {"explanations": rows, "none": left} if rows else None
 
     def held_out_by_run() -> Content | None:
         found = tables.selection(comparison)
@@ -160,7 +144,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
     def rivals() -> Content:
         spelled = tables.titles(comparison)
         rows = [tables.rival_row(rival, spelled) for rival in comparison.rivals]
-        return {"rivals_text": tables.rivals_text(comparison), "rivals": rows}
+        return {"rivals": rows}
 
     def physics() -> Content | None:
         rows = tables.physics_rows(comparison)
@@ -174,7 +158,6 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             "Errors",
             [
                 Part("The table of errors", "errors", errors),
-                Part("The table of loadings", "loadings", loadings),
             ],
         ),
         (
@@ -184,8 +167,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             [
                 Part("The laws found", "laws", laws),
                 Part("The table of terms", "terms", terms),
-                Part("The constants fitted along", "constants", constants),
-                Part("The table of what each kind of test determined", "told_by", told_by),
+                Part("The table of explanations", "explanations", explanations),
                 Part(
                     "The table of the network's coefficients",
                     "coefficients",
@@ -229,7 +211,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
                 Part(
                     "The table of experiments",
                     "next",
-                    lambda: _unless_empty("proposals", tables.proposals(comparison)),
+                    lambda: _unless_empty("tests", tables.next_rows(comparison)),
                 )
             ],
         ),

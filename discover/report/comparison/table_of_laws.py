@@ -6,12 +6,9 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.fitting.law_by_mode import LawByMode
-from discover.comparison.outcomes.constant import in_words as constant_in_words
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
-from discover.report.plots.by_mode import by_mode_in_brief
-from discover.report.wording import effects_title, readable, significant
+from discover.report.wording import estimate, interval, readable
 
 
 def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
@@ -21,78 +18,41 @@ def law_rows(comparison: Comparison) -> list[dict[str, Any]]:
     fitted range apart from those beyond it.
     """
     placed = {flow.name: comparison.placement(flow).inside for flow in comparison.judged}
-    one_mode = comparison.known is None or len(comparison.known.modulus) == 1
-    rows = []
-    for fit in comparison.classical:
-        end = " (the end of its range)" if fit.at_bound else ""
-        constants = [
-            f"{readable(name)} = {significant(value, 3)}{end}"
-            for name, value in fit.parameters.items()
-        ]
-        constants += [
-            f"{constant_in_words(name, one_mode)} = {significant(value, 3)}"
-            for name, value in fit.along.items()
-        ]
-        rows.append(
-            {
-                "law": fit.title,
-                "constants": ", ".join(constants),
-                "number": len(fit.parameters) + len(fit.along),
-                "misfit": fit.misfit,
-                "criterion": fit.criterion,
-                **_mean_errors(fit.errors, placed),
-            }
-        )
-    if comparison.by_mode is not None:
-        rows.append(_row_by_mode(comparison.by_mode, placed))
+    rows = [
+        {
+            "law": fit.title,
+            "constants": ", ".join(
+                f"{readable(name)} = {estimate(value, fit.ci95[name])} ({interval(fit.ci95[name])})"
+                for name, value in fit.parameters.items()
+            ),
+            "number": len(fit.parameters),
+            "misfit": fit.misfit,
+            "criterion": fit.criterion,
+            **_mean_errors(fit.errors, placed),
+        }
+        for fit in comparison.classical
+    ]
     for name, outcome in comparison.outcomes.items():
         errors = {flow.name: comparison.errors(name, flow) for flow in comparison.judged}
-        path, chosen = outcome.details.get("path") or (), outcome.details.get("chosen")
-        left = comparison.explanation.lack_of_fit.get(name)
+        left = comparison.lack_of_fit.get(name)
         rows.append(
             {
                 "law": learner_title(name),
-                "constants": ", ".join(
-                    f"{constant_in_words(c.name, one_mode)} = {significant(c.value, 3)}"
-                    for c in outcome.constants.values()
-                ),
+                "constants": "",
                 "number": _number_of_constants(outcome),
                 "misfit": None if left is None else left.misfit,
-                # of moduli that may move it would say less of the misfit than classical laws' do
-                "criterion": path[chosen].get("bic_at_exact_moduli", path[chosen]["bic"])
-                if path and chosen is not None
-                else None,
+                "criterion": None,
                 **_mean_errors(errors, placed),
             }
         )
-    least = min((row["criterion"] for row in rows if row["criterion"] is not None), default=0.0)
-    for row in rows:
-        if row["criterion"] is not None:
-            row["criterion"] -= least
     return rows
-
-
-def _row_by_mode(law: LawByMode, placed: Mapping[str, bool]) -> dict[str, Any]:
-    errors = {name: {"recorded": law.errors.get(name)} for name in placed}
-    return {
-        "law": f"constants by mode: {effects_title([*law.constants])}",
-        "constants": "; ".join(
-            by_mode_in_brief(name, constant) for name, constant in law.constants.items()
-        ),
-        "number": law.n_constants,
-        "misfit": law.left.misfit,
-        "criterion": None,  # it counts the samples that this law leaves independent
-        **_mean_errors(errors, placed),
-    }
 
 
 def _number_of_constants(outcome: LearnerOutcome) -> int | None:
     """Return how many numbers of a law were fitted; None of a learner that does not say."""
     if outcome.learner == "tensor_sindy":
-        own = sum(1 + len(term.inner) for term in outcome.terms)
-    elif (own := outcome.details.get("n_constants")) is None:
-        return None
-    return own + len(outcome.constants)
+        return sum(1 + len(term.inner) for term in outcome.terms)
+    return outcome.details.get("n_constants")
 
 
 def _mean_errors(

@@ -7,17 +7,13 @@ from typing import Any
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.identifiability import EXACT, Rival
-from discover.comparison.judging.other_causes.loadings import OwnLoadings
-from discover.comparison.outcomes.constant import in_words as constant_in_words
-from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.rivals import Rival
 from discover.equations import Equation
 from discover.equations.spelling.mathml import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
-from discover.learners.registry import BANDS_ONLY, learner_title
-from discover.report.comparison.asked import within_a_sentence
+from discover.learners.registry import learner_title
 from discover.report.plots.style import learner_colour
 from discover.report.wording import (
     FIGURE_SYMBOLS,
@@ -29,6 +25,7 @@ from discover.report.wording import (
     selection_sentence,
     significant,
 )
+from discover.words import effects_title
 
 
 def selection(comparison: Comparison) -> dict[str, Any] | None:
@@ -74,21 +71,20 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the errors in flows that no fit saw, with half of the band where there is one."""
     rows = []
     for flow in comparison.judged:
-        band = comparison.next_measurement.bands.get(flow.key)
-        widths = {} if band is None else band.widths(with_rivals=False)
+        band = comparison.claimed(flow)
+        widths = {} if band is None else band.half_widths()
         cells = []
         for who in ("before", *comparison.outcomes):
             if who == "tensor_sindy":
-                mine = {name: _half(width) for name, width in widths.items()}
+                mine = widths if comparison.determined_terms else {}
             else:
                 mine = {} if who == "before" else comparison.outcomes[who].half_widths(flow)
             law = comparison.before if who == "before" else comparison.outcomes[who].predictions
             cells += [
                 {
                     "value": value,
-                    "half_width": None if value is None else mine.get(name),
+                    "half_width": None if value is None else known_or_none(mine.get(name)),
                     "runs_away": law[flow.key] is None and name in flow.reference,
-                    "without": without_outliers(comparison, who, flow) if name == "sigma12" else "",
                 }
                 for name, value in comparison.errors(who, flow).items()
             ]
@@ -103,17 +99,9 @@ def error_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def without_outliers(comparison: Comparison, who: str, flow: Flow) -> str:
-    """Return a learner's error of the stress without outliers, in words; empty without any."""
-    samples = [] if who == "before" else comparison.outliers(who, flow)
-    if not samples:
-        return ""
-    which = "1 outlier" if len(samples) == 1 else f"{len(samples)} outliers"
-    return f"{percent(comparison.error_without_outliers(who, flow))} without {which}"
-
-
-def _half(width: float | None) -> float | None:
-    return None if width is None or not np.isfinite(width) else 0.5 * width
+def known_or_none(width: float | None) -> float | None:
+    """Return a width; None where it is not finite."""
+    return None if width is None or not np.isfinite(width) else width
 
 
 def network_interval(comparison: Comparison) -> bool:
@@ -122,35 +110,22 @@ def network_interval(comparison: Comparison) -> bool:
     return network is None or any(term.ci95 for term in network.terms)
 
 
-def loadings(found: OwnLoadings) -> dict[str, Any]:
-    """Return the factors on the records of runs, with a column for each learner."""
-    runs = {one.run: one.held_out for told in found.found.values() for one in told}
-    by_learner = [{one.run: one for one in told} for told in found.found.values()]
-    return {
-        "deviation": found.deviation,
-        "leading": within_a_sentence(found.leading),
-        "titles": [learner_title(name) for name in found.found],
-        "rows": [
-            {"run": run, "held_out": held, "factors": [told.get(run) for told in by_learner]}
-            for run, held in runs.items()
-        ],
-    }
-
-
-def constant_rows(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the constants that were fitted along, one line for each learner."""
-    rows = [
+def explanation_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the sets of effects and terms that the runs allow, the likeliest first."""
+    return [
         {
-            "constant": constant_in_words(constant.name, bool(constant.unit)),
-            "learner": learner_title(name),
-            "value": constant.value,
-            "ci95": constant.ci95,
-            "unit": constant.unit,
+            "effects": effects_title(one.effects) or "the known part alone",
+            "constants": ", ".join(
+                f"{readable(name)} = {significant(value, 3)}"
+                for own in one.parameters.values()
+                for name, value in own.items()
+            ),
+            "probability": one.probability,
+            "fit": one.error.fit,
+            "held_out": one.error.held_out,
         }
-        for name, outcome in comparison.outcomes.items()
-        for constant in outcome.constants.values()
+        for one in comparison.posterior.explanations.likeliest_first
     ]
-    return sorted(rows, key=lambda row: row["constant"])
 
 
 def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> dict[str, Any]:
@@ -158,9 +133,6 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> di
     message = (outcome.message[:1].upper() + outcome.message[1:]).rstrip(".")
     if (missed := outcome.details.get("projection_misfit")) is not None and outcome.terms:
         message += f"; the terms above miss {percent(missed)} of what the network adds"
-    shown = _shown_terms(outcome)
-    if len(shown) < len(outcome.terms):
-        message += f". Shown are the {len(shown)} terms largest along the runs"
     named = known.named
     if named is not None and not named.is_written:
         message += f". The h of the known law {named.law} is to be added: nobody wrote it out"
@@ -168,7 +140,7 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> di
     return {
         "title": learner_title(outcome.learner),
         "colour": learner_colour(outcome.learner),
-        "math": law_element([*known.terms, *shown], linear_relaxation, named),
+        "math": law_element([*known.terms, *outcome.terms], linear_relaxation, named),
         "message": message,
         "seconds": outcome.train_seconds,
     }
@@ -187,7 +159,7 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
     truth = {t.term: t for t in comparison.truth or ()}
     found: dict[str, dict[str, RecoveredTerm]] = {}
     for name, outcome in comparison.outcomes.items():
-        for term in _shown_terms(outcome):
+        for term in outcome.terms:
             found.setdefault(term.term, {})[name] = term
     rows = []
     for name in dict.fromkeys([*truth, *found]):
@@ -230,15 +202,6 @@ def term_rows(comparison: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-_MOST_TERMS = 8
-"""Of a law that holds its whole library, shown; the rest is in comparison.json."""
-
-
-def _shown_terms(outcome: LearnerOutcome) -> tuple[RecoveredTerm, ...]:
-    """Return the terms that a page shows; of a whole library the largest along the trajectories."""
-    return outcome.terms[:_MOST_TERMS] if outcome.learner in BANDS_ONLY else outcome.terms
-
-
 def coefficients(comparison: Comparison) -> list[dict[str, Any]]:
     """Return the network's coefficients along the training runs."""
     network = comparison.outcomes.get("tbnn_ude")
@@ -249,28 +212,19 @@ def coefficients(comparison: Comparison) -> list[dict[str, Any]]:
     ]
 
 
-def proposals(comparison: Comparison) -> list[dict[str, Any]]:
-    """Return the experiments proposed, best first."""
-    following = comparison.next_measurement
+def next_rows(comparison: Comparison) -> list[dict[str, Any]]:
+    """Return the tests that could be run, the most telling first."""
     return [
         {
-            "title": proposal.experiment.title,
-            "observed": ", ".join(FIGURE_SYMBOLS[name] for name in proposal.observed),
-            "falling": f"{len(proposal.falling)} of {len(following.laws) - 1}",
-            "weakest": min(filter(known, proposal.evidence.values()), default=None),
+            "title": test.title,
+            "observed": FIGURE_SYMBOLS.get(test.quantity, test.quantity),
+            "nats": test.nats,
         }
-        for proposal in following.proposals
+        for test in comparison.posterior.next_tests.tests[:_MOST_TESTS]
     ]
 
 
-def rivals_text(comparison: Comparison) -> str:
-    """Return what the search says of the laws that the data do not rule out."""
-    sparse = comparison.outcomes.get("tensor_sindy")
-    text = "" if sparse is None else str(sparse.details.get("rivals_text", ""))
-    # the text is on laws that were fitted; a twin follows from mathematics and is never ruled out
-    exact = sum((r.errors_to_chosen["sigma12"] or 0.0) <= EXACT for r in comparison.rivals)
-    twins = "One law below gives" if exact == 1 else f"{exact} laws below give"
-    return f"{text} {twins} the same σ12 whatever the flow." if text and exact else text
+_MOST_TESTS = 6
 
 
 def titles(comparison: Comparison) -> dict[str, str]:

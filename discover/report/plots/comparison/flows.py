@@ -5,15 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.bands.dense_library import DENSE, GREEN_BAND, NAMED_BESIDE
-from discover.comparison.outcomes.flows import QUANTITIES, Flow, columns_of
+from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
 from discover.report.plots.cycles import about_middle, in_last_cycle, shade_between
 from discover.report.plots.style import (
     BEFORE_STYLE,
-    BY_MODE_STYLE,
-    BY_MODE_TITLE,
     INK,
     MEASURED,
     OVERLAY_STYLES,
@@ -63,8 +60,6 @@ def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ())
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
             yield learner_title(name), learner_style(name), prediction
-    if flow.key in comparison.bands_by_mode:
-        yield BY_MODE_TITLE, BY_MODE_STYLE, columns_of(comparison.bands_by_mode[flow.key].chosen)
     for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
         if flow.key in overlay.curves:
             yield literal(overlay.label), style, overlay.curves[flow.key]
@@ -104,10 +99,9 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
             f"{flow.title}: {_seen(comparison, flow)} "
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
-            "and against shear rate. Shaded in orange is what the data leave open: the 95 % "
-            "intervals of the parameters, and the rival laws; what is not determined has no such "
-            f"band.{_condition(comparison, flow)} Curves of the known part alone may leave the "
-            "frame.",
+            "and against shear rate. Shaded in orange is the 95 % band of all laws "
+            "that the data allow; what is not determined has no band. Curves of the known part "
+            "alone may leave the frame.",
         )
 
 
@@ -136,8 +130,7 @@ def start_up_picture(
         return picture(
             drawing,
             f"flow_{flow.name}",
-            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}."
-            f"{_condition(comparison, flow)}",
+            f"{flow.title}: {_new_kind(comparison)} It lies {comparison.placement(flow).text}.",
         )
 
 
@@ -180,14 +173,6 @@ def _seen(comparison: Comparison, flow: Flow) -> str:
     return "no learner saw this flow."
 
 
-def _condition(comparison: Comparison, flow: Flow) -> str:
-    """Return what the dense library's band takes for granted, where it is drawn."""
-    dense = comparison.outcomes.get(DENSE)
-    if dense is None or dense.bands.get(flow.key) is None:
-        return ""
-    return f" {GREEN_BAND}"
-
-
 def _new_kind(comparison: Comparison) -> str:
     """Return how a start-up differs from the flows fitted."""
     if all(flow.oscillatory for flow in comparison.flows_of("training")):
@@ -195,55 +180,26 @@ def _new_kind(comparison: Comparison) -> str:
     return "no learner saw this flow."
 
 
-_FITTING_AS_WELL = {
-    "tensor_dense": "laws that fit σ₁₂, no claim beyond them",
-    "tbnn_ude": "networks that fit as well",
-}
-
-
-_WITH_NAMES = "laws and named effects that fit σ₁₂, no claim beyond them"
-
-
 def _draw_band(panel, comparison: Comparison, flow: Flow, quantity: str, shown, along=None) -> None:
-    """Shade what the data leave open: the intervals of the parameters, rivals, and members.
+    """Shade what the data leave open: the band of the posterior, and the members of an ensemble.
 
     Against time, of a flow curve the rate, or against what is given of the samples shown.
     """
     along = flow.along[shown] if along is None else along
-    for name, label in _FITTING_AS_WELL.items():
-        outcome = comparison.outcomes.get(name)
-        limits = None if outcome is None else outcome.bands.get(flow.key)
-        if outcome is not None and limits is not None:
-            if flow.key in outcome.details.get(NAMED_BESIDE, ()):
-                label = _WITH_NAMES
-            low, high = limits[quantity]
-            shade_between(
-                panel,
-                along,
-                low[shown],
-                high[shown],
-                color=learner_style(name)["color"],
-                alpha=0.18,
-                linewidth=0,
-                label=label,
-            )
-    for bands, colour, label in (
-        (comparison.bands_by_mode, BY_MODE_STYLE["color"], "constants by mode, 95 %"),
-        (comparison.next_measurement.bands, SPARSE, "left open by the data (95 %, with rivals)"),
-    ):
-        if (band := bands.get(flow.key)) is None:
-            continue
-        column = QUANTITIES.index(quantity)
+    limits = []
+    network = comparison.outcomes.get("tbnn_ude")
+    members = None if network is None else network.bands.get(flow.key)
+    if members is not None:
+        label = "networks that fit as well"
+        limits.append((*members[quantity], learner_style("tbnn_ude")["color"], label))
+    band = comparison.claimed(flow)
+    if band is not None and np.any(np.isfinite(band.low[quantity])):
+        limits.append((band.low[quantity], band.high[quantity], SPARSE, "95 % band"))
+    for low, high, colour, label in limits:
         shade_between(
-            panel,
-            along,
-            band.rivals_low[shown, column],
-            band.rivals_high[shown, column],
-            color=colour,
-            alpha=0.18,
-            linewidth=0,
-            label=label,
-        )
+            panel, along, low[shown], high[shown],
+            color=colour, alpha=0.18, linewidth=0, label=label,
+        )  # fmt: skip
 
 
 def _axis_of(comparison: Comparison, flow: Flow) -> str:

@@ -3,20 +3,16 @@
 The diagram is that of Pipkin 1972, Lectures on Viscoelasticity Theory: De across, Wi upwards.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from discover.comparison.comparison import Comparison
-from discover.comparison.judging.identifiability import EXACT
-from discover.comparison.judging.next_measurement import IdentifiabilityCell
-from discover.comparison.outcomes.flows import QUANTITIES
+from discover.comparison.flows import QUANTITIES
 from discover.learners.registry import learner_title
 from discover.report.plots.style import (
-    GREEN,
     INK,
     NETWORK,
-    SPARSE,
     TRUTH,
     Picture,
     figure,
@@ -57,54 +53,6 @@ def error_map_picture(comparison: Comparison) -> Picture | None:
         )
 
 
-def identifiability_picture(comparison: Comparison) -> Picture | None:
-    """Return where in Wi and De the laws that remain differ, and where measuring decides."""
-    cells = comparison.next_measurement.identifiability()
-    if not cells:
-        return None
-    kinds = [q for q in QUANTITIES if any(q == c.observed[-1] for c in cells)]
-    with figure(1, len(kinds), width=10.0, height=2.9) as (drawing, axes):
-        for panel, quantity in zip(axes[0], kinds, strict=True):
-            mine = [c for c in cells if c.observed[-1] == quantity]
-            _draw_cells(panel, differences(mine, quantity), SPARSE)
-            deciding = [c for c in mine if c.decides]
-            places = [_place(mine, c.weissenberg, c.deborah) for c in deciding]
-            if places:
-                panel.plot(
-                    [x + 0.3 for x, _ in places], [y + 0.28 for _, y in places], "*", ms=6.0,
-                    color=GREEN, label="measuring it here is expected to rule out every rival",
-                )  # fmt: skip
-            also = "" if quantity == "sigma12" else " measured besides σ₁₂"
-            panel.set_title(f"{FIGURE_SYMBOLS[quantity]}{also}")
-            if comparison.noise is not None:  # otherwise runs have no Wi in these units
-                _mark_training(panel, comparison, differences(mine, quantity))
-        _label(axes)
-        legend_above(drawing, axes)
-        noise = percent(comparison.next_measurement.noise)
-        return picture(
-            drawing,
-            "pipkin_identifiability",
-            "Pipkin map of identifiability: how far the rival furthest from the chosen law is from "
-            "it, relative to the chosen law, N₂ relative to N₁; ∞ where a rival runs away. Where "
-            "the number is 0 no measurement of this quantity, however good, tells these laws "
-            f"apart. A star: at {noise} noise it decides against all of them, their parameters "
-            "readjusted within their intervals.",
-        )
-
-
-def differences(cells: Sequence[IdentifiabilityCell], quantity: str) -> Cells:
-    """Return the difference of a quantity by place: infinite where a rival runs away.
-
-    What is below the error of the integration is zero.
-    """
-    found = {}
-    for cell in cells:
-        value = cell.difference[quantity]
-        rounded = np.inf if value is None else 0.0 if value < EXACT else value
-        found[cell.weissenberg, cell.deborah] = rounded
-    return found
-
-
 def _draw_cells(panel, cells: Cells, colour: str) -> None:
     """Draw one number a cell, the deeper the larger on a logarithmic scale."""
     weissenberg, deborah = _axes_of(cells)
@@ -130,11 +78,6 @@ def _strength(value: float) -> float:
 
 def _axes_of(cells: Cells) -> tuple[list[float], list[float]]:
     return sorted({wi for wi, _ in cells}), sorted({de for _, de in cells})
-
-
-def _place(cells: Sequence[IdentifiabilityCell], wi: float, de: float) -> tuple[int, int]:
-    weissenberg, deborah = _axes_of({(c.weissenberg, c.deborah): None for c in cells})
-    return deborah.index(de), weissenberg.index(wi)
 
 
 def _mark_training(panel, comparison: Comparison, cells: Cells) -> None:
