@@ -60,7 +60,7 @@ def compare(data: dc.Dataset, world: World) -> dict:
 
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
     found = dc.compare(
-        data, base, held_out=_held_out(data), learners=["tensor_sindy", "tensor_dense"]
+        data, base, held_out=_held_out(data), learners=["tensor_sindy"]
     )
     exact, lines = world.make(None), comparison_predictions(found)
     lines = lines[(lines["role"] == "held_out") & (lines["source"] != "declared")]

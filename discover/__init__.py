@@ -34,7 +34,6 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.learners import register_learner as register_learner
     from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
-    from discover.learners.tensor_dense import TensorDense as TensorDense
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
     from discover.loop.in_memory import close_loop as close_loop
     from discover.protocols import after_alternation as after_alternation
@@ -60,7 +59,6 @@ __all__ = [
     "InputError",
     "LinearSweep",
     "Run",
-    "TensorDense",
     "TensorSINDy",
     "after_alternation",
     "after_steady_flow",
@@ -110,7 +108,6 @@ _PLACES = {
     "discover.learners": ("register_learner",),
     "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
-    "discover.learners.tensor_dense": ("TensorDense",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),
     "discover.protocols": (
         "after_alternation",

@@ -6,13 +6,12 @@ from pathlib import Path
 from discover.errors import InputError
 from discover.learners.files.estimator_file import EstimatorFile
 from discover.learners.tbnn_ude import TBNNUDE
-from discover.learners.tensor_dense import TensorDense
 from discover.learners.tensor_sindy import TensorSINDy
 
-_LEARNERS = {"tensor_sindy": TensorSINDy, "tbnn_ude": TBNNUDE, "tensor_dense": TensorDense}
+_LEARNERS = {"tensor_sindy": TensorSINDy, "tbnn_ude": TBNNUDE}
 
 
-def load(path: str | Path) -> TensorSINDy | TBNNUDE | TensorDense:
+def load(path: str | Path) -> TensorSINDy | TBNNUDE:
     """Return the fitted estimator in a file that its `save` wrote; it predicts the same numbers.
 
     Parameters

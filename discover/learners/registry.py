@@ -16,12 +16,8 @@ from tensor_library.registry import Registry
 BUILT_IN: Mapping[str, str] = {
     "tensor_sindy": "sparse regression",
     "tbnn_ude": "neural network",
-    "tensor_dense": "dense library",
 }
 """Titles of the learners of this package."""
-
-BANDS_ONLY = ("tensor_dense",)
-"""Learners that fit nearly any σ12: what they say is a band, and never that a law was found."""
 
 
 @dataclass(frozen=True)

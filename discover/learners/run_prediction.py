@@ -215,7 +215,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
         """Return what the data leave open, with named dimensions, for xarray and ArviZ.
 
-        Of `TensorSINDy` and `TensorDense` 1,000 draws of the coefficients, dimensions ``chain``,
+        Of `TensorSINDy` 1,000 draws of the coefficients, dimensions ``chain``,
         ``draw`` and ``term``, as `arviz.summary` takes them (96 where the linearisation does not
         hold). Those of a sparse law are given its terms: that other terms may be right is not in
         them. Of `TBNNUDE` what each network predicts, dimensions ``member`` and ``sample``: members

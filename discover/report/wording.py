@@ -34,7 +34,6 @@ SMALL_FAULTS = (
 _LEARNERS = {
     "tensor_sindy": "Sparse regression",
     "tbnn_ude": "The neural network",
-    "tensor_dense": "The dense library",
 }
 
 

@@ -27,22 +27,12 @@ def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
         or xarray is missing.
     """
     rng = np.random.default_rng(seed)
-    if hasattr(estimator, "uncertainty_"):
-        terms, values, inner = _of_a_sparse_law(estimator, rng)
-        given = "the terms that were chosen"
-    else:
-        names = estimator.library_.names[: estimator.draws_.coefficients.shape[1]]
-        chosen = rng.choice(len(estimator.draws_.weights), N_DRAWS, p=estimator.draws_.weights)
-        terms, values = list(names), estimator.draws_.coefficients[chosen]
-        inner = dict(
-            zip(("alpha", "xi", "epsilon", "k", "m"), estimator.draws_.constants[chosen].T,
-                strict=True)
-        )  # fmt: skip
-        given = "all terms, each on top of the named law whose constants are beside it"
+    terms, values, inner = _of_a_sparse_law(estimator, rng)
     variables = {"coefficient": (("chain", "draw", "term"), values[None])}
     variables |= {name: (("chain", "draw"), column[None]) for name, column in inner.items()}
     coordinates = {"chain": [0], "draw": np.arange(len(values)), "term": terms}
-    return xarray_module().Dataset(variables, coordinates, {"given": given, **_source(estimator)})
+    told = {"given": "the terms that were chosen", **_source(estimator)}
+    return xarray_module().Dataset(variables, coordinates, told)
 
 
 def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":

@@ -11,7 +11,6 @@ from discover.equations import Equation, HasEquation, combined, law_parts
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.learners.results.term_tables import TermTables
-from discover.learners.results.weighted_laws import WeightedLaws
 from tensor_library.law_terms import spell
 
 
@@ -37,9 +36,6 @@ class LearnerResult(HasEquation, TermTables):
         One sentence on how the fit ended.
     members
         Laws that fit the data about as well, this one among them; empty where there is one only.
-    weighted
-        Laws that fit, of one structure, with weights, whose 95 % band is this learner's answer;
-        None where it has no such band.
     """
 
     learner: str
@@ -52,7 +48,6 @@ class LearnerResult(HasEquation, TermTables):
     details: Mapping[str, Any] = field(default_factory=dict)
     message: str = ""
     members: tuple[AbstractConstitutiveLaw, ...] = ()
-    weighted: WeightedLaws | None = None
 
     def __repr__(self) -> str:
         terms = spell({t.term: t.coefficient for t in self.terms}) if self.terms else "no term"

@@ -55,7 +55,6 @@ _DECADES = 30.0
 _LEARNER_STYLES: dict[str, dict[str, Any]] = {
     "tensor_sindy": {"color": SPARSE, "linestyle": "--", "linewidth": 1.8},
     "tbnn_ude": {"color": NETWORK, "linestyle": ":", "linewidth": 2.2},
-    "tensor_dense": {"color": GREEN, "linestyle": "-", "linewidth": 1.2},
 }
 _OTHERS = (PURPLE, YELLOW, GREEN)
 """Colours of learners of users' own, in their order."""
