@@ -25,8 +25,6 @@ _AS_EFFECTS = {
 }
 """Effects that make each law of upper convected Maxwell."""
 
-CLASSICAL = tuple(_AS_EFFECTS)
-"""Laws that every comparison is held against."""
 
 _STARTS = (0.03, 0.3)
 """Shares of the range of a constant from which its fits start."""

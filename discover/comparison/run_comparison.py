@@ -15,7 +15,13 @@ from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.predictive_check import expectation_of, lacks_of_fit
-from discover.comparison.prepared import prepared, require_one_known_law, settled_by, thinned_to
+from discover.comparison.prepared import (
+    prepared,
+    require_one_known_law,
+    settled_by,
+    thinned_to,
+    without_spikes_in_fit,
+)
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import make_statements
 from discover.comparison.sweep import sweep_points, sweep_studies
@@ -81,7 +87,9 @@ def compare(
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)
+    of_spikes = ""
     if made is None:  # estimators that are fitted already saw every sample
+        data, of_spikes = without_spikes_in_fit(data)
         data = thinned_to(data, options.most_samples)
     require_teacher(study)
     sweep = sweep_studies(study)
@@ -128,7 +136,7 @@ def compare(
     }
     comparison = Comparison(
         name=study.name,
-        data_summary=data_in_words(data, study),
+        data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
         known_part=known_in_words(declared, frame, study),
         flows=frame.shown,
         before=frame.alone(),

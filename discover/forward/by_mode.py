@@ -74,11 +74,3 @@ def constants_of_modes(
         return low + (mean - low) * jnp.exp(change)
     share, odds = (mean - low) / (high - low), jnp.exp(change)
     return low + (high - low) * share * odds / (1.0 - share + share * odds)
-
-
-def link_slope(value: float, low: float, high: float) -> float:
-    """Return the derivative of the link of `constants_of_modes` at a value; infinite at an end."""
-    sides = [side for side in (value - low, high - value) if np.isfinite(side)]
-    if not sides:
-        return 1.0
-    return float("inf") if min(sides) <= 0.0 else float(sum(1.0 / side for side in sides))

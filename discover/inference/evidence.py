@@ -11,10 +11,6 @@ INDISTINGUISHABLE = 6.0
 773: from 6 on the evidence is strong]."""
 
 
-BARE_MENTION = 2.0
-"""A difference of the criterion below this is worth no more than a bare mention (same source): it
-adds no effect, and of two effects the simpler is taken."""
-
 WINDOW = 20.0
 """An explanation so many times less probable than the best counts no longer: Occam's window
 [Madigan & Raftery 1994, J. Am. Stat. Assoc. 89, 1535]."""

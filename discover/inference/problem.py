@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.effects import AbstractEffect
 from discover.forward import AugmentedModel, Batch
 from discover.inference.evidence import criterion, evidence
 from discover.inference.least_squares import NO_PRIOR, Fit, Prior, best_of, fit_batch
@@ -117,8 +116,3 @@ class FitProblem:
     def worth(self, fit: Fit, effects: Sequence[str], effective: float) -> float:
         """Return the criterion of a fit by what it leaves; see `criterion`."""
         return self.criterion(self.cost(fit), fit.free, effects, effective)
-
-
-def effect_of(model: AugmentedModel, name: str) -> AbstractEffect:
-    """Return the effect of a name among the candidates of a model."""
-    return next(effect for effect in model.effects if effect.name == name)

@@ -4,16 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import TransientFlows, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.inference.least_squares import gauss_newton_step
 from discover.protocols.rate_steps import steps_between_samples
 
 _MOST = 40
@@ -59,67 +55,6 @@ def with_places(
         [placed(run, True) for run in fitted],
         [placed(run, False) for run in held_out],
     )
-
-
-def with_own_instants(
-    model: AugmentedModel, theta: Float[np.ndarray, " p"], runs: Sequence[Run]
-) -> list[Run]:
-    """Return runs that no fit saw with the rate stepping when their own stress says.
-
-    The constants stay as they are. A model that cannot be integrated through them leaves the runs
-    as they were.
-    """
-    rows = [i for i, run in enumerate(runs) if any(s.place is None for s in run.rate_steps)]
-    if not rows:
-        return list(runs)
-    # a factor on the whole record dates no step
-    batch = make_batch([replace(runs[i], loading=None) for i in rows])
-    (flows,) = batch.parts
-    assert isinstance(flows, TransientFlows)  # only a given rate steps
-    assert flows.steps is not None
-    sources = np.unique([runs[i].source for i in rows], return_inverse=True)[1]
-    free = np.asarray(flows.steps.place) < 0
-    share = np.array(flows.steps.share)
-
-    def residual(share: np.ndarray) -> np.ndarray:
-        moved = eqx.tree_at(lambda b: b.parts[0].steps.share, batch, jnp.asarray(share))
-        return model.residuals([theta], moved)[0]
-
-    left = residual(share)
-    if not np.all(np.isfinite(left)):
-        return list(runs)
-    for _ in range(_ROUNDS):
-        columns = np.zeros((share.shape[1], *left.shape))
-        for k in range(share.shape[1]):
-            moved, width = share.copy(), np.where(share[:, k] > 0.5, -_WIDTH, _WIDTH)
-            moved[:, k] += width
-            columns[k] = (residual(moved) - left) / width[:, None]
-        trial = share.copy()
-        for source in np.unique(sources):
-            own = sources == source
-            at = np.flatnonzero(free[own][0])
-            begun = share[np.ix_(own, at)]
-            room = (-begun[0], 1.0 - begun[0])
-            step = gauss_newton_step(columns[np.ix_(at, own)], left[own], _DAMPING, room=room)
-            trial[np.ix_(own, at)] = np.clip(begun + step, 0.0, 1.0)
-        after = residual(trial)
-        # a run's own record speaks of its own instants alone
-        better = np.array(
-            [np.sum(after[sources == s] ** 2) < np.sum(left[sources == s] ** 2) for s in sources]
-        )
-        if not np.any(better):
-            break
-        share, left = (
-            np.where(better[:, None], trial, share),
-            np.where(better[:, None], after, left),
-        )
-    found = list(runs)
-    for i, own in zip(rows, share, strict=True):
-        steps = zip(runs[i].rate_steps, own, strict=False)  # rows are padded
-        found[i] = replace(
-            runs[i], rate_steps=tuple(replace(step, share=float(at)) for step, at in steps)
-        )
-    return found
 
 
 def instants_found(

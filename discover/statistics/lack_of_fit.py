@@ -109,11 +109,6 @@ class LackOfFit:
         )
 
     @property
-    def noise_unsure(self) -> bool:
-        """Whether `noise` is no more than what changes from sample to sample."""
-        return self.changing is not None and self.noise <= self.changing
-
-    @property
     def random(self) -> bool:
         """Whether it is noise, as far as its samples tell: no pattern that other errors excuse."""
         seen = self.probability is not None and self.probability <= SIGNIFICANCE

@@ -118,24 +118,6 @@ class DeclaredModel:
         """The declared fluid."""
         return Fluid(self.law, self.modulus, self.relaxation_time, self.solvent_viscosity)
 
-    def without_effects(self, **options: Any) -> ForwardDeclared:
-        """Return the declared fluid as forward models take it, with nothing of it to be fitted.
-
-        Parameters
-        ----------
-        **options
-            Other attributes of `discover.forward.DeclaredModel`.
-        """
-        return ForwardDeclared(
-            self.law,
-            self.modulus,
-            self.relaxation_time,
-            self.solvent_viscosity,
-            law_name=self.law_name,
-            parameters=tuple(self.parameters.items()),
-            **options,
-        )
-
 
 def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     """Return the declared law of a study, with its modes.

@@ -126,22 +126,6 @@ class Records(eqx.Module):
         weight, recorded = np.asarray(self.weight), np.asarray(self.recorded)
         return self.loadings.factors(weight * (predicted - recorded), weight * predicted)
 
-    def as_loaded(
-        self, predicted: Float[np.ndarray, "trials runs n"]
-    ) -> Float[np.ndarray, "trials runs n"]:
-        """Return predictions with the likeliest factors of their loadings, if there are any."""
-        if self.loadings is None:
-            return predicted
-        factors, precision = self.factors(predicted)
-        prior = self.loadings.deviation**2
-        factors = factors * prior * precision / (1.0 + prior * precision)
-        return predicted * (1.0 + self.loadings.at_rows(factors))[..., None]
-
-    @property
-    def deviation_of_loadings(self) -> float:
-        """Standard deviation of the factors of loadings; zero where there are none."""
-        return 0.0 if self.loadings is None else float(self.loadings.deviation)
-
     @property
     def seen(self) -> Bool[np.ndarray, "runs n *kinds"]:
         """Whether a value was recorded and is looked at."""

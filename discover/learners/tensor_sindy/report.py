@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from discover.learners.tensor_sindy.deviance import draws_of_fit
-from discover.learners.tensor_sindy.intervals import ParameterUncertainty, parameter_uncertainty
+from discover.learners.tensor_sindy.intervals import ParameterUncertainty
 from discover.learners.tensor_sindy.refit import Fit
 from discover.learners.tensor_sindy.search import SupportSearch
 from discover.learners.tensor_sindy.stability import Stability
@@ -78,15 +77,6 @@ def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:
     if errors is not None:
         rows["modulus_errors"] = {name: v.tolist() for name, v in vars(errors).items()}
     return rows
-
-
-def uncertainty_row(search: SupportSearch, fit: Fit, seed: int) -> dict[str, Any]:
-    """Return the covariance of a law's parameters and, where it does not serve, their draws."""
-    if not fit.support:
-        return {"covariance": None, "draws": None}
-    uncertainty = parameter_uncertainty(search.problem, fit, search.floor, search.slots)
-    draws = draws_of_fit(search.problem, fit, uncertainty, search.slots, seed)
-    return {**described(uncertainty), "draws": draws.to_json()}
 
 
 def frequency_table(library: TermLibrary, stability: Stability | None) -> list[dict[str, Any]]:

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 
 from discover.inference.by_mode.constants import ConstantByMode
-from discover.inference.by_mode.other_law_of_a_mode import other_laws_said
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,
@@ -82,24 +81,6 @@ def by_mode_picture(
         )
 
 
-def by_mode_in_brief(name: str, constant: ConstantByMode) -> str:
-    """Return the range over which a constant is known to go, in few words."""
-    symbol = readable(effect_title(name))
-    if not constant.degree:
-        return f"{symbol} {significant(constant.value, 2)} in all modes"
-    known = sorted(
-        (mode for mode in constant.modes if not mode.left_open),
-        key=lambda mode: mode.relaxation_time_s,
-    )
-    if not known:
-        return f"{symbol} open in every mode"
-    first, last = (
-        f"{significant(mode.value, 2)} at {significant(mode.relaxation_time_s, 2)} s"
-        for mode in (known[0], known[-1])
-    )
-    return f"{symbol} {first}" if len(known) == 1 else f"{symbol} from {first} to {last}"
-
-
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     """Return what the data say of a constant by mode."""
     symbol = readable(effect_title(name))
@@ -134,10 +115,8 @@ def _allowed(constant: ConstantByMode) -> str:
         for mode in constant.told
         if mode.ci95 is not None
     ]
-    laws = constant.other_laws
     if not ranges:
-        return f"{said}, and determine it in no single mode.{other_laws_said(laws)}"
+        return f"{said}, and determine it in no single mode."
     text = f"{said}, and allow {' and '.join(ranges)}"
-    left = [significant(time, 2) for time in constant.open_times_s if time not in laws]
-    text = f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."
-    return text + other_laws_said(laws)
+    left = [significant(time, 2) for time in constant.open_times_s]
+    return f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."

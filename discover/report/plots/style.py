@@ -65,7 +65,6 @@ OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
 )
 """Of what a study asks to be drawn beside the rest, in its order."""
 
-BY_MODE_TITLE = "constants by mode"
 BY_MODE_STYLE: dict[str, Any] = {"color": PURPLE, "linestyle": "-", "linewidth": 1.2}
 """Of a law whose constants differ from mode to mode."""
 

@@ -58,19 +58,6 @@ def same_correlation_probability(
     return probability
 
 
-def common_likelihood(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
-    """Return the log of the largest likelihood of noise with one first-order correlation.
-
-    Its size each row has of its own; but for a constant.
-
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in any unit.
-    """
-    return float(np.max(sum(_likelihood(row[None], _CORRELATIONS)[0] for row in rows)))
-
-
 def _by_lot(
     rows: Sequence[np.ndarray], correlations: np.ndarray, exponents: np.ndarray, ratio: float
 ) -> float:

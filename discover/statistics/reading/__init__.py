@@ -1,1 +1,0 @@
-"""What faults of reading leave in residuals."""
