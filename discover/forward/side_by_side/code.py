@@ -1,6 +1,6 @@
 """Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, TypeVar
 
 import equinox as eqx
@@ -8,11 +8,12 @@ import jax
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.side_by_side.layout import Layout
+from discover.forward.side_by_side.layout import Layout, as_array
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
 from discover.forward.structure import Numbers
 from discover.programs import compiled
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
+from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
 _MADE: dict[tuple, "Code"] = {}
@@ -118,6 +119,47 @@ class Code:
 
     def _body(self) -> None:
         raise NotImplementedError
+
+    def _keep(self, values: Any, place: Any) -> None:
+        """Write values into the scratch array, one after another."""
+        for i, value in enumerate(np.asarray(values, object).flat):
+            at = place if not i else self._w.at((place, 1), (i, 1))
+            self._w.store(self._arithmetic.lanes(value), "scratch", at)
+
+    def _kept(self, place: Any, *shape: int) -> Any:
+        """Return what stands in the scratch array: a value, or an array of them."""
+        if not shape:
+            return self._w.load("scratch", place)
+        places = [self._w.at((place, 1), (i, 1)) for i in range(int(np.prod(shape)))]
+        return as_array([self._w.load("scratch", at) for at in places]).reshape(shape)
+
+    def _tree(self, name: str, layout: Layout, at: Any) -> Any:
+        """Return the tree of which an array holds several, at a place."""
+        first = self._w.at((at, layout.size))
+        places = [self._w.at((first, 1), (i, 1)) for i in range(layout.size)]
+        return layout.tree([self._w.load(name, place) for place in places])
+
+    def _truths(self) -> dict[str, Any]:
+        """Return which parts are needed, by name."""
+        truths = [
+            self._w.builder.icmp_signed("!=", self._w.load("flags", i), INTEGER(0))
+            for i in range(len(self.flags.names))
+        ]
+        return dict(zip(self.flags.names, truths, strict=True))
+
+    def _rest(self, levels: Sequence[tuple[int, float]], place: int) -> None:
+        """Write states of the fluid at rest, of so many numbers each."""
+        at_rest = [rest for count, rest in levels for _ in range(count)]
+        self._keep(at_rest, place)
+
+    def _states(self, levels: Sequence[tuple[int, float]], place: int) -> tuple:
+        """Return the states of the fluid, in the shapes of their effects."""
+        found = []
+        for count, _ in levels:
+            own = self._kept(place, count)
+            found.append(own if count > 1 else own.reshape(()))
+            place += count
+        return tuple(found)
 
 
 def _is_shape(leaf: Any) -> bool:

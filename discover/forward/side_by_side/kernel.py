@@ -143,11 +143,7 @@ class Kernel(Code):
         w = self._w
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
-        truths = [
-            w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))
-            for i in range(len(self.flags.names))
-        ]
-        self._on = dict(zip(self.flags.names, truths, strict=True))
+        self._on = self._truths()
         self._keep(0.0, _MISSED)
         self._next = w.builder.alloca(INTEGER)
         self._held = OwnWidths(
@@ -161,12 +157,6 @@ class Kernel(Code):
     def _goes_on(self):
         return self._w.builder.icmp_signed("!=", self._w.load("goes_on", 0), INTEGER(0))
 
-    def _keep(self, value: Any, place: Any) -> None:
-        self._w.store(self._arithmetic.lanes(value), "scratch", place)
-
-    def _kept(self, place: Any) -> Any:
-        return self._w.load("scratch", place)
-
     def _splat(self, name: str, place: Any) -> Any:
         return self._arithmetic.splat(self._w.load(name, place))
 
@@ -178,11 +168,7 @@ class Kernel(Code):
         for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, *_OWN):
             self._keep(0.0, place)
         w.builder.store(INTEGER(0), self._next)
-        place = _LEVELS
-        for levels, rest in self._levels:
-            for _ in range(levels):
-                self._keep(rest, place)
-                place += 1
+        self._rest(self._levels, _LEVELS)
         states = w.at((counts["modes"], 4 + self._variables))
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
@@ -231,7 +217,7 @@ class Kernel(Code):
         w, counts, write, step = self._w, self._w.counts, self._write, self._step
         shared, on, add = self._parameters, self._on, self._arithmetic.add
         w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
-        levels, earlier = self._states(), self._kept(_EARLIER)
+        levels, earlier = self._states(self._levels, _LEVELS), self._kept(_EARLIER)
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
         )
@@ -295,27 +281,10 @@ class Kernel(Code):
         )  # fmt: skip
         self._keep(taken[()], _TAKEN)
 
-    def _states(self) -> tuple:
-        """Return the states of the fluid, in the shapes of their effects."""
-        found, place = [], _LEVELS
-        for levels, _ in self._levels:
-            values = np.empty((levels,) if levels > 1 else (), object)
-            for at in np.ndindex(values.shape):
-                values[at] = self._kept(place)
-                place += 1
-            found.append(values)
-        return tuple(found)
-
-    def _constants(self, mode_number) -> Mode:
-        """Return what differs from mode to mode."""
-        w, size = self._w, self._of_mode.size
-        places = [w.at((mode_number, size), (i, 1)) for i in range(size)]
-        return self._of_mode.tree([w.load("mode", place) for place in places])
-
     def _mode(self, run, number, mode_number, width, slow, is_held):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, builder, counts = self._w, self._w.builder, self._w.counts
-        mode = self._constants(mode_number)
+        mode = self._tree("mode", self._of_mode, mode_number)
         untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
         own = builder.or_(builder.or_(self._on["own weights"], untabled), is_held)
         # past the table's end its first row is read, and not used
@@ -360,9 +329,11 @@ class Kernel(Code):
         places = [w.at((at, 4), (i, 1)) for i in range(4)]
         for place in places:
             w.store(a.lanes(0.0), "of_modes", place)
-        factor = self._write(self._step.stiffness, self._parameters, self._on, self._states())[()]
+        factor = self._write(
+            self._step.stiffness, self._parameters, self._on, self._states(self._levels, _LEVELS)
+        )[()]
         with w.loop(w.counts["modes"]) as number, a.apart():
-            mode = self._constants(number)
+            mode = self._tree("mode", self._of_mode, number)
             own = a.multiply(factor, mode.modulus[()])
             stress = w.at((number, 4 + self._variables), (self._state_at, 1))
             for i, place in enumerate(places):
