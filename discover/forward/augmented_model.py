@@ -212,8 +212,9 @@ class AugmentedModel:
         """Return the predicted records, N1 and N2 in Pa of any number of parameter vectors.
 
         All three come from one integration, in the order of `OBSERVED`: what is recorded is σ12 in
-        shear and the tensile stress in extension. N1 is σ11 − σ22 and N2 is σ22 − σ33 in any flow.
-        They are not numbers where a test has none, as a sweep.
+        shear, the tensile stress in extension, and a strain at a given stress. N1 is σ11 − σ22 and
+        N2 is σ22 − σ33 in any flow. They are not numbers where a test has none, as a sweep, and at
+        a given stress with a user's own effect that lanes do not know.
 
         Parameters
         ----------

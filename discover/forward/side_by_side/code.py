@@ -139,6 +139,29 @@ class Code:
         places = [self._w.at((first, 1), (i, 1)) for i in range(layout.size)]
         return layout.tree([self._w.load(name, place) for place in places])
 
+    def _record_modes(self, at: Any, factor: Any, first: int, stride: int) -> None:
+        """Write down σ11, σ22, σ33 and σ12 of all modes.
+
+        Parameters
+        ----------
+        at
+            Which of the places for them.
+        factor
+            On all moduli.
+        first, stride
+            Where in the scratch array the first mode stands, and how far the next is.
+        """
+        w, a = self._w, self._arithmetic
+        places = [w.at((at, 4), (i, 1)) for i in range(4)]
+        for place in places:
+            w.store(a.lanes(0.0), "of_modes", place)
+        with w.loop(w.counts["modes"]) as number, a.apart():
+            own = a.multiply(factor, self._tree("mode", self._of_mode, number).modulus[()])
+            stress = self._kept(w.at((number, stride), (first, 1)), 4)
+            for value, place in zip(stress, places, strict=True):
+                more = a.multiply(own, value)
+                w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
+
     def _truths(self) -> dict[str, Any]:
         """Return which parts are needed, by name."""
         truths = [

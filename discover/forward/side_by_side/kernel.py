@@ -307,7 +307,9 @@ class Kernel(Code):
         w.store(a.lanes(recorded), "stress", at)
         w.store(a.lanes(taken), "felt", at)
         with builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))), a.apart():
-            self._record_modes(at)
+            levels = self._states(self._levels, _LEVELS)
+            factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
+            self._record_modes(at, factor, self._state_at, 4 + self._variables)
         weight = w.load("weight", at)
         with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
             beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
@@ -322,23 +324,6 @@ class Kernel(Code):
             bits = builder.bitcast(of_use, _EIGHT_BITS)
             some = builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
             w.store(builder.zext(some, INTEGER), "goes_on", 0)
-
-    def _record_modes(self, at) -> None:
-        """Write down σ11, σ22, σ33 and σ12 of the modes."""
-        w, a = self._w, self._arithmetic
-        places = [w.at((at, 4), (i, 1)) for i in range(4)]
-        for place in places:
-            w.store(a.lanes(0.0), "of_modes", place)
-        factor = self._write(
-            self._step.stiffness, self._parameters, self._on, self._states(self._levels, _LEVELS)
-        )[()]
-        with w.loop(w.counts["modes"]) as number, a.apart():
-            mode = self._tree("mode", self._of_mode, number)
-            own = a.multiply(factor, mode.modulus[()])
-            stress = w.at((number, 4 + self._variables), (self._state_at, 1))
-            for i, place in enumerate(places):
-                more = a.multiply(own, self._kept(w.at((stress, 1), (i, 1))))
-                w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""
