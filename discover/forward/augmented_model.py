@@ -323,7 +323,8 @@ class AugmentedModel:
     def vectors_at_once(self, batch: Batch) -> int:
         """Return how many vectors cost what one does: as many as stand side by side."""
         kernels = (
-            isinstance(part, TransientFlows) and self._predictor.side_by_side(part) is not None
+            isinstance(part, TransientFlows | StressFlows)
+            and self._predictor.side_by_side(part) is not None
             for part in batch.parts
         )
         return LANES if all(kernels) else 1
