@@ -250,6 +250,7 @@ class Step:
         w = self._of_step(mode, weights)
         first, middle, last = rates
 
+        @jax.jit  # so that it is traced once, and not at each of the four stages
         def remainder(stress, rate, now):
             return self._remainder(shared, mode, on, flow, w, slow[1], stress, rate, now)
 

@@ -60,6 +60,7 @@ class StressStep(Step):
         w = self._of_step(mode, weights)
         middle, last = rates[0], rates[1]
 
+        @jax.jit  # so that it is traced once, and not at each of the four stages
         def remainder(state, rate):
             return self._remainder(shared, mode, on, flow, w, slow, state, rate, slow)
 
