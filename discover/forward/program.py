@@ -105,34 +105,39 @@ class Program:
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
-        To it are left runs that begin with a periodic state, and what laws or effects of a user's
-        own do that is not known in lanes.
+        To it is left what laws or effects of a user's own do that is not known in lanes.
         """
-        if isinstance(part, TransientFlows) and part.cycle_steps:
-            return None
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        chooses = isinstance(part, TransientFlows) and self._chooses_steps(part)
+        choices = {}
+        if isinstance(part, TransientFlows):
+            choices = {"chooses": self._chooses_steps(part), "cycles": part.cycle_steps > 0}
         kind = (
             type(part),
             jax.tree.structure(arrays),
             shapes,
             *jax.tree.leaves(rest),
             flow is None,
-            chooses,
+            *choices.values(),
         )
         if kind not in self._kernels:
             try:
-                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, chooses)
+                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
         return self._kernels[kind]
 
-    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None, chooses: bool):
+    def _in_lanes(
+        self,
+        numbers: Numbers,
+        control: type,
+        flow: Kinematics | None,
+        choices: dict[str, bool],
+    ):
         given, made_from = (self.fluid, numbers, flow), self._made_from
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
@@ -143,7 +148,7 @@ class Program:
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
-        kernel = code_of(Kernel, *given, chooses=chooses)
+        kernel = code_of(Kernel, *given, **choices)
         return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
 
     def _chooses_steps(self, part: TransientFlows) -> bool:
