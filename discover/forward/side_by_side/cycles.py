@@ -30,11 +30,12 @@ if TYPE_CHECKING:
 # begins with what was found, and the run from there on
 _BEFORE, _REST, _NEWTON, _CLOSING, _RUN = range(5)
 
-# By how much a number is moved, of one and its size
+# By how much a number is moved, of one and its size. All modes are moved by as much, that of the
+# largest: what couples them would else show in those that are moved less
 _MOVED = 1e-7
 
 _ENOUGH = 10**9
-_ALIVE, _CHANGE, _SHIFT, _PERIOD = range(4)
+_ALIVE, _CHANGE, _SHIFT, _LARGEST, _PERIOD = range(5)
 
 
 def improved(relaxation_time, period, alive, moved, way, end, tangents):
@@ -62,7 +63,9 @@ def improved(relaxation_time, period, alive, moved, way, end, tangents):
 
 def improved_level(alive, level, end, slope):
     """Return the next approximation of a state of the fluid, and by how much it moved."""
-    following = level + (end - level) / (1.0 - slope)
+    # one that stays where it is, as of an effect that is absent, may be anywhere
+    stays = end == level
+    following = level + jnp.where(stays, 0.0, (end - level) / jnp.where(stays, 1.0, 1.0 - slope))
     moved = jnp.abs(following - level)
     moved = jnp.where(moved < jnp.inf, moved, jnp.inf)  # where it is no number
     return jnp.where(alive > 0.0, following, level), moved
@@ -219,18 +222,24 @@ class Cycles:
             is_moved = b.icmp_signed("==", index, INTEGER(1 + self._size + effect))
             for _ in range(count):
                 level = code._kept(self._of_level(0, place))
-                code._keep(self._shifted(level, is_moved), self._levels_at + place)
+                code._keep(self._shifted(level, is_moved, level), self._levels_at + place)
                 place += 1
+        with b.if_then(b.icmp_signed("==", index, INTEGER(0))), self._a.apart():
+            self._keep(0.0, _LARGEST)
+            with self._each_mode() as (_, _, way):
+                for value in code._kept(way, self._size):
+                    larger = self._a.larger(self._kept(_LARGEST), self._a.size(value))
+                    self._keep(larger, _LARGEST)
         with self._each_mode() as (_, state, way):
             for i in range(self._size):
                 at = self._w.at((state, 1), (i, 1))
                 is_moved = b.icmp_signed("==", index, INTEGER(1 + i))
                 value = code._kept(self._w.at((way, 1), (i, 1)))
-                code._keep(self._shifted(value, is_moved), at)
+                code._keep(self._shifted(value, is_moved, self._kept(_LARGEST)), at)
 
-    def _shifted(self, value: Any, is_moved: Any) -> Any:
+    def _shifted(self, value: Any, is_moved: Any, of: Any) -> Any:
         a = self._a
-        return a.add(value, a.chosen(is_moved, self._width(value), 0.0))
+        return a.add(value, a.chosen(is_moved, self._width(of), 0.0))
 
     def _width(self, value: Any) -> Any:
         return self._a.multiply(_MOVED, self._a.add(1.0, self._a.size(value)))
@@ -275,7 +284,7 @@ class Cycles:
                 code._keep(code._kept(state, self._size), end)
             with b.if_then(b.and_(of_mode, b.not_(is_base))), a.apart():
                 moved = w.at((index, 1), (-1, 1))
-                width = self._width(code._kept(w.at((way, 1), (moved, 1))))
+                width = self._width(self._kept(_LARGEST))
                 column = w.at((end, 1), (self._size, 1), (moved, self._size))
                 for i in range(self._size):
                     value = code._kept(w.at((state, 1), (i, 1)))
