@@ -1,7 +1,7 @@
 """Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
 
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
@@ -28,6 +28,37 @@ def in_whole_eights(count: int) -> np.ndarray:
 def lanes_last(values: np.ndarray) -> np.ndarray:
     """Return values of lanes, in whole eights, with these eights first and their lanes last."""
     return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
+
+
+class Eights(NamedTuple):
+    """Vectors in whole eights, the last again until they are full.
+
+    Attributes
+    ----------
+    pairs
+        Of each eight its vectors and their moduli.
+    modes, shared
+        What the vectors say of each mode, and of all of them, lanes first.
+    """
+
+    pairs: list[tuple[np.ndarray, np.ndarray]]
+    modes: np.ndarray
+    shared: np.ndarray
+
+    @classmethod
+    def of(cls, packed: Callable, numbers: Numbers, thetas, moduli) -> "Eights":
+        """Return vectors packed by a program of `Code.packing`, whose lanes are first."""
+        places = in_whole_eights(len(thetas))
+        both = (values[places].reshape(-1, LANES, values.shape[1]) for values in (thetas, moduli))
+        pairs = list(zip(*both, strict=True))
+        each = [packed(numbers, *pair) for pair in pairs]
+        return cls(pairs, *(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
+
+    def rates(self, commanded: np.ndarray, shaped: Callable | None) -> np.ndarray:
+        """Return the rates that each vector feels: as commanded, or what a program makes of it."""
+        if shaped is None:
+            return np.broadcast_to(commanded, (len(self.modes), *commanded.shape))
+        return np.concatenate([shaped(thetas) for thetas, _ in self.pairs])
 
 
 class Code:
