@@ -1,10 +1,11 @@
 """What a prediction of transients costs where many vectors of parameters are asked for at once.
 
 Cases: start-ups of a melt of thirteen modes, steps of the rate of a fluid with one, large
-oscillations of a gel, start-ups in shear and extension, a flow curve and a sweep; each with the
-Maxwell law alone or with an effect, and start-ups with a law whose chains retract. Prints
-milliseconds of processor a vector for 1, 8 and 32 of them, in this tree and, run in turns as a
-process of its own, in another; their ratio; and how far predictions are apart.
+oscillations of a gel from rest and in steady alternation, a wave of its stress, start-ups in shear
+and extension, a flow curve and a sweep; each with the Maxwell law alone or with an effect, and
+start-ups with a law whose chains retract. Prints milliseconds of processor a vector for 1, 8 and 32
+of them, in this tree and, run in turns as a process of its own, in another; their ratio; and how
+far predictions are apart.
 
     python benchmarks/many_vectors.py [OTHER_TREE]
 """
@@ -15,10 +16,14 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 
+# where the loop is: an older tree has it elsewhere
+LOOP = "loop" if find_spec("discover.loop") else "closed_loop"
 BATCHES = 1, 8, 32
 CALLS = 5
 TURNS = 3
@@ -34,6 +39,8 @@ def flows():
         steady_rates,
         step_rates,
     )
+    from discover.protocols.control import imposed_stress
+    from discover.protocols.history import after_alternation
     from discover.protocols.protocol import in_flow
 
     def run(name, protocol, times, rate):
@@ -48,6 +55,10 @@ def flows():
     blood = [run("b", step_rates([0.0, 20.0, 40.0], [1.0, 10.0, 0.5]), steps, 1.0)]
     times = np.linspace(0.02, 12.0, 500)
     gel = [run(f"g{i}", oscillatory_shear(a, 2.0), times, 0.0) for i, a in enumerate((0.5, 2.0))]
+    wave = oscillatory_shear(4.0, 2.0)
+    turns = [run("t", after_alternation(wave, np.pi, times), times, 0.0)]
+    stress = imposed_stress(np.append(0.0, times), np.append(0.0, 150.0 * np.sin(2.0 * times)))
+    driven = [replace(run("d", stress, times, 0.0), strain=np.ones(times.size))]
     ldpe_times = np.geomspace(1e-2, 1e2, 8)
     ldpe = []
     for i, rate in enumerate((0.03, 0.3, 1.0)):
@@ -67,6 +78,8 @@ def flows():
         "curve": (curve, 3e4 * melt_times**-0.25, melt_times),
         "sweep": (sweep, 1e4 * ldpe_times**-0.3, ldpe_times),
         "melt": (melt, 3e4 * melt_times**-0.25, melt_times),
+        "turns": (turns, np.array([200.0, 80.0]), np.array([0.3, 4.0])),
+        "driven": (driven, np.array([200.0, 80.0]), np.array([0.3, 4.0])),
         "blood": (blood, np.array([0.5]), np.array([0.1])),
         "gel": (gel, np.array([200.0, 80.0]), np.array([0.3, 4.0])),
         "ldpe": (ldpe, 1e4 * ldpe_times**-0.3, ldpe_times),
@@ -80,6 +93,8 @@ CASES = {
     "blood, Maxwell": ("blood", ()),
     "blood, structure": ("blood", ("thixotropy",)),
     "gel, Giesekus and rise time": ("gel", ("giesekus_mobility", "rate_rise_time")),
+    "steady alternation, Giesekus": ("turns", ("giesekus_mobility",)),
+    "given stress, Giesekus": ("driven", ("giesekus_mobility",)),
     "LDPE, exponential PTT": ("ldpe", ("ptt_exponential",)),
     "LDPE, compliance": ("ldpe", ("ptt_exponential", "tool_compliance")),
     "LDPE, Rolie-Poly": ("ldpe", ()),
@@ -94,9 +109,9 @@ def measured() -> dict[str, dict]:
     from discover.forward import AugmentedModel, make_batch
     from discover.forward.batches import data_scales
     from discover.forward.declared import DeclaredModel
-    from discover.loop.candidates import candidates_of
     from discover.precision import enable_x64
 
+    candidates_of = import_module(f"discover.{LOOP}.candidates").candidates_of
     enable_x64()
     enable_compilation_cache()
     models, found = {}, {}

@@ -201,19 +201,13 @@ class AugmentedFluid:
         def modes_rate(stress, gradient):
             return of_law(stress, gradient) - added(stress, gradient)
 
-        series = None
-        if self.series:
-            pairs = [e.slip_and_compliance(self.values(theta, e)) for e in self.series]
-            both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
-            slip, compliance = where_in_shear(flow, both, jnp.zeros(2))
-            series = Series(slip, compliance, self._slip_by_stress(theta, flow))
         return Dynamics(
             modes_rate,
             law.linear_relaxation,
             declared,
             extra,
             {effect: self.values(theta, effect) for effect in self.states},
-            series,
+            self.in_series(theta, flow),
             self.beside(numbers, theta, jnp.ones(1), flow and flow.driven)[0],
             self._of_modes_at_rest("relaxations", law, declared.modulus, extra)
             if law.retracts
@@ -224,6 +218,15 @@ class AugmentedFluid:
             self._of_modes_at_rest("shares", law, declared.modulus, extra) if law.tensors else None,
             in_one_piece,
         )
+
+    def in_series(self, theta, flow: Kinematics | None) -> Series | None:
+        """Return what gives way in series with the fluid; None where there is no such effect."""
+        if not self.series:
+            return None
+        pairs = [e.slip_and_compliance(self.values(theta, e)) for e in self.series]
+        both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
+        slip, compliance = where_in_shear(flow, both, jnp.zeros(2))
+        return Series(slip, compliance, self._slip_by_stress(theta, flow))
 
     def _slip_by_stress(self, theta, flow: Kinematics | None):
         """Return what slip depends on the stress, as a function of it; None where nothing does."""

@@ -212,8 +212,9 @@ class AugmentedModel:
         """Return the predicted records, N1 and N2 in Pa of any number of parameter vectors.
 
         All three come from one integration, in the order of `OBSERVED`: what is recorded is σ12 in
-        shear and the tensile stress in extension. N1 is σ11 − σ22 and N2 is σ22 − σ33 in any flow.
-        They are not numbers where a test has none, as a sweep.
+        shear, the tensile stress in extension, and a strain at a given stress. N1 is σ11 − σ22 and
+        N2 is σ22 − σ33 in any flow. They are not numbers where a test has none, as a sweep, and at
+        a given stress with a user's own effect that lanes do not know.
 
         Parameters
         ----------
@@ -322,7 +323,8 @@ class AugmentedModel:
     def vectors_at_once(self, batch: Batch) -> int:
         """Return how many vectors cost what one does: as many as stand side by side."""
         kernels = (
-            isinstance(part, TransientFlows) and self._predictor.side_by_side(part) is not None
+            isinstance(part, TransientFlows | StressFlows)
+            and self._predictor.side_by_side(part) is not None
             for part in batch.parts
         )
         return LANES if all(kernels) else 1

@@ -26,7 +26,7 @@ from discover.forward.batches import (
     TransientFlows,
 )
 from discover.forward.dynamics import declared_weights
-from discover.forward.integrators.imposed_stress import answer_to_stress
+from discover.forward.integrators.imposed_stress import answer_to_stress, strain_in_series
 from discover.forward.integrators.with_effects import RUNS, Judged, integrate
 from discover.forward.side_by_side import (
     Kernel,
@@ -35,6 +35,8 @@ from discover.forward.side_by_side import (
     SideBySide,
     SteadyCode,
     SteadySideBySide,
+    StressCode,
+    StressSideBySide,
     code_of,
     intervals,
 )
@@ -103,34 +105,39 @@ class Program:
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
-        To it are left runs that begin with a periodic state, and what laws or effects of a user's
-        own do that is not known in lanes.
+        To it is left what laws or effects of a user's own do that is not known in lanes.
         """
-        if isinstance(part, StressFlows) or (isinstance(part, TransientFlows) and part.cycle_steps):
-            return None
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
-        chooses = isinstance(part, TransientFlows) and self._chooses_steps(part)
+        choices = {}
+        if isinstance(part, TransientFlows):
+            choices = {"chooses": self._chooses_steps(part), "cycles": part.cycle_steps > 0}
         kind = (
             type(part),
             jax.tree.structure(arrays),
             shapes,
             *jax.tree.leaves(rest),
             flow is None,
-            chooses,
+            *choices.values(),
         )
         if kind not in self._kernels:
             try:
-                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, chooses)
+                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
             except NotTranslatable as reason:
                 _LOGGER.debug("vectors are predicted one by one: %s", reason)
                 self._kernels[kind] = None
         return self._kernels[kind]
 
-    def _in_lanes(self, numbers: Numbers, control: type, flow: Kinematics | None, chooses: bool):
+    def _in_lanes(
+        self,
+        numbers: Numbers,
+        control: type,
+        flow: Kinematics | None,
+        choices: dict[str, bool],
+    ):
         given, made_from = (self.fluid, numbers, flow), self._made_from
         if control is SteadyFlows:
             own = self._steady_rates, self._recorded_steady
@@ -138,7 +145,10 @@ class Program:
         if control is PeriodicFlows:
             own = self._periodic_rates, self._moduli_recorded
             return PeriodicSideBySide(self.fluid, code_of(PeriodicCode, *given), *own, made_from)
-        kernel = code_of(Kernel, *given, chooses=chooses)
+        if control is StressFlows:
+            code = code_of(StressCode, *given)
+            return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
+        kernel = code_of(Kernel, *given, **choices)
         return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
 
     def _chooses_steps(self, part: TransientFlows) -> bool:
@@ -385,7 +395,13 @@ class Program:
     def _predict_strain(self, numbers, used, theta, run: StressFlows):
         flow = run.kinematics
         dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        imposed, inertia = run.imposed, jnp.zeros(())
+        imposed, inertia = self._driven(theta, run)
+        answer = answer_to_stress(dynamics, run.times, imposed, inertia, flow)
+        return answer.strain[run.sample_index]
+
+    def _driven(self, theta, run: StressFlows):
+        """Return the true stress of a run at a given one in Pa, and the tool's inertia in Pa s²."""
+        flow, imposed, inertia = run.kinematics, run.imposed, jnp.zeros(())
         still = jnp.zeros_like(imposed)
         for effect in reversed(self._signal):
             values = self.fluid.values(theta, effect)
@@ -400,9 +416,16 @@ class Program:
                 )
                 imposed = (imposed - nothing) / (unit - nothing)
         inertia = where_in_shear(flow, inertia, jnp.zeros(()))
-        imposed = where_in_shear(flow, imposed, run.imposed)
-        answer = answer_to_stress(dynamics, run.times, imposed, inertia, flow)
-        return answer.strain[run.sample_index]
+        return where_in_shear(flow, imposed, run.imposed), inertia
+
+    def _driven_with_series(self, theta, run: StressFlows):
+        """Return these, and the strain at step ends of what gives way in series."""
+        imposed, inertia = self._driven(theta, run)
+        series = self.fluid.in_series(theta, run.kinematics)
+        strain = jnp.zeros_like(imposed)
+        if series is not None:
+            strain = strain_in_series(series, run.times, imposed)
+        return imposed, inertia, strain
 
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
         """Return the stress after an effect of the torque's signal, where that is recorded."""

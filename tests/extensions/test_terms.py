@@ -38,6 +38,7 @@ SAMPLES = """
 import jax.numpy as jnp, numpy as np, pathlib, discover as dc
 from discover.equations import Equation
 from discover.simulate import simulate
+from tensor_library import LawTerm
 fluid = Equation((LawTerm("(tanh(mu*tr(sigma)))*sigma", 0.8, {"mu": 0.7}),)).fluid()
 folder = pathlib.Path("data"); folder.mkdir()
 names, noise = [], np.random.default_rng(3)

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.forward.dynamics import Dynamics
+from discover.forward.dynamics import Dynamics, Series
 from discover.protocols.kinematics import Kinematics
 from tensor_library.contraction import contracted
 
-# dγ̇/dt where the rate is asked for, over 1/h, of the rates there less that before: of the parabola
-# through all three
-_RATE_OF_RATE = np.array([[0.0, 1.0], [-4.0, 3.0]])
+RATE_OF_RATE = np.array([[0.0, 1.0], [-4.0, 3.0]])
+"""dγ̇/dt where the rate is asked for, over 1/h, of the rates there less that before: of the parabola
+through all three."""
 
 
 class Answer(NamedTuple):
@@ -80,7 +80,7 @@ def answer_to_stress(
         w = dynamics.weights_of_step(weights, h, slow)
         scale = jnp.stack([dynamics.combined("modulus_factor", at) for at in (halfway, ahead)])
         wanted = jnp.stack([0.5 * (from_ + target), target])
-        accelerated = inertia / h * _RATE_OF_RATE
+        accelerated = inertia / h * RATE_OF_RATE
 
         def followed(fluid: Dynamics, rates):
             """Return what the balance misses at rates in the middle and at the end; the modes."""
@@ -140,8 +140,22 @@ def answer_to_stress(
     )
     if dynamics.series is None:
         return Answer(strain, stress, rate)
-    # what gives way feels the same stress, and its strain is recorded with the fluid's
-    slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * width)
-    given = dynamics.series.compliance * (imposed - imposed[0])
-    strain = strain + given + dynamics.series.slip * jnp.concatenate([jnp.zeros(1), slipped])
-    return Answer(strain, stress, rate)
+    given = strain_in_series(dynamics.series, times, imposed)
+    return Answer(strain + given, stress, rate)
+
+
+def strain_in_series(
+    series: Series, times: Float[Array, " s"], imposed: Float[Array, " s"]
+) -> Float[Array, " s"]:
+    """Return the strain of what gives way, which feels the same stress as the fluid.
+
+    Parameters
+    ----------
+    series
+        What gives way; slip that depends on the stress is left out.
+    times, imposed
+        As in `answer_to_stress`; what is recorded is this strain and that of the fluid.
+    """
+    slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * jnp.diff(times))
+    given = series.compliance * (imposed - imposed[0])
+    return given + series.slip * jnp.concatenate([jnp.zeros(1), slipped])

@@ -6,6 +6,8 @@ from discover.forward.side_by_side.periodic import PeriodicSideBySide
 from discover.forward.side_by_side.periodic_code import PeriodicCode
 from discover.forward.side_by_side.steady import SteadySideBySide
 from discover.forward.side_by_side.steady_code import SteadyCode
+from discover.forward.side_by_side.stress import StressSideBySide
+from discover.forward.side_by_side.stress_code import StressCode
 from discover.forward.side_by_side.transients import SideBySide, intervals
 
 __all__ = [
@@ -15,6 +17,8 @@ __all__ = [
     "SideBySide",
     "SteadyCode",
     "SteadySideBySide",
+    "StressCode",
+    "StressSideBySide",
     "code_of",
     "intervals",
 ]

@@ -1,18 +1,19 @@
 """Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
 
-from collections.abc import Callable
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import equinox as eqx
 import jax
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.side_by_side.layout import Layout
+from discover.forward.side_by_side.layout import Layout, as_array
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
 from discover.forward.structure import Numbers
 from discover.programs import compiled
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
+from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
 _MADE: dict[tuple, "Code"] = {}
@@ -27,6 +28,37 @@ def in_whole_eights(count: int) -> np.ndarray:
 def lanes_last(values: np.ndarray) -> np.ndarray:
     """Return values of lanes, in whole eights, with these eights first and their lanes last."""
     return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
+
+
+class Eights(NamedTuple):
+    """Vectors in whole eights, the last again until they are full.
+
+    Attributes
+    ----------
+    pairs
+        Of each eight its vectors and their moduli.
+    modes, shared
+        What the vectors say of each mode, and of all of them, lanes first.
+    """
+
+    pairs: list[tuple[np.ndarray, np.ndarray]]
+    modes: np.ndarray
+    shared: np.ndarray
+
+    @classmethod
+    def of(cls, packed: Callable, numbers: Numbers, thetas, moduli) -> "Eights":
+        """Return vectors packed by a program of `Code.packing`, whose lanes are first."""
+        places = in_whole_eights(len(thetas))
+        both = (values[places].reshape(-1, LANES, values.shape[1]) for values in (thetas, moduli))
+        pairs = list(zip(*both, strict=True))
+        each = [packed(numbers, *pair) for pair in pairs]
+        return cls(pairs, *(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
+
+    def rates(self, commanded: np.ndarray, shaped: Callable | None) -> np.ndarray:
+        """Return the rates that each vector feels: as commanded, or what a program makes of it."""
+        if shaped is None:
+            return np.broadcast_to(commanded, (len(self.modes), *commanded.shape))
+        return np.concatenate([shaped(thetas) for thetas, _ in self.pairs])
 
 
 class Code:
@@ -118,6 +150,70 @@ class Code:
 
     def _body(self) -> None:
         raise NotImplementedError
+
+    def _keep(self, values: Any, place: Any) -> None:
+        """Write values into the scratch array, one after another."""
+        for i, value in enumerate(np.asarray(values, object).flat):
+            at = place if not i else self._w.at((place, 1), (i, 1))
+            self._w.store(self._arithmetic.lanes(value), "scratch", at)
+
+    def _kept(self, place: Any, *shape: int) -> Any:
+        """Return what stands in the scratch array: a value, or an array of them."""
+        if not shape:
+            return self._w.load("scratch", place)
+        places = [self._w.at((place, 1), (i, 1)) for i in range(int(np.prod(shape)))]
+        return as_array([self._w.load("scratch", at) for at in places]).reshape(shape)
+
+    def _tree(self, name: str, layout: Layout, at: Any) -> Any:
+        """Return the tree of which an array holds several, at a place."""
+        first = self._w.at((at, layout.size))
+        places = [self._w.at((first, 1), (i, 1)) for i in range(layout.size)]
+        return layout.tree([self._w.load(name, place) for place in places])
+
+    def _record_modes(self, at: Any, factor: Any, first: int, stride: int) -> None:
+        """Write down σ11, σ22, σ33 and σ12 of all modes.
+
+        Parameters
+        ----------
+        at
+            Which of the places for them.
+        factor
+            On all moduli.
+        first, stride
+            Where in the scratch array the first mode stands, and how far the next is.
+        """
+        w, a = self._w, self._arithmetic
+        places = [w.at((at, 4), (i, 1)) for i in range(4)]
+        for place in places:
+            w.store(a.lanes(0.0), "of_modes", place)
+        with w.loop(w.counts["modes"]) as number, a.apart():
+            own = a.multiply(factor, self._tree("mode", self._of_mode, number).modulus[()])
+            stress = self._kept(w.at((number, stride), (first, 1)), 4)
+            for value, place in zip(stress, places, strict=True):
+                more = a.multiply(own, value)
+                w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
+
+    def _truths(self) -> dict[str, Any]:
+        """Return which parts are needed, by name."""
+        truths = [
+            self._w.builder.icmp_signed("!=", self._w.load("flags", i), INTEGER(0))
+            for i in range(len(self.flags.names))
+        ]
+        return dict(zip(self.flags.names, truths, strict=True))
+
+    def _rest(self, levels: Sequence[tuple[int, float]], place: int) -> None:
+        """Write states of the fluid at rest, of so many numbers each."""
+        at_rest = [rest for count, rest in levels for _ in range(count)]
+        self._keep(at_rest, place)
+
+    def _states(self, levels: Sequence[tuple[int, float]], place: int) -> tuple:
+        """Return the states of the fluid, in the shapes of their effects."""
+        found = []
+        for count, _ in levels:
+            own = self._kept(place, count)
+            found.append(own if count > 1 else own.reshape(()))
+            place += count
+        return tuple(found)
 
 
 def _is_shape(leaf: Any) -> bool:

@@ -12,6 +12,7 @@ import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.cycles import Cycles
 from discover.forward.side_by_side.layout import as_array as _array
 from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
@@ -22,8 +23,8 @@ from discover.protocols.kinematics import Kinematics
 _COUNTS = ("runs", "steps", "modes", "tabled", "normal")
 # of all modes and lanes: rates, parameters, modes and the limit of each vector; and what is written
 _WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "of_modes", "scratch")
-_WHOLE = ("last", "held", "flags", "goes_on")
-_SCALAR = ("width", "whole", "least", "table", "flow", "jump", "weight", "recorded")
+_WHOLE = ("last", "held", "cycle", "flags", "goes_on")
+_SCALAR = ("width", "whole", "least", "period", "table", "flow", "jump", "weight", "recorded")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 
 _EIGHT_BITS = ir.IntType(8)
@@ -59,6 +60,8 @@ class Kernel(Code):
         Kinematics of one run; None where all are simple shear.
     chooses
         Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
+    cycles
+        Whether some runs begin with a periodic state.
 
     Raises
     ------
@@ -74,16 +77,17 @@ class Kernel(Code):
         found: tuple[Mode, Shared],
         flow: Kinematics | None,
         chooses: bool,
+        cycles: bool,
     ):
         super().__init__(fluid, found, flow)
-        self._chooses, self.steps_taken = chooses, 0
+        self._chooses, self._begins, self.steps_taken = chooses, cycles, 0
         self._times_at = self.flags.names.index("times")
         self._variables = self._law.variables
         self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
         self._state_at = _LEVELS + sum(levels for levels, _ in self._levels)
-        self._make(fluid, found, flow, chooses)
+        self._make(fluid, found, flow, chooses, cycles)
 
     def __call__(
         self,
@@ -121,7 +125,9 @@ class Kernel(Code):
         flags[-1] = used[self._times_at]
         size = self._state_at + modes * (4 + self._variables)
         # a step whose width is chosen holds the state three times
-        scratch = np.empty((_STATE + 3 * (size - _STATE), LANES))
+        room = _STATE + 3 * (size - _STATE)
+        room += Cycles.room(self._state_at - _LEVELS, modes, 4 + self._variables) * self._begins
+        scratch = np.empty((room, LANES))
         arrays = given | {
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
             "of_modes": of_modes,
@@ -143,29 +149,25 @@ class Kernel(Code):
         w = self._w
         first = [w.load("shared", i) for i in range(self._shared.size)]
         self._parameters = self._shared.tree(first)
-        truths = [
-            w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))
-            for i in range(len(self.flags.names))
-        ]
-        self._on = dict(zip(self.flags.names, truths, strict=True))
+        self._on = self._truths()
         self._keep(0.0, _MISSED)
         self._next = w.builder.alloca(INTEGER)
         self._held = OwnWidths(
             w, self._arithmetic, _OWN, _STATE, range(_LEVELS, self._state_at),
             self._state_at, self._variables, self._on["states"],
         )  # fmt: skip
+        if self._begins:
+            size = 4 + self._variables
+            modes = w.at((w.counts["modes"], 3 * size), (3, self._state_at - _STATE), (_STATE, 1))
+            self._cycles = Cycles(
+                self, self._levels, _LEVELS, self._state_at, size, modes, self._on["states"]
+            )
         w.store(INTEGER(1), "goes_on", 0)
         with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
             self._of_run(run)
 
     def _goes_on(self):
         return self._w.builder.icmp_signed("!=", self._w.load("goes_on", 0), INTEGER(0))
-
-    def _keep(self, value: Any, place: Any) -> None:
-        self._w.store(self._arithmetic.lanes(value), "scratch", place)
-
-    def _kept(self, place: Any) -> Any:
-        return self._w.load("scratch", place)
 
     def _splat(self, name: str, place: Any) -> Any:
         return self._arithmetic.splat(self._w.load(name, place))
@@ -178,36 +180,62 @@ class Kernel(Code):
         for place in (_MISSING, _EARLIER, _SHEARED, _RECORDED, _TAKEN, *_OWN):
             self._keep(0.0, place)
         w.builder.store(INTEGER(0), self._next)
-        place = _LEVELS
-        for levels, rest in self._levels:
-            for _ in range(levels):
-                self._keep(rest, place)
-                place += 1
+        self._rest(self._levels, _LEVELS)
         states = w.at((counts["modes"], 4 + self._variables))
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
-        with w.loop(w.load("last", run), self._goes_on) as number, self._arithmetic.apart():
-            if self._chooses:
-                is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
-                with w.builder.if_then(is_next), self._arithmetic.apart():
-                    self._of_interval(run, number, flow)
-            else:
-                self._of_grid(run, number, flow)
+        last = w.load("last", run)
+        if self._begins:
+            cycle = [w.load("cycle", w.at((run, 2), (i, 1))) for i in range(2)]
+            period = self._splat("period", run)
+            start, end = cycle
+            passes = self._cycles.passes(start, end, last, period, lambda: self._settle(flow))
+            with passes as (first, behind, is_run), self._arithmetic.apart():
+                w.builder.store(first, self._next)
+                self._steps(run, first, w.builder.sub(behind, first), flow, is_run)
+        else:
+            self._steps(run, INTEGER(0), last, flow, TRUTH(1))
         with w.builder.if_then(self._goes_on()), self._arithmetic.apart():
             self._at_start(run, flow)
             with w.loop(w.load("last", run)) as number, self._arithmetic.apart():
                 self._beside(run, number, flow)
 
-    def _of_grid(self, run, number, flow) -> None:
+    def _steps(self, run, first, count, flow, is_run) -> None:
+        """Write so many steps, and what is recorded in them if they are the run's."""
+        w, arithmetic = self._w, self._arithmetic
+        with w.loop(count, self._goes_on) as number, arithmetic.apart():
+            number = w.at((number, 1), (first, 1))
+            if self._chooses:
+                is_next = w.builder.icmp_signed(">=", number, w.builder.load(self._next))
+                with w.builder.if_then(is_next), arithmetic.apart():
+                    self._of_interval(run, number, flow, is_run)
+            else:
+                self._of_grid(run, number, flow, is_run)
+
+    def _settle(self, flow) -> None:
+        """Write what a step needs of modes that were not reached by a step before."""
+        w, add = self._w, self._arithmetic.add
+        for place in (_MISSING, _EARLIER, _TAKEN, _SHEARED):
+            self._keep(0.0, place)
+        with w.loop(w.counts["modes"]) as number, self._arithmetic.apart():
+            mode, at = self._tree("mode", self._of_mode, number), self._place_of_mode(number)
+            stress = self._kept(at, 4 + self._variables)
+            sheared, _ = self._write(self._step.felt, mode, flow, stress)
+            self._keep(add(self._kept(_SHEARED), sheared[()]), _SHEARED)
+
+    def _place_of_mode(self, number) -> Any:
+        return self._w.at((number, 4 + self._variables), (self._state_at, 1))
+
+    def _of_grid(self, run, number, flow, is_run) -> None:
         """Write a step of the grid."""
         w, steps = self._w, self._w.counts["steps"]
         half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
         rates = [w.load("rate", w.at((half, 1), (i, 1))) for i in range(3)]
         width = self._splat("width", w.at((run, steps), (number, 1)))
         self._of_step(run, number, flow, rates, width, TRUTH(0))
-        self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), rates[2])
+        self._record(run, number, flow, rates[2], is_run)
 
-    def _of_interval(self, run, number, flow) -> None:
+    def _of_interval(self, run, number, flow, is_run) -> None:
         """Write a step of the grid, or several in which the rate is a straight line."""
         w, steps = self._w, self._w.counts["steps"]
         half = w.at((run, w.at((steps, 2), (1, 1))), (number, 2))
@@ -225,13 +253,13 @@ class Kernel(Code):
                     earlier, now = w.load("felt", first), self._kept(_EARLIER)
                     w.store(self._arithmetic.chosen(is_first, now, earlier), "felt", first)
         number = w.at((number, 1), (count, 1), (-1, 1))
-        self._record(run, number, flow, self._kept(_RECORDED), self._kept(_EARLIER), last)
+        self._record(run, number, flow, last, is_run)
 
     def _of_step(self, run, number, flow, rates, width, is_held) -> None:
         w, counts, write, step = self._w, self._w.counts, self._write, self._step
         shared, on, add = self._parameters, self._on, self._arithmetic.add
         w.store(w.at((w.load("goes_on", _STEPS), 1), (1, 1)), "goes_on", _STEPS)
-        levels, earlier = self._states(), self._kept(_EARLIER)
+        levels, earlier = self._states(self._levels, _LEVELS), self._kept(_EARLIER)
         before, scale_last, slow = write(
             step.before_modes, shared, on, flow, levels, self._kept(_SHEARED), rates[1], width
         )
@@ -295,27 +323,10 @@ class Kernel(Code):
         )  # fmt: skip
         self._keep(taken[()], _TAKEN)
 
-    def _states(self) -> tuple:
-        """Return the states of the fluid, in the shapes of their effects."""
-        found, place = [], _LEVELS
-        for levels, _ in self._levels:
-            values = np.empty((levels,) if levels > 1 else (), object)
-            for at in np.ndindex(values.shape):
-                values[at] = self._kept(place)
-                place += 1
-            found.append(values)
-        return tuple(found)
-
-    def _constants(self, mode_number) -> Mode:
-        """Return what differs from mode to mode."""
-        w, size = self._w, self._of_mode.size
-        places = [w.at((mode_number, size), (i, 1)) for i in range(size)]
-        return self._of_mode.tree([w.load("mode", place) for place in places])
-
     def _mode(self, run, number, mode_number, width, slow, is_held):
         """Return a mode, the weights of its step, its stress and where that is kept."""
         w, builder, counts = self._w, self._w.builder, self._w.counts
-        mode = self._constants(mode_number)
+        mode = self._tree("mode", self._of_mode, mode_number)
         untabled = builder.icmp_signed(">=", mode_number, counts["tabled"])
         own = builder.or_(builder.or_(self._on["own weights"], untabled), is_held)
         # past the table's end its first row is read, and not used
@@ -326,19 +337,25 @@ class Kernel(Code):
         width = self._arithmetic.divide(width, slow[1])
         on = {"own weights": own}
         weights = self._write(self._step.weights, mode, on, width, _array(table))
-        at = w.at((mode_number, 4 + self._variables), (self._state_at, 1))
+        at = self._place_of_mode(mode_number)
         stress = [self._kept(w.at((at, 1), (i, 1))) for i in range(4 + self._variables)]
         return mode, weights, _array(stress), at
 
-    def _record(self, run, number, flow, recorded, taken, rate) -> None:
+    def _record(self, run, number, flow, rate, is_run) -> None:
         """Write a stress down, and give up where no vector is of use any more."""
+        with self._w.builder.if_then(is_run), self._arithmetic.apart():
+            self._record_run(run, number, flow, rate)
+
+    def _record_run(self, run, number, flow, rate) -> None:
         w, builder, a = self._w, self._w.builder, self._arithmetic
-        steps = w.counts["steps"]
+        steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
         at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
         w.store(a.lanes(recorded), "stress", at)
         w.store(a.lanes(taken), "felt", at)
         with builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))), a.apart():
-            self._record_modes(at)
+            levels = self._states(self._levels, _LEVELS)
+            factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
+            self._record_modes(at, factor, self._state_at, 4 + self._variables)
         weight = w.load("weight", at)
         with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
             beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
@@ -353,21 +370,6 @@ class Kernel(Code):
             bits = builder.bitcast(of_use, _EIGHT_BITS)
             some = builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
             w.store(builder.zext(some, INTEGER), "goes_on", 0)
-
-    def _record_modes(self, at) -> None:
-        """Write down σ11, σ22, σ33 and σ12 of the modes."""
-        w, a = self._w, self._arithmetic
-        places = [w.at((at, 4), (i, 1)) for i in range(4)]
-        for place in places:
-            w.store(a.lanes(0.0), "of_modes", place)
-        factor = self._write(self._step.stiffness, self._parameters, self._on, self._states())[()]
-        with w.loop(w.counts["modes"]) as number, a.apart():
-            mode = self._constants(number)
-            own = a.multiply(factor, mode.modulus[()])
-            stress = w.at((number, 4 + self._variables), (self._state_at, 1))
-            for i, place in enumerate(places):
-                more = a.multiply(own, self._kept(w.at((stress, 1), (i, 1))))
-                w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""

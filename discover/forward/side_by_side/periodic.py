@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import PeriodicFlows, Records
-from discover.forward.side_by_side.code import in_whole_eights, lanes_last
+from discover.forward.side_by_side.code import Eights, in_whole_eights, lanes_last
 from discover.forward.side_by_side.periodic_code import PeriodicCode
 from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
@@ -88,26 +88,19 @@ class PeriodicSideBySide:
         del limits, judging, runs, normal
         count, frequency = len(thetas), np.asarray(part.frequency)
         present = self._fluid.present(thetas)
-        padded = in_whole_eights(count)
-        eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
-        own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
-        pairs = list(zip(eights, own, strict=True))
-        of_eights = [self._packed(numbers, *pair) for pair in pairs]
-        modes, shared = (np.concatenate(arrays) for arrays in zip(*of_eights, strict=True))
-        rate = np.broadcast_to(frequency * np.asarray(part.strain), (len(padded), len(frequency)))
-        if np.any(thetas[:, self._shaping]):
-            rate = np.concatenate([self._rates(eight, present, part) for eight in eights])
-        found = self._solved(thetas, modes, len(numbers.modulus), shared, rate / frequency, part)[
-            padded
-        ]
-        split = found.reshape(len(eights), LANES, *found.shape[1:])
+        eights = Eights.of(self._packed, numbers, thetas, moduli)
+        is_shaped = np.any(thetas[:, self._shaping])
+        shaped = (lambda eight: self._rates(eight, present, part)) if is_shaped else None
+        rate = eights.rates(frequency * np.asarray(part.strain), shaped)
+        found = self._solved(thetas, eights, len(numbers.modulus), rate / frequency, part)
+        places = np.split(in_whole_eights(count), len(eights.pairs))
         recorded = [
-            self._recorded(numbers, each[:, -1], eight, present, part, of_modes)
-            for (eight, each), of_modes in zip(pairs, split, strict=True)
+            self._recorded(numbers, own[:, -1], eight, present, part, found[at])
+            for (eight, own), at in zip(eights.pairs, places, strict=True)
         ]
         return np.concatenate(recorded)[:count]
 
-    def _solved(self, thetas, modes, declared: int, shared, strain, part) -> np.ndarray:
+    def _solved(self, thetas, eights: Eights, declared: int, strain, part) -> np.ndarray:
         """Return the complex moduli of the modes, shape (trials, states)."""
         frequency, steps = np.asarray(part.frequency), np.asarray(part.steps).astype(np.int64)
         patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
@@ -118,14 +111,14 @@ class PeriodicSideBySide:
             own = steps[state[::LANES]]
             half = np.arange(2 * own.max() + 1) * (0.5 * np.pi / own[:, None])
 
-            of_mode = modes[trial]
+            of_mode = eights.modes[trial]
             # what effects add is left out where no lane has it
             present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
             present[:declared] = True
             given = {
                 "strain": lanes_last(strain[trial, state]),
                 "frequency": lanes_last(frequency[state]),
-                "shared": lanes_last(shared[trial]), "mode": lanes_last(of_mode[:, present]),
+                "shared": lanes_last(eights.shared[trial]), "mode": lanes_last(of_mode[:, present]),
                 "steps": own, "cosine": np.cos(half), "sine": np.sin(half),
             }  # fmt: skip
             found = self._code(patterns[which.ravel()[trial[0]]], given)

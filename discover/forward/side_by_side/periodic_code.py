@@ -5,15 +5,12 @@ take as many steps. Nothing but the law couples a mode to itself, so every mode 
 by the modified Newton method of `starts.periodic_states`, with its derivatives in the same pass.
 """
 
-from typing import Any
-
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.layout import Layout, as_array
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.starts.half_cycles import mirror
 from discover.forward.starts.modified_newton import (
@@ -142,27 +139,14 @@ class PeriodicCode(Code):
         self._call(groups, modes, most, *(array.ctypes.data for array in laid))
         return storage + 1j * loss
 
-    def _keep(self, values: Any, place: int) -> None:
-        for i, value in enumerate(np.asarray(values, object).flat):
-            self._w.store(self._arithmetic.lanes(value), "scratch", place + i)
-
-    def _kept(self, place: int, *shape: int) -> Any:
-        count = int(np.prod(shape, dtype=int))
-        values = as_array([self._w.load("scratch", place + i) for i in range(count)])
-        return values.reshape(shape) if shape else values[0]
-
-    def _tree(self, name: str, layout: Layout, at: Any) -> Any:
-        w = self._w
-        first = w.at((at, layout.size))
-        return layout.tree([w.load(name, w.at((first, 1), (i, 1))) for i in range(layout.size)])
-
     def _body(self) -> None:
         w, a = self._w, self._arithmetic
-        on: dict[str, Any] = {
-            name: w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))
-            for i, name in enumerate(self.flags.names)
+        on = self._truths() | {
+            "series": False,
+            "states": False,
+            "times": False,
+            "own weights": True,
         }
-        on |= {"series": False, "states": False, "times": False, "own weights": True}
         modes = w.counts["modes"]
         with w.loop(w.counts["groups"]) as group, a.apart():
             shared = self._tree("shared", self._shared, group)

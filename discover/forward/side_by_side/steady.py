@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, SteadyFlows
-from discover.forward.side_by_side.code import in_whole_eights, lanes_last
+from discover.forward.side_by_side.code import Eights, in_whole_eights, lanes_last
 from discover.forward.side_by_side.steady_code import SteadyCode
 from discover.forward.side_by_side.step import Flags
 from discover.forward.structure import Numbers
@@ -82,32 +82,25 @@ class SteadySideBySide:
         """
         del limits, judging, runs
         count, present = len(thetas), self._fluid.present(thetas)
-        # so many as one program is compiled for
-        padded = in_whole_eights(count)
-        eights = thetas[padded].reshape(-1, LANES, thetas.shape[1])
-        own = moduli[padded].reshape(-1, LANES, moduli.shape[1])
-        pairs = zip(eights, own, strict=True)
-        of_eights = [self._packed(numbers, eight, each) for eight, each in pairs]
-        modes, shared = (np.concatenate(arrays) for arrays in zip(*of_eights, strict=True))
-        rate = np.broadcast_to(np.asarray(part.rate), (len(padded), *part.rate.shape))
-        if np.any(thetas[:, self._shaping]):
-            rate = np.concatenate([self._rates(eight, present, part) for eight in eights])
-        found = self._states(thetas, modes, len(numbers.modulus), shared, rate, part)
+        eights = Eights.of(self._packed, numbers, thetas, moduli)
+        is_shaped = np.any(thetas[:, self._shaping])
+        shaped = (lambda eight: self._rates(eight, present, part)) if is_shaped else None
+        rate = eights.rates(np.asarray(part.rate), shaped)
+        found = self._states(thetas, eights, len(numbers.modulus), rate, part)
         stress, felt, of_modes = found[..., 0], found[..., 1], found[..., 2:]
         beside = []
         if normal:
             beside = [normal_stress_differences(part.kinematics, stress, of_modes)]
         if not np.any(thetas[:, self._distorting]):
             return np.concatenate([stress[..., None], *beside], axis=-1)
+        places = np.split(in_whole_eights(count), len(eights.pairs))
         recorded = [
-            self._recorded(
-                eight, present, part, *(of[padded[at : at + LANES]] for of in (stress, felt))
-            )
-            for eight, at in zip(eights, range(0, len(padded), LANES), strict=True)
+            self._recorded(eight, present, part, stress[at], felt[at])
+            for (eight, _), at in zip(eights.pairs, places, strict=True)
         ]
         return np.concatenate([np.concatenate(recorded)[:count, ..., None], *beside], axis=-1)
 
-    def _states(self, thetas, modes, declared: int, shared, rate, part) -> np.ndarray:
+    def _states(self, thetas, eights: Eights, declared: int, rate, part) -> np.ndarray:
         """Return stresses, felt rates and those of the modes, shape (trials, runs, n, 6)."""
         own = np.asarray(part.rate)
         # behind the last there are copies of it
@@ -130,13 +123,13 @@ class SteadySideBySide:
             trial, state = trial[filled], state[filled]
             row, column = of_run[state], at[state]
 
-            of_mode = modes[trial]
+            of_mode = eights.modes[trial]
             # what effects add is left out where no lane has it
             present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
             present[:declared] = True
             given = {
                 "rate": lanes_last(rate[trial, row, column]),
-                "shared": lanes_last(shared[trial]),
+                "shared": lanes_last(eights.shared[trial]),
                 "mode": lanes_last(of_mode[:, present]),
                 "flow": np.zeros(1) if flows is None else lanes_last(flows[row]),
             }

@@ -4,15 +4,13 @@ Each lane holds a vector of parameters, a flow and a rate of its own, so that th
 curve fill them as well as many vectors do. The way is that of `starts.approach`.
 """
 
-from typing import Any
-
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.layout import Layout, as_array
+from discover.forward.side_by_side.layout import as_array
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.starts.approach import (
     MOST_STEPS,
@@ -169,25 +167,9 @@ class SteadyCode(Code):
         self._call(groups, modes, *(array.ctypes.data for array in laid))
         return stress, felt, of_modes
 
-    def _keep(self, value: Any, place: Any) -> None:
-        value = value[()] if isinstance(value, np.ndarray) else value
-        self._w.store(self._arithmetic.lanes(value), "scratch", place)
-
-    def _kept(self, place: Any) -> Any:
-        return self._w.load("scratch", place)
-
-    def _tree(self, name: str, layout: Layout, at: Any) -> Any:
-        w = self._w
-        first = w.at((at, layout.size))
-        return layout.tree([w.load(name, w.at((first, 1), (i, 1))) for i in range(layout.size)])
-
     def _body(self) -> None:
         w = self._w
-        truths = [
-            w.builder.icmp_signed("!=", w.load("flags", i), INTEGER(0))
-            for i in range(len(self.flags.names))
-        ]
-        on = dict(zip(self.flags.names, truths, strict=True))
+        on = self._truths()
         with w.loop(w.counts["groups"]) as group, self._arithmetic.apart():
             shared = self._tree("shared", self._shared, group)
             flow = self._tree("flow", self._flow, group) if self._flow.size else None
@@ -199,11 +181,7 @@ class SteadyCode(Code):
         self._keep(rate, _FELT)
         self._keep(0.0, _INDEX)
         self._keep(1.0, _ALIVE)
-        place = _LEVELS
-        for levels, rest in self._levels:
-            for _ in range(levels):
-                self._keep(rest, place)
-                place += 1
+        self._rest(self._levels, _LEVELS)
         with w.loop(w.at((modes, self._numbers))) as number:
             self._keep(0.0, w.at((number, 1), (self._modes_at, 1)))
         w.store(INTEGER(1), "goes_on", 0)
@@ -212,7 +190,11 @@ class SteadyCode(Code):
             return w.builder.icmp_signed("!=", w.load("goes_on", 0), INTEGER(0))
 
         with w.loop(MOST_STEPS, goes_on), a.apart():
-            levels, felt, alive = self._states(), self._kept(_FELT), self._kept(_ALIVE)
+            levels, felt, alive = (
+                self._states(self._levels, _LEVELS),
+                self._kept(_FELT),
+                self._kept(_ALIVE),
+            )
             index = self._kept(_INDEX)
             self._keep(0.0, _SUM)
             self._keep(0.0, _MOVING)
@@ -238,7 +220,7 @@ class SteadyCode(Code):
             self._keep(a.add(index, 1.0), _INDEX)
             some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
             w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
-        levels, felt = self._states(), self._kept(_FELT)
+        levels, felt = self._states(self._levels, _LEVELS), self._kept(_FELT)
         for place in _TOTAL:
             self._keep(0.0, place)
         with w.loop(modes) as number, a.apart():
@@ -252,16 +234,6 @@ class SteadyCode(Code):
         for i, value in enumerate(of_modes):
             w.store(a.lanes(value), "of_modes", w.at((group, 4), (i, 1)))
         w.store(felt, "felt", group)
-
-    def _states(self) -> tuple:
-        found, place = [], _LEVELS
-        for levels, _ in self._levels:
-            values = np.empty((levels,) if levels > 1 else (), object)
-            for at in np.ndindex(values.shape):
-                values[at] = self._kept(place)
-                place += 1
-            found.append(values)
-        return tuple(found)
 
     def _mode(self, group, number):
         """Return a mode, its way so far and where that is kept."""

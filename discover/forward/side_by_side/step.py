@@ -137,7 +137,14 @@ class Step:
         What of the law is no array.
     states
         Those states of the fluid that are followed; by default all.
+
+    Attributes
+    ----------
+    kept
+        How many weights of a step are kept of each mode.
     """
+
+    kept = WEIGHTS
 
     def __init__(
         self, fluid: AugmentedFluid, law: Any, states: Sequence[StateEffect] | None = None
@@ -205,7 +212,7 @@ class Step:
 
         def own(faster=0.0):
             h = width / mode.relaxation_time
-            return jnp.stack(krogstad_weights(-(self.decay + faster) * h, h)[:WEIGHTS])
+            return jnp.stack(krogstad_weights(-(self.decay + faster) * h, h)[: self.kept])
 
         if mode.relaxations is None:
             return _if(on["own weights"], own, table)
@@ -214,7 +221,9 @@ class Step:
 
     def _of_step(self, mode: Mode, weights) -> StressWeights:
         """Return weights as the integrators take them; see `Dynamics.weights_of_step`."""
-        kinds = [KrogstadWeights(*row, m4=jnp.zeros(())) for row in weights.reshape(-1, WEIGHTS)]
+        rows = weights.reshape(-1, self.kept)
+        more = jnp.zeros((len(rows), len(KrogstadWeights._fields) - self.kept))
+        kinds = [KrogstadWeights(*row) for row in jnp.concatenate([rows, more], axis=1)]
         if mode.relaxations is None:
             return StressWeights(kinds[0])
         whole, trace, *others = kinds
@@ -241,6 +250,7 @@ class Step:
         w = self._of_step(mode, weights)
         first, middle, last = rates
 
+        @jax.jit  # so that it is traced once, and not at each of the four stages
         def remainder(stress, rate, now):
             return self._remainder(shared, mode, on, flow, w, slow[1], stress, rate, now)
 

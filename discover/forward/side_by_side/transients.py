@@ -36,7 +36,10 @@ _KEPT = 8
 # always be long: two halves, extrapolated, err no more than two steps of the grid
 _FEWEST, _ALWAYS = 8, 2.0
 
-_OF_RUNS = ("last", "held", "width", "whole", "least", "jump", "flow", "weight", "recorded")
+_OF_RUNS = (
+    "last", "held", "cycle", "width", "whole", "least", "period", "jump", "flow", "weight",
+    "recorded",
+)  # fmt: skip
 
 
 class _Runs(NamedTuple):
@@ -51,6 +54,9 @@ class _Runs(NamedTuple):
     held, whole, least
         Of how many steps that follow the commanded rate may be a straight line, from each on, how
         long these are together, in s, and how short a vector's own may become; see `OwnWidths`.
+    cycle, period
+        Steps between which the cycle lies that a run's start brings back, the first negative where
+        there is none, and how long it is, in s.
     flow
         Kinematics of each run.
     sample
@@ -64,6 +70,8 @@ class _Runs(NamedTuple):
     """
 
     last: np.ndarray
+    cycle: np.ndarray
+    period: np.ndarray
     held: np.ndarray
     width: np.ndarray
     whole: np.ndarray
@@ -90,6 +98,7 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     width = np.diff(times)
     held = np.ones(width.shape, np.int64)
     whole, least = width.copy(), width.copy()
+    behind = np.asarray(part.cycle)[:, 1]
     for row, (own, at) in enumerate(zip(times, sample, strict=True)):
         jumps = np.flatnonzero(width[row] <= jump[row])
         starts = np.searchsorted(own, 0.0)
@@ -99,7 +108,8 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
             own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
             line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
             is_straight = np.allclose(own_rates, line, rtol=1e-10, atol=0.0)
-            if end - first >= _FEWEST and is_straight:
+            # a cycle is gone through in the same steps again and again
+            if end - first >= _FEWEST and is_straight and first >= behind[row]:
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
                 least[row, first] = _ALWAYS * length / (end - first)
@@ -280,9 +290,13 @@ class SideBySide:
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
         held, whole, least = intervals(part)
+        cycle = np.asarray(part.cycle).astype(np.int64)
+        ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
         found = _Runs(
             # one step more than its samples need, since effects of the signal look at its rate
             np.minimum(last + 1, np.max(last)).astype(np.int64),
+            cycle,
+            np.where(cycle[:, 0] < 0, 1.0, np.diff(ends, axis=1)[:, 0]),
             held,
             np.diff(times),
             whole,

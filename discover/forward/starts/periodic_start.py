@@ -18,7 +18,7 @@ from discover.forward.starts.modified_newton import (
 
 # Most iterations in all, and the relative change below which the next step would change nothing
 # that is seen: Newton's error goes as its square
-_MOST, _TOLERANCE = 40, 1e-7
+MOST, TOLERANCE = 40, 1e-7
 
 Levels = tuple[Float[Array, "..."], ...]
 
@@ -101,7 +101,7 @@ def periodic_start(
         )
         moves = [jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)]
         moved = jnp.max(jnp.stack([jnp.zeros(()), *moves]))
-        largest = jnp.maximum(moved, relative_change(now.modes, modes, slowness, _TOLERANCE))
+        largest = jnp.maximum(moved, relative_change(now.modes, modes, slowness, TOLERANCE))
         change = jnp.where(is_periodic, jnp.where(jnp.all(better), largest, jnp.inf), 0.0)
         return _Iterate(modes, levels, moved, change)
 
@@ -110,11 +110,11 @@ def periodic_start(
     never = jnp.asarray(jnp.inf)
     start = _Iterate(first_approximation(begun[0], FROM_REST), begun[1], jnp.zeros(()), never)
     end = jax.lax.while_loop(
-        lambda now: goes_on(now.modes, now.change, _MOST, _TOLERANCE),
+        lambda now: goes_on(now.modes, now.change, MOST, TOLERANCE),
         improved,
         start,
     )
-    found = jnp.where(end.change < _TOLERANCE, end.modes.stress, jnp.nan)
+    found = jnp.where(end.change < TOLERANCE, end.modes.stress, jnp.nan)
     stress, levels = rest
     levels = tuple(jnp.where(is_periodic, a, b) for a, b in zip(end.levels, levels, strict=True))
     return jnp.where(is_periodic, found, stress), levels
