@@ -13,6 +13,7 @@ from jaxtyping import Float
 from discover.forward.by_mode import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.inference.engine.design import NextTests, design
+from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
@@ -25,11 +26,7 @@ from discover.loop.final_model import (
     states_of,
 )
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import (
-    CandidateScore,
-    LawFit,
-    Stage,
-)
+from discover.loop.parts import CandidateScore, FreeForm, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
@@ -114,6 +111,19 @@ class Ended(Path):
         """Size of what no hypothesis holds; None where no hypothesis can be followed."""
         size = None if self.without_fluid else self.posterior.discrepancy()
         return None if size is None else asdict(size)
+
+    @cached_property
+    def free_form(self) -> tuple[FreeForm, ...]:
+        """Free functions that are likelier than all that has a name; none where that is enough."""
+        if self.verdict != "unexplained":
+            return ()
+        return tuple(
+            FreeForm(
+                one.variable.slot, one.variable.name, one.variable.unit, one.beside,
+                one.grid, one.value, one.low95, one.high95, one.nearest,
+            )
+            for one in free_functions(self.posterior)
+        )  # fmt: skip
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
@@ -312,6 +322,7 @@ def result_of(
         explanations=ended.explanations,
         next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
         laws=laws,
+        free_form=ended.free_form,
         discrepancy=ended.discrepancy,
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
