@@ -13,7 +13,6 @@ from jaxtyping import Float
 from discover.forward.by_mode import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.inference.engine.design import NextTests, design
-from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
@@ -114,15 +113,13 @@ class Ended(Path):
 
     @cached_property
     def free_form(self) -> tuple[FreeForm, ...]:
-        """Free functions that are likelier than all that has a name; none where that is enough."""
-        if self.verdict != "unexplained":
-            return ()
+        """Functions of one variable that are likelier than all that has a name."""
         return tuple(
             FreeForm(
                 one.variable.slot, one.variable.name, one.variable.unit, one.beside,
                 one.grid, one.value, one.low95, one.high95, one.nearest,
             )
-            for one in free_functions(self.posterior)
+            for one in self.curves
         )  # fmt: skip
 
     def stages(self) -> tuple[Stage, ...]:

@@ -16,6 +16,7 @@ from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem, explain
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
+from discover.inference.engine.free_functions import free_functions
 from discover.inference.engine.search import Search
 from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.inference.step_instants import with_places
@@ -123,8 +124,12 @@ def run_loop(
     task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say)
     declared, tried = task.choose(declared, laws)
     posterior = _by_mode(task, task.explained(declared))
+    say("curves of one variable")
+    curves = free_functions(posterior)
+    if curves:
+        posterior = posterior.with_something_else(curves[0].log_odds)
     say("bands, intervals and the next test")
-    ended = Ended(posterior, without_fluid(posterior), dataset.names, explanations)
+    ended = Ended(posterior, without_fluid(posterior), dataset.names, explanations, curves)
     lines = task.lines(tried) if tried else ()
     return result_of(ended, lines, spikes, of_rates, time.perf_counter() - started)
 

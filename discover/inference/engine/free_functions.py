@@ -20,8 +20,12 @@ from discover.inference.engine.posterior import Posterior
 from discover.inference.engine.problem import TERM_ODDS
 from discover.linear_algebra_threads import in_one_thread
 
-_KNOTS = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
-"""Where the slope changes, over the largest value."""
+_LATE = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
+_EARLY = (0.0, 0.02, 0.05, 0.1, 0.18, 0.3, 0.45, 0.65, 0.85)
+"""Where the slope changes, over the largest value: what saturates does so at the end of a range,
+what settles at its beginning."""
+
+_KNOTS = len(_LATE)
 
 _WIDTHS = (0.1, 0.3, 1.0, 3.0)
 """Standard deviations of a change of slope, both axes over their size."""
@@ -73,7 +77,7 @@ class Variable:
     def basis(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n knots"]:
         """Return what one change of slope at each knot is at some values."""
         x = np.abs(values) / self.largest
-        hinges = np.maximum(x[:, None] - np.array(_KNOTS), 0.0)
+        hinges = np.maximum(x[:, None] - np.array(_LATE if self.is_odd else _EARLY), 0.0)
         return hinges * np.sign(values)[:, None] if self.is_odd else hinges
 
     def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
@@ -125,7 +129,7 @@ class WithFunction(Fitter):
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
         self.__dict__.update(vars(fitter))
         self.variable = variable
-        self.widths = np.append(fitter.widths, [width] * len(_KNOTS))
+        self.widths = np.append(fitter.widths, [width] * _KNOTS)
 
     def linear_columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows q"]:
         """Return what one of each does to the records, in Pa; the function last."""
@@ -134,7 +138,7 @@ class WithFunction(Fitter):
 
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return by how much a record changes with the stress of the fluid."""
-        gain, own, step = super().gain(fit), fit.linear[-len(_KNOTS) :], 1e-6
+        gain, own, step = super().gain(fit), fit.linear[-_KNOTS:], 1e-6
         if self.variable.values is None or self.variable.is_factor:
             moved = self.variable.columns(fit.predicted * (1.0 + step), self.rows.size)
             change = (moved - self.variable.columns(fit.predicted, self.rows.size)) @ own
@@ -184,7 +188,7 @@ def _variables(fitter: Fitter) -> Iterator[Variable]:
         np.concatenate([one(run) for run in runs])
         for one in (lambda r: np.asarray(r.rate), lambda r: np.asarray(r.time), _strain)
     )
-    if len(np.unique(np.abs(rates))) > len(_KNOTS):
+    if len(np.unique(np.abs(rates))) > _KNOTS:
         yield of("rate", "shear rate", "1/s", rates)
     yield of("drift", "time", "s", times)
     yield of("network", "strain", "", strains, True)
@@ -206,10 +210,11 @@ def _starts(
         own = WithFunction(fitter, variable, width)
         for fit in bases:
             assert fit.jacobian is not None
+            assert fit.covariance is not None
             columns = np.column_stack(
                 [fit.jacobian, variable.columns(fit.predicted, fitter.rows.size)]
             )
-            record, k = fitter.record(fit), len(_KNOTS)
+            record, k = fitter.record(fit), _KNOTS
             both = np.column_stack([columns, fitter.rows.recorded - record])
             white = fitter.noise.whitened(both, record, fit.noise)
             curvature = white[:, :-1].T @ white[:, :-1]
@@ -238,7 +243,7 @@ def _starts(
 def _described(fitter: WithFunction, fit: Fit, log_odds: float) -> FreeFunction:
     """Return a function that was fitted, with its band and its closed form."""
     assert fit.covariance is not None
-    variable, k = fitter.variable, len(_KNOTS)
+    variable, k = fitter.variable, _KNOTS
     along = fit.predicted if variable.values is None else variable.values
     low = 0.0 if variable.is_odd else float(np.min(np.abs(along)))
     grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
@@ -266,7 +271,7 @@ def _nearest(variable: Variable, fit: Fit, grid: np.ndarray, size: float) -> str
 
     Where it stands at the knots decides, inside of what was measured, weighed by its covariance.
     """
-    k = len(_KNOTS)
+    k = _KNOTS
     x = np.linspace(grid[0], grid[-1], k + 1)[1:]
     basis = size * variable.basis(x)
     assert fit.covariance is not None
