@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
 
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
@@ -238,12 +237,13 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
         Discrepancy(whole.fitter, fit, smallest(whole, fit)) for fit in judged[:_WITH_DISCREPANCY]
     ]
     nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
-    total = logsumexp([*logs, *nothing])
+    total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
-    unexplained = float(np.exp(logsumexp(nothing) - total)) + lost if nothing else 1.0
+    unexplained = float(np.exp(np.logaddexp.reduce(nothing) - total)) + lost if nothing else 1.0
     # constants and bands are those of the fitted runs
     own = np.array([search.rank(fit) for fit in near])
-    share = np.exp(own - float(logsumexp(own))) if len(own) else own
+    among = float(np.logaddexp.reduce(own))
+    share = np.exp(own - among)
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
     found = Posterior(problem, search, explanations, unexplained, fits, None)
     found.memory["whole"] = whole, judged, beside
@@ -253,7 +253,7 @@ def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None =
     none = own[0] + left.log_factor + np.log(NONE / (1.0 - NONE))
     enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
     # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
-    if enough and none > logsumexp(own):
+    if enough and none > among:
         found.by_left_out = _foretelling(found)
         fit = found.relied_on[0][0]
         if fit is not near[0]:
