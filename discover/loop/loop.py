@@ -16,6 +16,7 @@ from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem, explain
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
+from discover.inference.engine.free_functions import FreeFunction, free_functions
 from discover.inference.engine.search import Search
 from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.inference.step_instants import with_places
@@ -110,7 +111,7 @@ def run_loop(
     found = search_runs(
         dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
         laws, progress, loading,
-    )  # fmt: skip
+    ).with_curves()  # fmt: skip
     found.task.say("bands, intervals and the next test")
     return found.result(explanations, time.perf_counter() - started)
 
@@ -133,6 +134,8 @@ class Found:
         Times of samples set aside as outliers, by run.
     of_rates
         That rates were read with noise which the fluid did not feel; empty where not.
+    curves
+        Free functions of one variable that are likelier than all that has a name.
     """
 
     task: "Task"
@@ -141,11 +144,23 @@ class Found:
     order: Sequence[str]
     spikes: Mapping[str, Sequence[float]]
     of_rates: str
+    curves: Sequence[FreeFunction] = ()
+
+    def with_curves(self) -> "Found":
+        """Return what was found with free functions of one variable among the hypotheses."""
+        self.task.say("curves of one variable")
+        curves = free_functions(self.posterior)
+        if not curves:
+            return self
+        posterior = self.posterior.with_something_else(curves[0].log_odds)
+        return replace(self, posterior=posterior, curves=curves)
 
     def ended(self, explanations: int = MOST_LISTED) -> Ended:
         """Return what is reported of the posterior, with so many explanations at most."""
         posterior = self.posterior
-        return Ended(posterior, without_fluid(posterior), self.order, explanations)
+        return Ended(
+            posterior, without_fluid(posterior), self.order, explanations, self.curves
+        )
 
     def result(self, explanations: int = MOST_LISTED, seconds: float = 0.0) -> LoopResult:
         """Return the result of a closed loop."""

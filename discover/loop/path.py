@@ -13,6 +13,7 @@ from discover.effects import AbstractEffect
 from discover.inference.engine import Explanation as Told
 from discover.inference.engine import Posterior
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.free_functions import FreeFunction
 from discover.inference.engine.posterior import quantiles
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search
@@ -55,12 +56,15 @@ class Path:
         Names of the runs of the data set, in its order.
     most
         Explanations that are listed.
+    curves
+        Functions of one variable that are likelier than all that has a name.
     """
 
     posterior: Posterior
     without_fluid: bool
     order: Sequence[str]
     most: int
+    curves: Sequence[FreeFunction] = ()
 
     @cached_property
     def verdict(self) -> Verdict:

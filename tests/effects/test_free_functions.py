@@ -3,11 +3,6 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import Giesekus, Thixotropic, WhiteMetzner
-from independent.flow import start_up
-
-import discover as dc
-from discover.effects import make_effect
 from discover.effects.free_function import (
     FREE_BREAKDOWN,
     FREE_RELAXATIONS,
@@ -15,6 +10,11 @@ from discover.effects.free_function import (
     ONSET,
     spline_basis,
 )
+from independent import Giesekus, Thixotropic, WhiteMetzner
+from independent.flow import start_up
+
+import discover as dc
+from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 
 MODULUS, TIME = 100.0, 1.0

@@ -9,11 +9,15 @@ import discover as dc
 from discover.forward import DeclaredModel
 from discover.inference.engine import Problem, explain
 from discover.inference.engine.design import design
+from discover.inference.engine.free_functions import free_functions
 from discover.loop.candidates import candidates_of
 from discover.loop.runs import split_runs
 
 GIESEKUS, MAXWELL, POM_POM = (1, 2), (1, 14), (2, 3)
 """Seed and index of worlds of the development seeds, all with a sound instrument."""
+
+CLIPPED, SETTLING = (4, 50), (4, 48)
+"""Exponential PTT on a transducer that saturates; linear PTT beside a zero that settles."""
 
 
 def ask(folder, seed, index):
@@ -92,3 +96,31 @@ def test_one_explanation_alone_asks_for_no_test_to_tell_it_from_another(asked):
     posterior, *_ = asked[MAXWELL]
     tests = design(posterior)
     assert len(tests.explanations) < 2 or tests.open_nats < 0.7  # two that are equally likely
+
+
+def test_a_transducer_that_saturates_is_told_as_a_function_of_the_stress(tmp_path):
+    posterior, _, world = ask(tmp_path, *CLIPPED)
+    assert posterior.verdict == "unexplained"
+    found = free_functions(posterior)
+    assert [one.variable.slot for one in found] == ["recorded_stress"]
+    (curve,) = found
+    assert curve.beside == ("ptt_exponential",)
+    assert curve.nearest == "clipped"
+    # beyond its limit a clipped record lacks what the stress exceeds it by, and below it nothing
+    limit = max(np.max(np.abs(run.stress)) for run in world.make(None).values())
+    lacking = -np.maximum(curve.grid - limit, 0.0)
+    assert np.max(np.abs(curve.value - lacking)) < 0.1 * limit
+
+
+@pytest.mark.slow
+def test_a_zero_that_settles_is_told_as_a_function_of_time(tmp_path):
+    posterior, *_ = ask(tmp_path, *SETTLING)
+    (curve,) = free_functions(posterior)
+    assert curve.variable.slot == "drift"
+    assert "ptt_linear" in curve.beside
+
+
+@pytest.mark.parametrize("world", [GIESEKUS, MAXWELL, POM_POM])
+def test_no_curve_is_told_of_a_sound_instrument_named_law_or_not(asked, world):
+    posterior, *_ = asked[world]
+    assert free_functions(posterior) == []

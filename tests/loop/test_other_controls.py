@@ -11,9 +11,6 @@ import discover as dc
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_offset"]
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-FAR_FROM_LINEAR = pytest.mark.xfail(
-    reason="the declared N1 is forty times too large, and fits of effects start too near to it"
-)
 
 
 def creep(stress, mobility, times):
@@ -79,7 +76,6 @@ def test_nothing_is_found_in_the_creep_of_the_declared_fluid(tmp_path):
 
 
 @pytest.mark.slow
-@FAR_FROM_LINEAR
 def test_a_mobility_is_found_in_a_flow_curve_and_its_n1(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
     loop = dc.close_loop(data, BASE, effects=EFFECTS, explanations=1)
@@ -95,7 +91,6 @@ def test_nothing_is_found_in_the_flow_curve_of_the_declared_fluid(tmp_path):
 
 
 @pytest.mark.slow
-@FAR_FROM_LINEAR
 def test_n1_that_was_not_fitted_judges_a_law_found_in_the_stress_alone(tmp_path):
     data = curve_folder(tmp_path, 0.3).quantity_by_quantity()
     loop = dc.close_loop(

@@ -34,7 +34,6 @@ def sweep_folder(folder, mobility):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="fits of effects start too near to a declared law that is far off")
 def test_a_mobility_is_found_in_an_amplitude_sweep_alone_and_holds_in_the_linear_limit(tmp_path):
     folder, omega = sweep_folder(tmp_path, 0.3), np.geomspace(0.1, 10.0, 24)
     write_table(folder / "lve.csv", maxwell_sweep([MODULUS], [TIME], omega))
@@ -53,8 +52,9 @@ def test_a_mobility_is_found_in_an_amplitude_sweep_alone_and_holds_in_the_linear
         "lve.csv (storage_modulus)": True,
         "lve.csv (loss_modulus)": True,
     }
-    # the linear sweep is exact, and is predicted at a strain of 0.01
-    assert loop.error_after.held_out < 1e-3
+    # the linear sweep is exact, and is predicted at a strain of 0.01; the gain of the transducer,
+    # fitted along, is told to the noise over the root of 48 values, of which two deviations
+    assert loop.error_after.held_out < 2.0 * NOISE / np.sqrt(48)
     table = loop_predictions(loop)
     assert set(table["quantity"]) == {"storage_modulus", "loss_modulus"}
     sweep = table[table["run"] == "lve.csv (loss_modulus)"]
@@ -67,7 +67,6 @@ def test_a_mobility_is_found_in_an_amplitude_sweep_alone_and_holds_in_the_linear
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="of 48 samples the prior of none of these is 0.55")
 def test_nothing_is_found_in_the_amplitude_sweep_of_the_declared_fluid(tmp_path):
     data = dc.load_dataset(sweep_folder(tmp_path, 0.0)).with_material_functions()
     loop = dc.close_loop(data, BASE, effects=EFFECTS)

@@ -213,10 +213,15 @@ class Fitter:
         with _running_away():
             own = (moved - fit.predicted).T / self._steps(fit)
         own = np.where(np.all(np.isfinite(own), axis=0), own, 0.0)
+        linear = self.linear_columns(fit.predicted)
+        return np.column_stack([own * self.gain(fit)[:, None], linear])
+
+    def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
+        """Return by how much a record changes with the stress of the fluid."""
         gain = np.full(len(self.rows), 1.0 + fit.linear[0])
         if self.problem.loading:
             gain += fit.linear[1 + 2 * len(self.rows.runs) :][self.rows.run]
-        return np.column_stack([own * gain[:, None], self.linear_columns(fit.predicted)])
+        return gain
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the records as predicted, with what is linear."""

@@ -1,11 +1,10 @@
 """Posterior over hypotheses: probabilities, constants, and bands of what was not fitted."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
 
 from discover.effects.library_term import LibraryTerm
 from discover.inference.engine.bands import NEGLIGIBLE, Band, Predictions, quantiles
@@ -119,6 +118,22 @@ class Posterior:
                 found[id(fit)] = fit, share * weight + found.get(id(fit), (fit, 0.0))[1]
         return tuple(sorted(found.values(), key=lambda pair: -pair[1]))
 
+    def with_something_else(self, log_odds: float) -> "Posterior":
+        """Return the posterior beside a further explanation that has no name.
+
+        Parameters
+        ----------
+        log_odds
+            Of that, over all that is possible so far.
+        """
+        share = 1.0 / (1.0 + float(np.exp(min(log_odds, 700.0))))
+        explanations = tuple(
+            replace(one, probability=share * one.probability) for one in self.explanations
+        )
+        return replace(
+            self, explanations=explanations, unexplained=1.0 - share * (1.0 - self.unexplained)
+        )
+
     def interval(self, position: int) -> tuple[float, float] | None:
         """Return the 95 % interval of a constant, over the hypotheses in which it is free."""
         parts = []
@@ -227,20 +242,27 @@ def posterior_of(search: Search) -> Posterior:
         Discrepancy(whole.fitter, fit, smallest(whole, fit)) for fit in judged[:_WITH_DISCREPANCY]
     ]
     nothing = [whole.rank(one.fit) + one.log_factor + np.log(NONE / (1.0 - NONE)) for one in beside]
-    total = logsumexp([*logs, *nothing])
+    total = float(np.logaddexp.reduce([*logs, *nothing]))
     explanations, lost = _classes(problem, whole, judged, np.exp(logs - total))
-    unexplained = float(np.exp(logsumexp(nothing) - total)) + lost if nothing else 1.0
+    unexplained = float(np.exp(np.logaddexp.reduce(nothing) - total)) + lost if nothing else 1.0
     # constants and bands are those of the fitted runs
     own = np.array([search.rank(fit) for fit in near])
-    share = np.exp(own - logsumexp(own)) if len(own) else own
+    among = float(np.logaddexp.reduce(own))
+    share = np.exp(own - among)
     fits = tuple((fit, float(p)) for fit, p in zip(near, share, strict=True))
     found = Posterior(problem, search, explanations, unexplained, fits, None)
     found.memory["whole"] = whole, judged, beside
-    if near and unexplained > NEGLIGIBLE and len(problem.fitted.runs) >= FEWEST_RUNS:
+    if not near:
+        return found
+    found.left = left = Discrepancy(search.fitter, near[0], smallest(search, near[0]))
+    none = own[0] + left.log_factor + np.log(NONE / (1.0 - NONE))
+    enough = len(problem.fitted.runs) >= FEWEST_RUNS and unexplained > NEGLIGIBLE
+    # runs held out may be what is unexplained: then evidence of the fitted ones stays as it is
+    if enough and none > among:
         found.by_left_out = _foretelling(found)
-    if near:
         fit = found.relied_on[0][0]
-        found.left = Discrepancy(search.fitter, fit, smallest(search, fit))
+        if fit is not near[0]:
+            found.left = Discrepancy(search.fitter, fit, smallest(search, fit))
     return found
 
 

@@ -233,7 +233,11 @@ class Problem:
 
     def log_prior(self, names: Sequence[str]) -> float:
         """Return the log prior of a set: one effect of all is expected."""
-        return float(sum(np.log(self.odds(name) / self._odds) for name in names))
+        return float(sum(self.log_odds_of(self.odds(name)) for name in names))
+
+    def log_odds_of(self, odds: float) -> float:
+        """Return the log prior of one thing more, of its odds over those of an effect by name."""
+        return float(np.log(odds / self._odds))
 
     def without(self, theta: Float[np.ndarray, " p"], *names: str) -> Float[np.ndarray, " p"]:
         """Return a vector without some effects."""
