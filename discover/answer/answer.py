@@ -94,7 +94,11 @@ _SYMBOLS = {
     "relaxation_time_factor": "factor on λ",
     "eta_s": "eta s",
     "L2": "L²",
-    "q": "q",
+    "yield_stress_Pa": "τy",
+    "consistency_Pa_sn": "K",
+    "flow_index": "n",
+    "viscosity_Pa_s": "η",
+    "elastic_modulus_Pa": "G",
 }
 
 
@@ -226,6 +230,8 @@ class Answer:
         Effects of the instrument that were found or are suspected.
     equation
         Law written out; None where it cannot be.
+    written
+        A law that is no `equation`, by format: ``latex``, ``python``.
     failed
         A test that the law failed, one short sentence; empty where none.
     instead
@@ -260,6 +266,7 @@ class Answer:
     next_test: str = ""
     suspects: tuple[Suspect, ...] = ()
     equation: Equation | None = field(default=None, repr=False)
+    written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""
     instead: str = ""
     tolerance: float = TOLERANCE

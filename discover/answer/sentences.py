@@ -72,7 +72,7 @@ def where(answer: "Answer") -> str:
     one = answer.range
     plain = [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
     if plain and one.weissenberg is not None:
-        found.append(f"Wi\u00a0≤\u00a0{_short(one.weissenberg[1])}")
+        found.append(f"Wi ≤ {_short(one.weissenberg[1])}")
         found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
@@ -97,11 +97,12 @@ def tolerance(answer: "Answer") -> str:
     met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     of = f" for {listed(met)}" if met else ""
-    parts = [
-        f"Meets the tolerance of {asked}{of}"
-        if answer.adequate
-        else f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"
-    ]
+    if not answer.adequate:
+        parts = [f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"]
+    elif answer.within_tolerance("sigma12") is False:
+        parts = [f"Fitted runs meet the tolerance of {asked}, predictions do not"]
+    else:
+        parts = [f"Meets the tolerance of {asked}{of}"]
     if missed:
         parts.append(f"not for {listed(missed)}")
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run

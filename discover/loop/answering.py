@@ -15,7 +15,9 @@ from discover.answer import (
     Range,
     Suspect,
 )
+from discover.answer.answer import Span
 from discover.answer.naming import named_law
+from discover.answer.simple_material import SimpleMaterial
 from discover.equations import Equation
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
@@ -37,6 +39,9 @@ _WORTH_SAYING = 0.05
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
+_TO_NOISE = 1.5
+"""Misfit over the change from sample to sample up to which a simple material leaves only noise."""
+
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
     "states": "Fitted, not tested: only steady or periodic states were measured.",
@@ -51,6 +56,8 @@ def loop_answer(result: "LoopResult") -> Answer:
             "", instead="No signal: these runs hold no more than noise, so no law is given.",
             noise=result.noise_floor, next_test=following, tolerance=result.tolerance,
         )  # fmt: skip
+    if result.material is not None:
+        return _of_material(result, result.material, following)
     try:
         equation = result.without_answer()
     except InputError:
@@ -81,6 +88,33 @@ def loop_answer(result: "LoopResult") -> Answer:
     if equation is None:
         return answer
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+
+def _of_material(result: "LoopResult", material: SimpleMaterial, following: str) -> Answer:
+    """Return the answer for a yield stress, a viscous fluid or a solid."""
+    found = Range(None, None, *_strain_and_rate(result))
+    inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
+    to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
+    size = result.error_after.fit
+    by_run = {r.name: float(r.errors[-1]) for r in result.records if not r.held_out}
+    answer = Answer(
+        material.title,
+        material.law,
+        material.constants,
+        error=size,
+        noise=result.noise_floor,
+        fits_to_the_noise=to_noise,
+        discrepancy=None if to_noise else Discrepancy(size, (size, size), by_run),
+        range=found,
+        expected_error={"sigma12": _of_stress(result), "N1": inelastic, "N2": inelastic},
+        next_test=following,
+        failed=_failed(result),
+        tolerance=result.tolerance,
+    )
+    head = "".join(f"# {line}\n" for line in answer.lines)
+    tex = "".join(f"% {line}\n" for line in answer.lines)
+    written = {"python": f"{head}\n{material.python}", "latex": f"{tex}\\[{material.latex}\\]\n"}
+    return replace(answer, written=written)
 
 
 def _failed(result: "LoopResult") -> str:
@@ -151,15 +185,31 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
 
 def _range(result: "LoopResult", equation: Equation | None) -> Range:
     fitted = [record for record in result.records if not record.held_out]
-    rates = [rate for record in fitted if (rate := _fastest(record)) > 0.0]
-    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
     return Range(
         None if box is None else box.weissenberg,
         None if box is None else box.deborah,
+        *_strain_and_rate(result),
+        tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",),
+    )
+
+
+def _strain_and_rate(result: "LoopResult") -> tuple[Span | None, Span | None]:
+    """Return the strains and the rates of the fitted runs, from the least to the largest.
+
+    Of a flow curve or a sweep each sample has a rate of its own, of other runs the largest counts.
+    """
+    fitted = [record for record in result.records if not record.held_out]
+    rates = [
+        float(rate)
+        for r in fitted
+        for rate in ([_fastest(r)] if r.is_transient else np.abs(r.rate))
+        if rate > 0.0
+    ]
+    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
+    return (
         (0.0, max(strains)) if strains else None,
         (min(rates), max(rates)) if rates else None,
-        tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",),
     )
 
 
@@ -212,6 +262,8 @@ def _of_stress(result: "LoopResult") -> ExpectedError:
         beyond = max(spread.beyond, inside or result.left_out_error or 0.0)
     if result.folds and result.error_after.held_out is not None:
         return ExpectedError(result.error_after.held_out, beyond, note="runs left out in turn")
+    if inside is None and result.material is not None:
+        return ExpectedError(result.error_after.fit, beyond, note="fitted runs, noise included")
     if inside is None and result.left_out_error is not None:
         return ExpectedError(result.left_out_error, beyond, note="runs left out in turn")
     return ExpectedError(inside, beyond, note="unseen runs" if held else "")

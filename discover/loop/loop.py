@@ -29,6 +29,7 @@ from discover.loop.parts import LawFit
 from discover.loop.path import predicted
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.simple import simple_result
 from discover.words import unknown_name
 
 MOST_LISTED = 8
@@ -117,6 +118,11 @@ def run_loop(
     fitted, held = every[: len(fitted)], every[len(fitted) :]
     require_samples(fitted, declared)
     candidates = candidates_beside(declared, effects, [*fitted, *held])
+    if max_effects and (effects is None or effects == "named"):
+        say("yield stress, viscous fluid or solid")
+        simple = simple_result(declared, fitted, held, spikes, time.perf_counter() - started)
+        if simple is not None:
+            return simple
     of_rates = unfelt_scatter(declared, fitted)
     if of_rates:
         fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]

@@ -23,6 +23,8 @@ def what_to_measure_next(result: "LoopResult") -> str:
             "Check that the sensor is connected and the sample loaded; use a larger sample, a more "
             f"sensitive transducer, or {faster}."
         )
+    if result.material is not None:
+        return result.stages[0].check
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT

@@ -71,7 +71,7 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
     """Return the law in every format that a button copies, or why it is not there."""
     found = []
     for name, form in _COPIED.items():
-        text, reason = "", "This law cannot be written as an equation."
+        text, reason = answer.written.get(form, ""), "This law cannot be written in this format."
         if answer.equation is not None:
             try:
                 text = FORMATS[form](answer.equation)
