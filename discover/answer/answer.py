@@ -142,6 +142,8 @@ class Range:
         With the mean relaxation time; None where there is none.
     strain, rate_1_s
         Largest strain and rate of the runs, least to largest; None where not known.
+    frequency_rad_s
+        Of sweeps, which have no rate of their own.
     flows
         Kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
     """
@@ -150,6 +152,7 @@ class Range:
     deborah: Span | None = None
     strain: Span | None = None
     rate_1_s: Span | None = None
+    frequency_rad_s: Span | None = None
     flows: tuple[str, ...] = ("shear",)
 
 
@@ -314,6 +317,7 @@ class Answer:
                     "deborah": flows.deborah,
                     "strain": flows.strain,
                     "rate_1_s": flows.rate_1_s,
+                    "frequency_rad_s": flows.frequency_rad_s,
                     "flows": flows.flows,
                 },
                 "expected_error": {name: self.expected(name).inside for name in QUANTITIES},

@@ -35,6 +35,10 @@ def headline(answer: "Answer") -> str:
         named.append(counted(len(answer.modes), "mode"))
     elif len(named) < _MOST_CONSTANTS:
         named += [one.text for one in answer.constants if one.name in _OF_MODES]
+    if len(answer.modes) == 1 and not named and not _is_plain(answer):
+        (mode,) = answer.modes
+        named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
+        named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     return " ".join([f"{', '.join([title, *named])}.", description(answer), where(answer)]).strip()
 
 
@@ -70,13 +74,19 @@ def where(answer: "Answer") -> str:
     """Return where the law may be used; in numbers without units where the modes have none."""
     found = []
     one = answer.range
-    plain = [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
-    if plain and one.weissenberg is not None:
+    if _is_plain(answer) and one.weissenberg is not None:
         found.append(f"Wi ≤ {_short(one.weissenberg[1])}")
         found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
+    elif one.frequency_rad_s is not None:
+        found.append(f"{span(one.frequency_rad_s)} rad/s")
     return f"Use in {', '.join([flows(answer), *found])}." if found else ""
+
+
+def _is_plain(answer: "Answer") -> bool:
+    """Return whether the law has no units: one mode of 1 Pa and 1 s."""
+    return [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
 
 
 def span(ends: "Span") -> str:

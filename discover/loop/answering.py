@@ -15,7 +15,6 @@ from discover.answer import (
     Range,
     Suspect,
 )
-from discover.answer.answer import Span
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
 from discover.equations import Equation
@@ -92,7 +91,7 @@ def loop_answer(result: "LoopResult") -> Answer:
 
 def _of_material(result: "LoopResult", material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
-    found = Range(None, None, *_strain_and_rate(result))
+    found = _range(result, None)
     inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
     size = result.error_after.fit
@@ -184,32 +183,32 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
 
 
 def _range(result: "LoopResult", equation: Equation | None) -> Range:
-    fitted = [record for record in result.records if not record.held_out]
-    box = None if equation is None or equation.tested is None else equation.tested.learned_in
-    return Range(
-        None if box is None else box.weissenberg,
-        None if box is None else box.deborah,
-        *_strain_and_rate(result),
-        tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",),
-    )
+    """Return the flows of the fitted runs.
 
-
-def _strain_and_rate(result: "LoopResult") -> tuple[Span | None, Span | None]:
-    """Return the strains and the rates of the fitted runs, from the least to the largest.
-
-    Of a flow curve or a sweep each sample has a rate of its own, of other runs the largest counts.
+    Of a flow curve each sample has a rate of its own, of other runs the largest counts.
     """
     fitted = [record for record in result.records if not record.held_out]
+    flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
+    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
+    strain = (0.0, max(strains)) if strains else None
+    if fitted and all(record.control == "oscillation" for record in fitted):
+        frequencies = np.concatenate([record.rate / record.strain for record in fitted])
+        ends = float(np.min(frequencies)), float(np.max(frequencies))
+        return Range(None, None, strain, None, ends, flows)
     rates = [
         float(rate)
         for r in fitted
         for rate in ([_fastest(r)] if r.is_transient else np.abs(r.rate))
-        if rate > 0.0
+        if rate > 0.0 and r.control != "oscillation"
     ]
-    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
-    return (
-        (0.0, max(strains)) if strains else None,
+    box = None if equation is None or equation.tested is None else equation.tested.learned_in
+    return Range(
+        None if box is None else box.weissenberg,
+        None if box is None else box.deborah,
+        strain,
         (min(rates), max(rates)) if rates else None,
+        None,
+        flows,
     )
 
 
