@@ -113,6 +113,7 @@ def _of_material(result: "LoopResult", material: SimpleMaterial, following: str)
     head = "".join(f"# {line}\n" for line in answer.lines)
     tex = "".join(f"% {line}\n" for line in answer.lines)
     written = {"python": f"{head}\n{material.python}", "latex": f"{tex}\\[{material.latex}\\]\n"}
+    written["formula"] = material.latex.partition(", ")[0]
     return replace(answer, written=written)
 
 
