@@ -234,7 +234,7 @@ class Answer:
     equation
         Law written out; None where it cannot be.
     written
-        A law that is no `equation`, by format: ``latex``, ``python``, and ``formula`` in LaTeX alone.
+        A law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX alone).
     failed
         A test that the law failed, one short sentence; empty where none.
     instead

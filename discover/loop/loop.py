@@ -65,7 +65,8 @@ def run_loop(
     """Find what a declared model lacks, add it, and test the result on held-out runs.
 
     Hypotheses are sets of effects beside the declared model, which is never exact: small instrument
-    errors are fitted jointly. All are weighed by evidence and prior, unknown effects among them; see `discover.inference.engine`. Nothing is random.
+    errors are fitted jointly. All are weighed by evidence and prior, unknown effects among them;
+    see `discover.inference.engine`. Nothing is random.
 
     Parameters
     ----------
@@ -253,7 +254,7 @@ def is_sound(problem: Problem) -> bool:
 
 
 def without_fluid(posterior: Posterior) -> bool:
-    """Return whether the records are as likely without any fluid: with noise and instrument errors alone.
+    """Return whether noise and instrument errors alone, without a fluid, are as likely.
 
     Such records hold no curve beside their noise either; where they do, it is the model that is
     wrong.

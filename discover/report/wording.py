@@ -26,8 +26,8 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
 
 
 SMALL_FAULTS = (
-    "for noise and for measurement errors of 0.5 to 2 %: sample loading, zero, drift and torque range "
-    "of each run"
+    "for noise and for measurement errors of 0.5 to 2 %: sample loading, zero, drift and torque "
+    "range of each run"
 )
 """What an interval allows for."""
 

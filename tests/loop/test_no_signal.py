@@ -99,4 +99,4 @@ def test_outliers_are_left_out_and_said():
     assert result.remaining["outlier_times_s"]["slow"] == pytest.approx(TIMES[off])
     assert result.verdict == clean.verdict == "no_effect_needed"
     assert result.noise_floor == pytest.approx(clean.noise_floor, rel=0.2)
-    assert f"{3 * len(off)} samples are outliers" in loop_verdict(result)[1]
+    assert f"{3 * len(off)} outliers were excluded" in loop_verdict(result)[1]

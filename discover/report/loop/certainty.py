@@ -25,14 +25,14 @@ def how_sure(result: LoopResult) -> str:
         sentences.append(ONLY_STATES)
     if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
         sentences.append(
-            f"Each run has a loading factor of its own, fitted jointly ({percent(deviation)} scatter); "
+            f"Each run has a loading factor, fitted jointly ({percent(deviation)} scatter); "
             "that of a held-out run is unknown."
         )
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
         sentences.append(
-            f"The rate of {runs} steps between two samples: the instants are fitted jointly, those of "
-            "a held-out run to that run."
+            f"The rate of {runs} steps between two samples: the instants are fitted jointly, "
+            "those of a held-out run to that run."
         )
     doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
@@ -85,8 +85,8 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
     together = result.remaining.get("autocorrelation") or 0.0
     if result.verdict in EXPLAINED and together > _SLOW:
         yield (
-            f"the residual is smooth (lag-1 correlation {together:.2g}); it is taken for noise, but a "
-            "slowly varying effect would look the same"
+            f"the residual is smooth (lag-1 correlation {together:.2g}); it is taken for noise, but "
+            "a slowly varying effect would look the same"
         )
     untested = untested_by(result)
     if untested == "flows":

@@ -26,8 +26,8 @@ KINDS = {
 }
 
 _LOOP = {
-    "effects_added": "Your model is missing an effect; with it the data are fitted to within the noise",
-    "no_effect_needed": "Your model fits the data to within the noise; nothing is missing",
+    "effects_added": "Your model is missing an effect; with it the data are fitted to the noise",
+    "no_effect_needed": "Your model fits the data to the noise; nothing is missing",
     "unexplained": "A systematic residual remains that no candidate explains",
     "no_signal": "No signal: the data hold no more than noise",
 }
