@@ -83,7 +83,8 @@ class Constant:
 
     @property
     def _ends(self) -> str:
-        return "" if self.ci95 is None else f" (95 %: {self.interval})"
+        known = self.ci95 is not None and self.ci95[0] < self.ci95[1]
+        return f" (95 %: {self.interval})" if known else ""
 
 
 _MINUS = "−"

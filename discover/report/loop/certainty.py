@@ -85,8 +85,8 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
     together = result.remaining.get("autocorrelation") or 0.0
     if result.verdict in EXPLAINED and together > _SLOW:
         yield (
-            f"the residual is smooth (lag-1 correlation {together:.2g}); it is taken for noise, but "
-            "a slowly varying effect would look the same"
+            f"the residual is smooth (lag-1 correlation {together:.2g}); it is taken for noise, "
+            "but a slowly varying effect would look the same"
         )
     untested = untested_by(result)
     if untested == "flows":
