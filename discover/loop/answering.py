@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +25,6 @@ from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
 from discover.words import effect_title, percent_of
-
-if TYPE_CHECKING:
-    from discover.loop.loop_result import LoopResult
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -55,7 +52,7 @@ _NOT_TESTED = {
 }
 
 
-def loop_answer(result: "LoopResult") -> Answer:
+def loop_answer(result: Any) -> Answer:
     """Return the answer of a closed loop."""
     following = what_to_measure_next(result)
     if result.verdict == "no_signal":
@@ -97,7 +94,7 @@ def loop_answer(result: "LoopResult") -> Answer:
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
 
 
-def _of_material(result: "LoopResult", material: SimpleMaterial, following: str) -> Answer:
+def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = _range(result, None)
     inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
@@ -125,7 +122,7 @@ def _of_material(result: "LoopResult", material: SimpleMaterial, following: str)
     return replace(answer, written=written)
 
 
-def _failed(result: "LoopResult") -> str:
+def _failed(result: Any) -> str:
     """Return what the law was not tested by, or failed."""
     if untested := untested_by(result):
         return _NOT_TESTED[untested]
@@ -137,9 +134,7 @@ def _failed(result: "LoopResult") -> str:
     return ""
 
 
-def _law(
-    result: "LoopResult", equation: Equation | None
-) -> tuple[str | None, str, tuple[Constant, ...]]:
+def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
     found: list[Constant] = list(_constants(result.declared_parameters))
@@ -196,7 +191,7 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
     )
 
 
-def _range(result: "LoopResult", equation: Equation | None) -> Range:
+def _range(result: Any, equation: Equation | None) -> Range:
     """Return the flows of the fitted runs.
 
     Of a flow curve each sample has a rate of its own, of other runs the largest counts.
@@ -230,7 +225,7 @@ def _fastest(record: RunRecord) -> float:
     return float(np.max(np.abs(record.rate)))
 
 
-def _expected(result: "LoopResult", title: str) -> dict[str, ExpectedError]:
+def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": _of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -259,12 +254,12 @@ def _expected(result: "LoopResult", title: str) -> dict[str, ExpectedError]:
     return found
 
 
-def _only(result: "LoopResult", kind: str) -> bool:
+def _only(result: Any, kind: str) -> bool:
     """Return whether nothing but linear response was measured."""
     return all(record.control == "oscillation" for record in result.records)
 
 
-def _of_stress(result: "LoopResult") -> ExpectedError:
+def _of_stress(result: Any) -> ExpectedError:
     fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
     slow = [r for r in held if _fastest(r) <= _FASTER * fastest]
@@ -282,7 +277,7 @@ def _of_stress(result: "LoopResult") -> ExpectedError:
     return ExpectedError(inside, beyond, note="unseen runs" if held else "")
 
 
-def _measured(result: "LoopResult", kind: str) -> ExpectedError | None:
+def _measured(result: Any, kind: str) -> ExpectedError | None:
     """Return the error of what was measured, unseen runs before fitted ones."""
     own = [record for record in result.records if _is(record, kind)]
     if not own:
