@@ -57,7 +57,7 @@ def description(answer: Any) -> str:
 
 def flows(answer: Any) -> str:
     """Return the kinds of flow, in words."""
-    return listed([_FLOWS.get(one, one) for one in answer.range.flows])
+    return listed([str(_FLOWS.get(one, one)) for one in answer.range.flows])
 
 
 _FLOWS = {
