@@ -30,10 +30,7 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return (
-            "Repeat one run with another geometry or instrument: what changes is the instrument's, "
-            "what stays is the fluid's."
-        )
+        return "Repeat one run with another geometry: what changes is the instrument's."
     doubtful = _most_doubtful(result.stages)
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
