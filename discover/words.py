@@ -33,6 +33,11 @@ def percent_of(share: float) -> str:
     return f"{100.0 * share:.2g} %" if abs(share) < 0.995 else f"{100.0 * share:.0f} %"
 
 
+def p_value(probability: float) -> str:
+    """Return a probability by chance to one digit, or that it is below 0.001."""
+    return "< 0.001" if probability < 1e-3 else f"{probability:.1g}"
+
+
 def nearest(given: object, known: Iterable[str]) -> str | None:
     """Return what is spelled most like a text; None where nothing is.
 
@@ -166,7 +171,7 @@ def effect_title(name: str) -> str:
 
 def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
     """Return a set of effects as readers know it, and whether an instrument error goes with it."""
-    title = " + ".join(map(effect_title, names)) or "the declared model alone"
+    title = " + ".join(map(effect_title, names)) or "your model alone"
     return f"{title}, with a small instrument error" if bench else title
 
 

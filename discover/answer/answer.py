@@ -83,7 +83,8 @@ class Constant:
 
     @property
     def _ends(self) -> str:
-        return "" if self.ci95 is None else f" (95 %: {self.interval})"
+        known = self.ci95 is not None and self.ci95[0] < self.ci95[1]
+        return f" (95 %: {self.interval})" if known else ""
 
 
 _MINUS = "−"
@@ -94,7 +95,11 @@ _SYMBOLS = {
     "relaxation_time_factor": "factor on λ",
     "eta_s": "eta s",
     "L2": "L²",
-    "q": "q",
+    "yield_stress_Pa": "τy",
+    "consistency_Pa_sn": "K",
+    "flow_index": "n",
+    "viscosity_Pa_s": "η",
+    "elastic_modulus_Pa": "G",
 }
 
 
@@ -138,6 +143,8 @@ class Range:
         With the mean relaxation time; None where there is none.
     strain, rate_1_s
         Largest strain and rate of the runs, least to largest; None where not known.
+    frequency_rad_s
+        Of sweeps, which have no rate of their own.
     flows
         Kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
     """
@@ -146,6 +153,7 @@ class Range:
     deborah: Span | None = None
     strain: Span | None = None
     rate_1_s: Span | None = None
+    frequency_rad_s: Span | None = None
     flows: tuple[str, ...] = ("shear",)
 
 
@@ -226,6 +234,8 @@ class Answer:
         Effects of the instrument that were found or are suspected.
     equation
         Law written out; None where it cannot be.
+    written
+        A law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX alone).
     failed
         A test that the law failed, one short sentence; empty where none.
     instead
@@ -260,6 +270,7 @@ class Answer:
     next_test: str = ""
     suspects: tuple[Suspect, ...] = ()
     equation: Equation | None = field(default=None, repr=False)
+    written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""
     instead: str = ""
     tolerance: float = TOLERANCE
@@ -307,6 +318,7 @@ class Answer:
                     "deborah": flows.deborah,
                     "strain": flows.strain,
                     "rate_1_s": flows.rate_1_s,
+                    "frequency_rad_s": flows.frequency_rad_s,
                     "flows": flows.flows,
                 },
                 "expected_error": {name: self.expected(name).inside for name in QUANTITIES},

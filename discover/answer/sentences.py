@@ -1,11 +1,8 @@
 """Sentences of an answer: at most sixty words on a first screen."""
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 from discover.words import counted, listed, percent_of, significant
-
-if TYPE_CHECKING:
-    from discover.answer.answer import Answer, ExpectedError, Span
 
 _MOST_CONSTANTS = 3
 """Constants that a first line names; the table has all."""
@@ -24,7 +21,7 @@ IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 
 """What to say of runs that no law describes, of which nobody said it; for a section of a study."""
 
 
-def headline(answer: "Answer") -> str:
+def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
     if not answer.title:
         return answer.instead
@@ -35,13 +32,17 @@ def headline(answer: "Answer") -> str:
         named.append(counted(len(answer.modes), "mode"))
     elif len(named) < _MOST_CONSTANTS:
         named += [one.text for one in answer.constants if one.name in _OF_MODES]
+    if len(answer.modes) == 1 and not named and not _is_plain(answer):
+        (mode,) = answer.modes
+        named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
+        named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     return " ".join([f"{', '.join([title, *named])}.", description(answer), where(answer)]).strip()
 
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
 
 
-def description(answer: "Answer") -> str:
+def description(answer: Any) -> str:
     """Return how well the law describes the runs."""
     noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
     if answer.fits_to_the_noise:
@@ -54,9 +55,9 @@ def description(answer: "Answer") -> str:
     return f"{text}, above the noise{noise}." if noise else f"{text}."
 
 
-def flows(answer: "Answer") -> str:
+def flows(answer: Any) -> str:
     """Return the kinds of flow, in words."""
-    return listed([_FLOWS.get(one, one) for one in answer.range.flows])
+    return listed([str(_FLOWS.get(one, one)) for one in answer.range.flows])
 
 
 _FLOWS = {
@@ -66,20 +67,26 @@ _FLOWS = {
 }
 
 
-def where(answer: "Answer") -> str:
+def where(answer: Any) -> str:
     """Return where the law may be used; in numbers without units where the modes have none."""
     found = []
     one = answer.range
-    plain = [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
-    if plain and one.weissenberg is not None:
-        found.append(f"Wi\u00a0≤\u00a0{_short(one.weissenberg[1])}")
+    if _is_plain(answer) and one.weissenberg is not None:
+        found.append(f"Wi ≤ {_short(one.weissenberg[1])}")
         found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
+    elif one.frequency_rad_s is not None:
+        found.append(f"{span(one.frequency_rad_s)} rad/s")
     return f"Use in {', '.join([flows(answer), *found])}." if found else ""
 
 
-def span(ends: "Span") -> str:
+def _is_plain(answer: Any) -> bool:
+    """Return whether the law has no units: one mode of 1 Pa and 1 s."""
+    return [(m.modulus_Pa, m.relaxation_time_s) for m in answer.modes] == [(1.0, 1.0)]
+
+
+def span(ends: tuple[float, float]) -> str:
     """Return a range in numbers of two digits."""
     low, high = map(_short, ends)
     return low if low == high else f"{low}–{high}"
@@ -89,7 +96,7 @@ def _short(value: float) -> str:
     return significant(value, 2)
 
 
-def tolerance(answer: "Answer") -> str:
+def tolerance(answer: Any) -> str:
     """Return whether the tolerance is met, where, and for which quantities."""
     if answer.adequate is None:
         return ""
@@ -97,11 +104,12 @@ def tolerance(answer: "Answer") -> str:
     met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     of = f" for {listed(met)}" if met else ""
-    parts = [
-        f"Meets the tolerance of {asked}{of}"
-        if answer.adequate
-        else f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"
-    ]
+    if not answer.adequate:
+        parts = [f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"]
+    elif answer.within_tolerance("sigma12") is False:
+        parts = [f"Fitted runs meet the tolerance of {asked}, predictions do not"]
+    else:
+        parts = [f"Meets the tolerance of {asked}{of}"]
     if missed:
         parts.append(f"not for {listed(missed)}")
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
@@ -114,7 +122,7 @@ def tolerance(answer: "Answer") -> str:
     return f"{'; '.join(parts)}."
 
 
-def expected(one: "ExpectedError", place: str) -> str:
+def expected(one: Any, place: str) -> str:
     """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
@@ -122,13 +130,13 @@ def expected(one: "ExpectedError", place: str) -> str:
     return "–" if one.is_known else one.missing
 
 
-def suspects(answer: "Answer") -> str:
+def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     named = listed([one.text for one in answer.suspects[:_MOST_CONSTANTS]])
     return f"Instrument: {named}." if named else ""
 
 
-def lines(answer: "Answer") -> list[str]:
+def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
     if answer.title:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from discover.answer import (
     Suspect,
 )
 from discover.answer.naming import named_law
+from discover.answer.simple_material import SimpleMaterial
 from discover.equations import Equation
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
@@ -24,9 +25,6 @@ from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
 from discover.words import effect_title, percent_of
-
-if TYPE_CHECKING:
-    from discover.loop.loop_result import LoopResult
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -37,13 +35,24 @@ _WORTH_SAYING = 0.05
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
+_TO_NOISE = 1.5
+"""Misfit over the change from sample to sample up to which a simple material leaves only noise."""
+
+_NAMED = {
+    "giesekus_mobility": "giesekus",
+    "non_affine_motion": "johnson_segalman",
+    "ptt_linear": "ptt_linear",
+    "ptt_exponential": "ptt_exponential",
+}
+"""Laws that an effect makes of an upper convected Maxwell fluid."""
+
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
     "states": "Fitted, not tested: only steady or periodic states were measured.",
 }
 
 
-def loop_answer(result: "LoopResult") -> Answer:
+def loop_answer(result: Any) -> Answer:
     """Return the answer of a closed loop."""
     following = what_to_measure_next(result)
     if result.verdict == "no_signal":
@@ -51,6 +60,8 @@ def loop_answer(result: "LoopResult") -> Answer:
             "", instead="No signal: these runs hold no more than noise, so no law is given.",
             noise=result.noise_floor, next_test=following, tolerance=result.tolerance,
         )  # fmt: skip
+    if result.material is not None:
+        return _of_material(result, result.material, following)
     try:
         equation = result.without_answer()
     except InputError:
@@ -83,7 +94,35 @@ def loop_answer(result: "LoopResult") -> Answer:
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
 
 
-def _failed(result: "LoopResult") -> str:
+def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
+    """Return the answer for a yield stress, a viscous fluid or a solid."""
+    found = _range(result, None)
+    inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
+    to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
+    size = result.error_after.fit
+    by_run = {r.name: float(r.errors[-1]) for r in result.records if not r.held_out}
+    answer = Answer(
+        material.title,
+        material.law,
+        material.constants,
+        error=size,
+        noise=result.noise_floor,
+        fits_to_the_noise=to_noise,
+        discrepancy=None if to_noise else Discrepancy(size, (size, size), by_run),
+        range=found,
+        expected_error={"sigma12": _of_stress(result), "N1": inelastic, "N2": inelastic},
+        next_test=following,
+        failed=_failed(result),
+        tolerance=result.tolerance,
+    )
+    head = "".join(f"# {line}\n" for line in answer.lines)
+    tex = "".join(f"% {line}\n" for line in answer.lines)
+    written = {"python": f"{head}\n{material.python}", "latex": f"{tex}\\[{material.latex}\\]\n"}
+    written["formula"] = material.latex.partition(", ")[0]
+    return replace(answer, written=written)
+
+
+def _failed(result: Any) -> str:
     """Return what the law was not tested by, or failed."""
     if untested := untested_by(result):
         return _NOT_TESTED[untested]
@@ -95,9 +134,7 @@ def _failed(result: "LoopResult") -> str:
     return ""
 
 
-def _law(
-    result: "LoopResult", equation: Equation | None
-) -> tuple[str | None, str, tuple[Constant, ...]]:
+def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
     found: list[Constant] = list(_constants(result.declared_parameters))
@@ -110,8 +147,13 @@ def _law(
     solvent = equation is not None and equation.solvent_viscosity > 0.0
     if named is None:
         base = None if result.declared_law is None else named_law(result.declared_law)
-        added = [effect_title(stage.effect) for stage in in_fluid]
         title = LAWS[base[0]].title if base else "law"
+        # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
+        names = [stage.effect for stage in in_fluid]
+        core = next((n for n in names if base and base[0] == "ucm" and n in _NAMED), None)
+        if core is not None:
+            title = LAWS[_NAMED[core]].title
+        added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)
         return None, f"{title} with {' and '.join(added)}" if added else title, tuple(found)
@@ -149,17 +191,33 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
     )
 
 
-def _range(result: "LoopResult", equation: Equation | None) -> Range:
+def _range(result: Any, equation: Equation | None) -> Range:
+    """Return the flows of the fitted runs.
+
+    Of a flow curve each sample has a rate of its own, of other runs the largest counts.
+    """
     fitted = [record for record in result.records if not record.held_out]
-    rates = [rate for record in fitted if (rate := _fastest(record)) > 0.0]
+    flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
     strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
+    strain = (0.0, max(strains)) if strains else None
+    if fitted and all(record.control == "oscillation" for record in fitted):
+        frequencies = np.concatenate([record.rate / record.strain for record in fitted])
+        ends = float(np.min(frequencies)), float(np.max(frequencies))
+        return Range(None, None, strain, None, ends, flows)
+    rates = [
+        float(rate)
+        for r in fitted
+        for rate in ([_fastest(r)] if r.is_transient else np.abs(r.rate))
+        if rate > 0.0 and r.control != "oscillation"
+    ]
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
     return Range(
         None if box is None else box.weissenberg,
         None if box is None else box.deborah,
-        (0.0, max(strains)) if strains else None,
+        strain,
         (min(rates), max(rates)) if rates else None,
-        tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",),
+        None,
+        flows,
     )
 
 
@@ -167,7 +225,7 @@ def _fastest(record: RunRecord) -> float:
     return float(np.max(np.abs(record.rate)))
 
 
-def _expected(result: "LoopResult", title: str) -> dict[str, ExpectedError]:
+def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": _of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -196,12 +254,12 @@ def _expected(result: "LoopResult", title: str) -> dict[str, ExpectedError]:
     return found
 
 
-def _only(result: "LoopResult", kind: str) -> bool:
+def _only(result: Any, kind: str) -> bool:
     """Return whether nothing but linear response was measured."""
     return all(record.control == "oscillation" for record in result.records)
 
 
-def _of_stress(result: "LoopResult") -> ExpectedError:
+def _of_stress(result: Any) -> ExpectedError:
     fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
     slow = [r for r in held if _fastest(r) <= _FASTER * fastest]
@@ -212,12 +270,14 @@ def _of_stress(result: "LoopResult") -> ExpectedError:
         beyond = max(spread.beyond, inside or result.left_out_error or 0.0)
     if result.folds and result.error_after.held_out is not None:
         return ExpectedError(result.error_after.held_out, beyond, note="runs left out in turn")
+    if inside is None and result.material is not None:
+        return ExpectedError(result.error_after.fit, beyond, note="fitted runs, noise included")
     if inside is None and result.left_out_error is not None:
         return ExpectedError(result.left_out_error, beyond, note="runs left out in turn")
     return ExpectedError(inside, beyond, note="unseen runs" if held else "")
 
 
-def _measured(result: "LoopResult", kind: str) -> ExpectedError | None:
+def _measured(result: Any, kind: str) -> ExpectedError | None:
     """Return the error of what was measured, unseen runs before fitted ones."""
     own = [record for record in result.records if _is(record, kind)]
     if not own:

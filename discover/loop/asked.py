@@ -1,10 +1,7 @@
 """Questions that several sentences on a closed loop ask of its result."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from discover.loop.loop_result import LoopResult
+from typing import Any
 
 MOST_NAMES = 3
 
@@ -21,12 +18,12 @@ def several(names: Sequence[str], word: str) -> str:
     return f" {word} ".join(shown)
 
 
-def untested_by(result: "LoopResult") -> str:
+def untested_by(result: Any) -> str:
     """Return why no run could have refuted what fits the runs; empty where one could."""
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
 
 
-def doubted(result: "LoopResult") -> float | None:
+def doubted(result: Any) -> float | None:
     """Return the probability of what was added, where that is less than even; None otherwise.
 
     Effects each of which is likelier there than not are not doubted, however many others may stand

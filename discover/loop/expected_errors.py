@@ -88,10 +88,17 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     own: dict[str, dict[str, list[float]]] = {}
     for i, (kind, place, test) in enumerate(zip(kinds, places, tests, strict=True)):
         of_n1 = i - 1 if kind == "N2" else i
-        size = rms(found[0, of_n1, : len(test)])
-        off = found[1:, i, : len(test)] - found[0, i, : len(test)]
-        square = float(np.array(weights) @ np.mean(off**2, axis=1))
-        value = float(np.sqrt(square)) / size if size > 0.0 else np.nan
+        with np.errstate(all="ignore"):  # laws that diverge in this flow
+            size = rms(found[0, of_n1, : len(test)])
+            off = found[1:, i, : len(test)] - found[0, i, : len(test)]
+            squares = np.mean(off**2, axis=1)
+        sound = np.isfinite(squares)
+        share = np.array(weights) * sound
+        if np.sum(share) < 0.5 or not np.isfinite(size) or size == 0.0:
+            value = np.nan
+        else:
+            square = float(share[sound] @ squares[sound]) / float(np.sum(share))
+            value = float(np.sqrt(square)) / size
         own.setdefault(kind, {}).setdefault(place, []).append(value)
     return {kind: Spread(*(_largest(of[place]) for place in ("inside", "beyond")))
             for kind, of in own.items()}  # fmt: skip

@@ -31,7 +31,7 @@ from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
 from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
-from discover.words import percent_of
+from discover.words import p_value, percent_of
 
 _DRAWS = 2000
 _FREE = 3
@@ -243,12 +243,12 @@ class Ended(Path):
     def _in_words(self, probability: float | None) -> str:
         none = percent_of(self.posterior.unexplained)
         if self.without_fluid:
-            return "Records of noise and the bench alone, without any fluid, are as likely."
-        text = f"That something is there which has no name has a probability of {none}."
+            return "Noise and instrument errors alone explain the data as well."
+        text = f"Probability that an unknown effect is present: {none}."
         if self.verdict == "unexplained":
-            text = f"Some effect is still missing, or has another form. {text}"
+            text = f"An effect is still missing or has another form. {text}"
         if probability is not None and probability < SIGNIFICANCE:
-            text += f" Were it noise, a residual like this has a probability of {probability:.2g}."
+            text += f" Probability of this residual, if noise: {p_value(probability)}."
         return text
 
     def _bench(self) -> dict[str, float]:

@@ -36,7 +36,7 @@ def close_loop(
     progress: Progress | None = None,
     **options: Any,
 ) -> LoopResult:
-    """Find what a fluid lacks on these data, add it, and judge it on runs that no fit saw.
+    """Find what a fluid lacks on these data, add it, and test the result on held-out runs.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def close_loop(
     base
         The declared fluid; by default upper convected Maxwell with G = 1 Pa and λ = 1 s.
     held_out
-        Runs that only judge: a data set of their own, names of runs of `data`, or ``"each"`` to
+        Runs that only test: a data set of their own, names of runs of `data`, or ``"each"`` to
         hold each run out in turn.
     free
         What of the base is fitted along: parameters of its law, which must be one with a name, and

@@ -30,6 +30,7 @@ from discover.loop.parts import LawFit
 from discover.loop.path import predicted
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.simple import simple_result
 from discover.words import unknown_name
 
 MOST_LISTED = 8
@@ -41,7 +42,7 @@ _OFF = 1e-30
 _AT_END = 1e-3
 """Share of its range within which a constant stands at an end."""
 
-_RUNS_AWAY = "its stress runs away. Check its parameters, modes and units."
+_DIVERGES = "its stress diverges. Check its parameters, modes and units."
 
 Say = Callable[[str], None]
 
@@ -62,11 +63,11 @@ def run_loop(
     progress: Say | None = None,
     loading: float | None = None,
 ) -> LoopResult:
-    """Find what a declared model lacks, add it, and judge it on runs that no fit saw.
+    """Find what a declared model lacks, add it, and test the result on held-out runs.
 
-    Hypotheses are sets of effects beside the declared model, which is never exact: what every sound
-    instrument has a little of is fitted along. All are weighed by evidence and prior, those that
-    leave something without a name too; see `discover.inference.engine`. Nothing is random.
+    Hypotheses are sets of effects beside the declared model, which is never exact: small instrument
+    errors are fitted jointly. All are weighed by evidence and prior, unknown effects among them;
+    see `discover.inference.engine`. Nothing is random.
 
     Parameters
     ----------
@@ -75,7 +76,7 @@ def run_loop(
     fit
         Names of the runs to fit; by default all that are not held out.
     held_out
-        Names of the runs that only judge.
+        Names of the held-out runs, which only test.
     effects
         Candidates, by name, by spelling of a library term, or as objects; ``"named"`` for every
         effect with a name that is no candidate on request alone; by default these and every library
@@ -83,11 +84,11 @@ def run_loop(
     max_effects
         Largest number of effects added.
     strain
-        Smallest and largest strain of the samples fitted and judged.
+        Smallest and largest strain of the samples fitted and tested.
     noise
         Relative noise, where it is known; estimated along otherwise.
     most_samples
-        Of a run with more samples at most so many are used, evenly chosen, to fit and to judge; of
+        Of a run with more samples at most so many are used, evenly chosen; of
         one with little noise fewer, but no fewer than 150.
     explanations
         How many sets of effects are listed, at most.
@@ -104,7 +105,7 @@ def run_loop(
     Raises
     ------
     InputError
-        If runs, window or effects are not as they should be, or the model runs away in the fitted
+        If runs, window or effects are not as they should be, or the model diverges in the fitted
         runs.
     """
     started = time.perf_counter()
@@ -197,6 +198,11 @@ def search_runs(
     fitted, held = every[: len(fitted)], every[len(fitted) :]
     require_samples(fitted, declared)
     candidates = candidates_beside(declared, effects, [*fitted, *held])
+    if max_effects and (effects is None or effects == "named"):
+        say("yield stress, viscous fluid or solid")
+        simple = simple_result(declared, fitted, held, spikes, time.perf_counter() - started)
+        if simple is not None:
+            return simple
     of_rates = unfelt_scatter(declared, fitted)
     if of_rates:
         fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
@@ -213,7 +219,7 @@ class Task:
     Attributes
     ----------
     fitted, held_out
-        Runs to fit, and runs that only judge.
+        Runs to fit, and runs that only test.
     noise, loading
         Relative noise where it is known, and deviation of loadings, zero where there are none.
     most
@@ -255,7 +261,7 @@ class Task:
         self.say(f"search among {len(problem.candidates)} effects")
         if not is_sound(problem):
             raise InputError(
-                "The declared model cannot be integrated through the fitted runs: " + _RUNS_AWAY
+                "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
         return explain(problem, self.most, self.say)
 
@@ -283,7 +289,7 @@ class Task:
         if not np.isfinite(log_evidence(found[best])):
             raise InputError(
                 f"None of the laws {', '.join(laws)} can be integrated through the fitted runs: "
-                "their stress runs away. Check modes and units."
+                "their stress diverges. Check modes and units."
             )
         return found[best].problem.declared, found
 
@@ -329,7 +335,7 @@ def is_sound(problem: Problem) -> bool:
 
 
 def without_fluid(posterior: Posterior) -> bool:
-    """Return whether the records are as likely without any fluid: with noise and the bench alone.
+    """Return whether noise and instrument errors alone, without a fluid, are as likely.
 
     Such records hold no curve beside their noise either; where they do, it is the model that is
     wrong.

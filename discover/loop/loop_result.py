@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from discover.answer import TOLERANCE, Answer
+from discover.answer.simple_material import SimpleMaterial
 from discover.equations import (
     AugmentedLaw,
     Equation,
@@ -104,6 +105,8 @@ class LoopResult(PageView, HasEquation, SummaryView):
         By how much laws that describe the runs as well differ in σ12, N1, N2, uniaxial stress.
     left_out_error
         Root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    material
+        The simple material that the runs show, recognised before any search; None where none is.
     tolerance
         Relative discrepancy that is good enough.
     folds
@@ -136,6 +139,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out_error: float | None = None
+    material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
@@ -202,6 +206,11 @@ class LoopResult(PageView, HasEquation, SummaryView):
             library terms, or if what it adds differs from mode to mode.
         """
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
+        if self.material is not None:
+            raise InputError(
+                f"A {self.material.title} is no viscoelastic law. Take its constants from `use`, "
+                "or its text from `answer.written`."
+            )
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(

@@ -1,7 +1,7 @@
 """What to measure next after a closed loop, in one sentence."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -10,11 +10,8 @@ from discover.loop.asked import EXPLAINED, several, untested_by
 from discover.loop.parts import Stage
 from discover.words import FIGURE_SYMBOLS, effect_title, effects_title, significant
 
-if TYPE_CHECKING:
-    from discover.loop.loop_result import LoopResult
 
-
-def what_to_measure_next(result: "LoopResult") -> str:
+def what_to_measure_next(result: Any) -> str:
     """Return what would say most: more signal, a check of an effect, another test."""
     rates = [float(np.max(np.abs(record.rate))) for record in result.records]
     faster = f"a shear rate above {significant(max(rates, default=0.0), 3)} 1/s"
@@ -23,6 +20,8 @@ def what_to_measure_next(result: "LoopResult") -> str:
             "Check that the sensor is connected and the sample loaded; use a larger sample, a more "
             f"sensitive transducer, or {faster}."
         )
+    if result.material is not None:
+        return result.stages[0].check
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT
@@ -31,10 +30,7 @@ def what_to_measure_next(result: "LoopResult") -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return (
-            "Repeat one run with another geometry or instrument: what changes is the instrument's, "
-            "what stays is the fluid's."
-        )
+        return "Repeat one run with another geometry: what changes is the instrument's."
     doubtful = _most_doubtful(result.stages)
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
@@ -48,7 +44,7 @@ def what_to_measure_next(result: "LoopResult") -> str:
     return f"To distinguish {title} from {others}: {check}."
 
 
-def _telling_test(result: "LoopResult") -> str:
+def _telling_test(result: Any) -> str:
     """Return the test that distinguishes the likeliest explanation from others; empty if none."""
     following = result.next_tests
     best = following.best

@@ -10,7 +10,7 @@ from scipy.stats import permutation_test, rankdata
 
 from discover.loop.run_record import RunRecord
 from discover.loop.waves import Wave, oscillation, read_wave
-from discover.words import percent_of
+from discover.words import p_value, percent_of
 
 _BINS = 24
 _DECADES = 30.0
@@ -94,32 +94,32 @@ class Reading:
         alike = [c.coordinate for c in self.collapses if best.share - c.share < _AHEAD]
         if len(alike) > 1:
             return [
-                f"The residuals of the runs share a pattern ({100 * best.share:.0f} % of their "
-                f"square), along {', '.join(alike[:-1])} and {alike[-1]} alike."
+                f"The residuals collapse onto one curve ({100 * best.share:.0f} % of the variance) "
+                f"against {', '.join(alike[:-1])} and {alike[-1]} alike."
             ]
         return [
-            f"Drawn against {best.coordinate} the residuals of the runs fall together: "
-            f"{100 * best.share:.0f} % of their square is one curve. {_HINTS[best.coordinate]}"
+            f"Plotted against {best.coordinate}, the residuals collapse onto one curve "
+            f"({100 * best.share:.0f} % of the variance). {_HINTS[best.coordinate]}"
         ]
 
     def _from_run_to_run(self) -> list[str]:
         sentences = []
         for of, what in (
             ("size", "The relative residual"),
-            ("sign", "What the model predicts too much"),
+            ("sign", "The over-prediction"),
         ):
             trends = [trend for trend in self.trends if trend.of == of]
             if not trends:
                 continue
             first = trends[0]
             text = (
-                f"{what} {'grows' if first.correlation > 0 else 'falls'} from run to run with "
-                f"{_plain(first.quantity)} (rank correlation {first.correlation:.2f}, probability "
-                f"by chance {first.probability:.2g})"
+                f"{what} {'increases' if first.correlation > 0 else 'decreases'} with "
+                f"{_plain(first.quantity)} (rank correlation {first.correlation:.2f}, "
+                f"p {p_value(first.probability)})"
             )
             if len(trends) > 1:
                 others = ", ".join(_plain(trend.quantity) for trend in trends[1:])
-                text += f", and follows {others} too: these runs do not tell which of them matters"
+                text += f", and with {others}: these runs do not distinguish them"
             sentences.append(f"{text}.".replace("-", "−"))
         return sentences
 
@@ -148,13 +148,13 @@ class Reading:
 
 
 _HINTS = {
-    "time": "Look for what needs time and not strain: a slow mode, an offset, a drift.",
+    "time": "Suspects: a slow mode, an offset, drift.",
     "time on the instrument's clock": "The instrument answers on its own clock: look at its "
     "motor, its transducer and its drift.",
-    "strain": "Look at the fluid's nonlinear response, or at a fracture of the edge.",
-    "shear rate": "Look at what depends on rate: slip, heating, a solvent, a missing relaxation.",
-    "stress": "Look at what gives way under stress: compliance, slip, a gain.",
-    "phase of the oscillation": "The same happens in every cycle: look at harmonics below.",
+    "strain": "Suspects: the nonlinear response, edge fracture.",
+    "shear rate": "Suspects: slip, viscous heating, a solvent, a missing mode.",
+    "stress": "Suspects: compliance, wall slip, torque calibration.",
+    "phase of the oscillation": "It repeats in every cycle: see the harmonics below.",
 }
 
 

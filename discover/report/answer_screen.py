@@ -10,6 +10,7 @@ from discover.equations.spelling.mathml import law_element
 from discover.equations.write import FORMATS
 from discover.errors import InputError
 from discover.plain_json import json_text
+from discover.report.mathtext import formula
 from discover.words import significant
 
 _COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
@@ -31,7 +32,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         return found
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     return found | {
-        "law": "" if answer.equation is None else _law(answer.equation),
+        "law": _typeset(answer),
         "constants": answer.constants,
         "expected": [
             {
@@ -50,6 +51,13 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
         "copies": _copies(answer),
     }
+
+
+def _typeset(answer: Answer) -> str:
+    if answer.equation is not None:
+        return _law(answer.equation)
+    written = answer.written.get("formula")
+    return f'<p class="scroll">{formula(written, "answer")}</p>' if written else ""
 
 
 def _law(equation: Equation) -> str:
@@ -71,7 +79,7 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
     """Return the law in every format that a button copies, or why it is not there."""
     found = []
     for name, form in _COPIED.items():
-        text, reason = "", "This law cannot be written as an equation."
+        text, reason = answer.written.get(form, ""), "This law cannot be written in this format."
         if answer.equation is not None:
             try:
                 text = FORMATS[form](answer.equation)

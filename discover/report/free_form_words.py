@@ -22,4 +22,4 @@ def free_form_sentence(found: FreeForm) -> str:
     beside = " and ".join(map(effect_title, found.beside)) or "the declared model"
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
     what = _WHAT[found.slot].format(variable=found.variable)
-    return f"{what}{shape}, beside {beside} explains what is left"
+    return f"{what}{shape}, with {beside} explains the residual"

@@ -26,8 +26,8 @@ def recorded_symbol(quantities: Iterable[str]) -> str:
 
 
 SMALL_FAULTS = (
-    "for noise and for small faults of reading, of 0.5 to 2 %: in filling, zero and course of each "
-    "run, and in the ranges of the torque"
+    "for noise and for measurement errors of 0.5 to 2 %: sample loading, zero, drift and torque "
+    "range of each run"
 )
 """What an interval allows for."""
 

@@ -288,7 +288,7 @@ class Report(Section):
 
 
 class Verdict(Section):
-    """What is good enough."""
+    """Size of the discrepancy that the user accepts."""
 
     tolerance: Annotated[float, Field(gt=0, le=1)] = TOLERANCE
     """Relative discrepancy that is good enough; 0.05 means 5 %."""

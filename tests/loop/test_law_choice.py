@@ -69,7 +69,7 @@ def test_laws_that_slow_shear_cannot_tell_apart_are_said_to_be_alike():
     found = chosen(runs(Giesekus(0.3), (0.02, 0.05, 0.1)))
     alike = [one.law for one in found.laws[1:] if one.probability > 0.05]
     assert len(alike) >= 2  # h is of second order in a rate of a tenth
-    assert "do not tell it from" in loop_verdict(found)[0]
+    assert "do not exclude" in loop_verdict(found)[0]
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ def test_error_of_a_run_held_out_is_that_of_a_prediction_without_its_factor(load
 
 
 def test_it_is_said_to_hold_if_loadings_differ_so(loaded):
-    assert "if each run is a loading of its own, 3 %" in how_sure(loaded)
+    assert "loading factor, fitted jointly (3 % scatter)" in how_sure(loaded)
 
 
 @pytest.mark.slow

@@ -144,7 +144,7 @@ def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
     assert result.verdict == "no_signal"
     assert result.stages == ()
     assert "without any fluid, are as likely" in result.remaining["description"]
-    assert "hardly anything but noise" in loop_verdict(result)[0]
+    assert "No signal" in loop_verdict(result)[0]
 
 
 def test_as_many_constants_as_samples_are_refused():

@@ -46,8 +46,8 @@ def test_a_name_that_one_flow_alone_tells_is_fitted_and_not_tested(repeated):
     assert loop.verdict == "effects_added"
     found, sure, following = loop_verdict(loop)
     assert found.startswith("Fitted, not tested")
-    assert "no more flows were measured than what was fitted takes" in sure
-    assert "explains the data" not in found
+    assert "there are as few flows as fitted constants" in sure
+    assert "fitted to the noise" not in found
     assert following
 
 

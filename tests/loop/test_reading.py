@@ -58,7 +58,7 @@ def test_residuals_fall_together_along_what_made_them(coordinate, residual):
     reading = read_residual([start_up(rate, residual) for rate in RATES])
     assert reading.collapses[0].coordinate == coordinate
     assert reading.collapses[0].share > 0.9
-    assert any(f"against {coordinate} " in sentence for sentence in reading.sentences)
+    assert any(f"against {coordinate}" in sentence for sentence in reading.sentences)
 
 
 def test_noise_lies_along_nothing_and_follows_nothing():

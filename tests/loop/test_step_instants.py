@@ -83,7 +83,7 @@ def test_instants_are_told_with_intervals_that_hold_them(loop):
 def test_the_verdict_says_that_instants_were_fitted(loop):
     said = " ".join(loop_verdict(loop))
     assert "steps between two samples" in said
-    assert "those of a run held out to that run itself" in said
+    assert "those of a held-out run to that run" in said
 
 
 @pytest.mark.slow

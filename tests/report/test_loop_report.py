@@ -81,7 +81,7 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(written):
         assert f'<figure id="{name}">' in page
         assert (written / "figures" / f"{name}.svg").is_file()
     for text in (
-        "cannot tell it from",
+        "do not distinguish it from",
         "rate gain",
         "<code>stress_gain</code>",
         "held-out runs",
@@ -98,8 +98,8 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, few_pic
         error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
     )  # fmt: skip
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
-    assert "Nothing is missing that these data show" in page
-    assert "with what was added" not in page
+    assert "nothing is missing" in page
+    assert "with the added effects" not in page
 
 
 def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(
@@ -111,7 +111,7 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(
         declared_parameters={"modulus_Pa": StageParameter(41.5, (41.0, 42.0), "Pa")},
     )
     page = write_loop(result, RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
-    for text in ("by a search that did not see it", "only.csv", "12 %", "tr(σ) σ"):
+    for text in ("runs left out in turn", "only.csv", "12 %", "tr(σ) σ"):
         assert text in page
     declared = page[page.index('<table id="declared"') :]
     row = declared[: declared.index("</table>")]
@@ -135,7 +135,7 @@ def test_the_page_says_which_modes_the_data_leave_open(tmp_path, few_pictures):
     assert "0.08 to 0.12" in rows[0]
     assert "not determined" not in rows[0]
     assert "not determined" in rows[1]
-    assert "α (it differs from mode to mode) at a relaxation time of 2 s = 0.15" in page
+    assert "α (varies from mode to mode) at λ = 2 s = 0.15" in page
     caption = page[page.index('<figure id="by_mode">') :]
     assert "linear in log λ (evidence over one constant, linear: 12)" in caption
     assert "no constants of the fluid" in caption
@@ -172,7 +172,7 @@ def test_every_verdict_answers_three_questions_in_whole_sentences():
             for sentence in answer[:-1].split(". "):
                 assert sentence[0].isupper(), answer
                 assert sentence.count(";") <= 3, sentence
-    assert "To tell stress gain from rate gain: a check." in loop_verdict(aliased)[2]
+    assert "To distinguish stress gain from rate gain: a check." in loop_verdict(aliased)[2]
     unaliased = replace(aliased.stages[0], aliases=())
     confirm = loop_verdict(replace(aliased, stages=(unaliased,)))[2]
     assert confirm == "To confirm stress gain: a check."
@@ -180,7 +180,7 @@ def test_every_verdict_answers_three_questions_in_whole_sentences():
 
 def test_what_passes_for_slow_noise_is_said_to_look_like_a_slow_effect():
     slow = {**loop_result().remaining, "autocorrelation": 0.9}
-    told = "correlated to 0.9: it is taken for noise, and an effect that varies slowly would look"
+    told = "lag-1 correlation 0.9); it is taken for noise, but a slowly varying effect would look"
     assert told in loop_verdict(replace(loop_result(), remaining=slow))[1]
     # not of white noise, and not where the verdict is that something is missing
     white = {**slow, "autocorrelation": 0.05}
@@ -197,31 +197,31 @@ def said_of(probability, **inclusion):
 
 def test_what_is_less_probable_than_not_is_not_said_to_explain_the_data():
     text = said_of(0.44, stress_gain=0.44)
-    assert text.startswith("The declared model lacked something, but what that is stays open;")
-    assert "with a probability of 44 % it is, in the instrument's signal: stress gain" in text
-    assert "That it is nothing that was tried has a probability of 56 %." in text
-    assert "explains the data" not in text
+    assert text.startswith("Your model is missing an effect, but the data do not identify it;")
+    assert "most likely (44 %), in the instrument: stress gain" in text
+    assert "Probability that no candidate is right: 56 %." in text
+    assert "fitted to the noise" not in text
     sure = said_of(0.89, stress_gain=0.89)
-    assert "explains the data; added in the" in sure
+    assert "fitted to the noise; added in the" in sure
     assert "probability" not in sure
     # in all that fits alike, of which no set has half
-    assert "explains the data; added in the" in said_of(0.44, stress_gain=0.86)
+    assert "fitted to the noise; added in the" in said_of(0.44, stress_gain=0.86)
 
 
 def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_added():
     unexplained = replace(loop_result(), verdict="unexplained")
     text = loop_verdict(unexplained)[0]
-    assert text.startswith("What is left still has structure that no candidate explains; ")
-    assert "what comes nearest is, in the instrument's signal: stress gain, gain = 0.7" in text
+    assert text.startswith("A systematic residual remains that no candidate explains; ")
+    assert "closest: in the instrument: stress gain, gain = 0.7" in text
     assert "dded" not in text
 
 
 @pytest.mark.parametrize(
     ("before", "after", "said"),
     [
-        (0.4, 0.2, "the error falls from 40 % to 20 %; on the fitted runs from 40 % to 1 %"),
-        (0.2, 0.4, "the error rises from 20 % to 40 %; on the fitted runs the error falls from"),
-        (0.201, 0.2, "the error stays at 20 %; on the fitted runs the error falls from 40 %"),
+        (0.4, 0.2, "the error falls from 40 % to 20 %; fitted runs: from 40 % to 1 %"),
+        (0.2, 0.4, "the error rises from 20 % to 40 %; fitted runs: the error falls from"),
+        (0.201, 0.2, "the error stays at 20 %; fitted runs: the error falls from 40 %"),
     ],
 )
 def test_an_error_that_does_not_fall_is_not_said_to_fall(before, after, said):
@@ -229,16 +229,16 @@ def test_an_error_that_does_not_fall_is_not_said_to_fall(before, after, said):
     assert said in loop_verdict(changed)[1]
 
 
-def test_where_nothing_was_added_the_verdict_says_what_may_still_hide():
+def test_where_nothing_was_added_the_verdict_names_the_hardest_test():
     clean = replace(
         loop_result(), verdict="no_effect_needed", stages=(), error_before=ErrorPair(0.01, 0.012),
         error_after=ErrorPair(0.01, 0.012), remaining={"linear_error": 0.02},
     )  # fmt: skip
     found, sure, following = loop_verdict(clean)
-    assert found.startswith("Nothing is missing that these data show")
-    assert "the error is 1.2 %; on the fitted runs 1 %" in sure
+    assert "nothing is missing" in found
+    assert "the error is 1.2 %; fitted runs: 1 %" in sure
     assert "falls" not in sure
-    assert "by less than 2 % may still hide" in following
+    assert "it tests the model hardest" in following
 
 
 def test_many_aliases_are_counted_and_not_recited():
@@ -260,7 +260,7 @@ def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(
     assert "<td>1 % (1 to 3 %)</td><td>20 %</td>" in page  # one held-out run has no range
     runs = page[page.index('<h2 id="run-table"') : page.index('<h2 id="ranking-table"')]
     assert runs.count("<tr><td>") == 3
-    assert '<td class="text">judge</td>' in runs
+    assert '<td class="text">test</td>' in runs
 
 
 def oscillating(name="wave.csv", held_out=False):

@@ -201,4 +201,4 @@ def _whole_stress(notation: InUnitsNotation, modes: int, solvent: bool) -> str:
     total = "<munder><mo>∑</mo><mi>k</mi></munder>" if modes > 1 else ""
     added = f"<mo>+</mo><msub><mi>η</mi><mi>s</mi></msub>{_TENSORS['gammadot']}" if solvent else ""
     stress = f"{_TENSORS['sigma']}<mo>=</mo>{total}{notation.modulus}{notation.stress}{added}"
-    return f"<mo>,</mo><mspace width='1em'/>{stress}"
+    return f"<mspace width='2em'/>{stress}"

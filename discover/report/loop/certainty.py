@@ -25,14 +25,14 @@ def how_sure(result: LoopResult) -> str:
         sentences.append(ONLY_STATES)
     if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
         sentences.append(
-            f"This holds if each run is a loading of its own, {percent(deviation)}: its factor is "
-            "fitted along. Of a run held out it is not known."
+            f"Each run has a loading factor, fitted jointly ({percent(deviation)} scatter); "
+            "that of a held-out run is unknown."
         )
     if steps := result.remaining.get("step_instants"):
         runs = listed([*steps]) if len(steps) <= MOST_NAMES else f"{len(steps)} runs"
         sentences.append(
-            f"The rate of {runs} steps between two samples, which do not tell "
-            "when: the instants are fitted along, those of a run held out to that run itself."
+            f"The rate of {runs} steps between two samples: the instants are fitted jointly, "
+            "those of a held-out run to that run."
         )
     doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
@@ -46,8 +46,8 @@ def _what_is_missing(result: LoopResult) -> Iterator[str]:
     low, high = (percent(end) for end in left["ci95"])
     worst = max(left["by_run"], key=left["by_run"].get)
     yield (
-        f"What no effect explains is {percent(left['size'])} of the stress (95 %: {low} to "
-        f"{high}), most in {worst} ({percent(left['by_run'][worst])})."
+        f"Discrepancy {percent(left['size'])} of the stress (95 %: {low} to {high}), largest in "
+        f"{worst} ({percent(left['by_run'][worst])})."
     )
 
 
@@ -56,18 +56,18 @@ def _errors(result: LoopResult) -> str:
     before, after = result.error_before, result.error_after
     parts, said = [], ""
     if before.held_out is not None and after.held_out is not None:
-        unseen = "on runs that no fit saw"
+        unseen = "held-out runs:"
         if result.folds:
-            unseen = "on each run, by a search that did not see it,"
+            unseen = "runs left out in turn:"
         said, sizes = _change(result, before.held_out, after.held_out)
         parts.append(f"{unseen} the error {said} {sizes}")
         if result.held_in_band is not None:
             share = percent(result.held_in_band)
-            parts.append(f"the 95 % band of all explanations holds {share} of their samples")
+            parts.append(f"{share} of their samples lie inside the 95 % band")
     verb, sizes = _change(result, before.fit, after.fit)
     # a verb is said again only where it is another one
     told = sizes if verb == said else f"the error {verb} {sizes}"
-    return sentence([*parts, f"on the fitted runs {told}, {_share_of_noise(result)}"])
+    return sentence([*parts, f"fitted runs: {told} ({_share_of_noise(result)})"])
 
 
 def _share_of_noise(result: LoopResult) -> str:
@@ -75,9 +75,9 @@ def _share_of_noise(result: LoopResult) -> str:
     floor = percent(result.noise_floor)
     linear = result.remaining.get("linear_error") or 0.0
     if linear > result.noise_floor:
-        misfit = f"the misfit of the linear sweep by its modes {percent(linear)}"
-        return f"where noise explains {floor} and {misfit}"
-    return f"where noise explains {floor}"
+        misfit = f"misfit of the spectrum {percent(linear)}"
+        return f"noise {floor}, {misfit}"
+    return f"noise {floor}"
 
 
 def _what_tests_it(result: LoopResult) -> Iterator[str]:
@@ -85,27 +85,23 @@ def _what_tests_it(result: LoopResult) -> Iterator[str]:
     together = result.remaining.get("autocorrelation") or 0.0
     if result.verdict in EXPLAINED and together > _SLOW:
         yield (
-            f"neighbouring samples of what is left are correlated to {together:.2g}: it is taken "
-            "for noise, and an effect that varies slowly would look the same"
+            f"the residual is smooth (lag-1 correlation {together:.2g}); it is taken for noise, "
+            "but a slowly varying effect would look the same"
         )
     untested = untested_by(result)
     if untested == "flows":
-        yield (
-            "no run was held out, and no more flows were measured than what was fitted takes, so "
-            "none tested it"
-        )
+        yield ("no run was held out, and there are as few flows as fitted constants")
     elif result.error_before.held_out is None:
-        yield "no run was held out to judge by"
+        yield "no run was held out"
     if doubted(result) is not None:
         none = percent(result.explanations.unexplained_probability)
-        yield f"that it is nothing that was tried has a probability of {none}"
+        yield f"probability that no candidate is right: {none}"
 
 
 def _samples_that_count(result: LoopResult) -> Iterator[str]:
     """Tell how many samples did not count."""
     if count := result.remaining.get("outliers", 0):
-        which = "samples are outliers" if count > 1 else "sample is an outlier"
-        yield f"{count} {which} and did not count"
+        yield f"{count} {'outliers were' if count > 1 else 'outlier was'} excluded"
 
 
 def _what_else_fits(result: LoopResult) -> Iterator[str]:
@@ -115,7 +111,7 @@ def _what_else_fits(result: LoopResult) -> Iterator[str]:
     for stage in result.stages:
         if stage.aliases:
             others = several([*map(effect_title, stage.aliases)], "or")
-            yield f"these data cannot tell {effect_title(stage.effect)} from {others}"
+            yield f"these data do not distinguish {effect_title(stage.effect)} from {others}"
 
 
 def _alternatives(result: LoopResult) -> str:
@@ -130,7 +126,7 @@ def _alternatives(result: LoopResult) -> str:
         return ""
     names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
     rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
-    return f"of what fits alike this has {percent(share)}, beside {names}{rest}"
+    return f"probability among equally good fits {percent(share)}; next: {names}{rest}"
 
 
 def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:

@@ -21,27 +21,26 @@ from discover.words import listed
 
 KINDS = {
     "constitutive": "in the fluid",
-    "kinematic": "in the flow that the fluid felt",
-    "signal": "in the instrument's signal",
+    "kinematic": "in the flow",
+    "signal": "in the instrument",
 }
 
 _LOOP = {
-    "effects_added": "The declared model lacked something, and adding it explains the data",
-    "no_effect_needed": "Nothing is missing that these data show: the declared model explains them",
-    "unexplained": "What is left still has structure that no candidate explains",
-    "no_signal": "The records hold no signal that a law could be told from",
+    "effects_added": "Your model is missing an effect; with it the data are fitted to the noise",
+    "no_effect_needed": "Your model fits the data to the noise; nothing is missing",
+    "unexplained": "A systematic residual remains that no candidate explains",
+    "no_signal": "No signal: the data hold no more than noise",
 }
 
-_OPEN = "The declared model lacked something, but what that is stays open"
+_OPEN = "Your model is missing an effect, but the data do not identify it"
 
 _UNTESTED = {
-    "effects_added": "Fitted, not tested: with what is added the declared model describes",
-    "no_effect_needed": "Fitted, not tested: with its constants fitted the declared model "
-    "describes",
+    "effects_added": "Fitted, not tested: with the added effects your model describes",
+    "no_effect_needed": "Fitted, not tested: with its constants fitted your model describes",
 }
 
 _ALIKE = 0.05
-"""Probability of a law from which on these runs do not tell it from the likeliest."""
+"""Probability of a law from which on these runs do not exclude it."""
 
 _MEASURED = {
     "flows": "what was measured",
@@ -54,9 +53,9 @@ def what_was_found(result: LoopResult) -> str:
     names = several([effect_title(stage.effect) for stage in result.stages], "and")
     if result.verdict == "no_signal":
         why = (
-            f"{names} would explain them, with a fluid that is as good as absent"
+            f"{names} alone would explain them, without any fluid"
             if names
-            else "they hold hardly anything but noise, or do not follow what was imposed"
+            else "the stress does not follow what was imposed"
         )
         return f"{_LOOP['no_signal']}: {why}."
     parts = [
@@ -64,10 +63,10 @@ def what_was_found(result: LoopResult) -> str:
         for stage in result.stages
     ]
     if parts:
-        # what comes near without explaining is not called added
-        lead = "what comes nearest is, " if result.verdict == "unexplained" else "added "
+        # what does not explain the data is not called added
+        lead = "closest: " if result.verdict == "unexplained" else "added "
         if (share := doubted(result)) is not None:
-            lead = f"with a probability of {percent(share)} it is, "
+            lead = f"most likely ({percent(share)}), "
         parts[0] = lead + parts[0]
     if result.verdict == "unexplained" and result.free_form:
         curve = result.free_form[0]
@@ -85,7 +84,7 @@ def _how_it_stands(result: LoopResult) -> str:
 
 
 def _values(stage: Stage) -> str:
-    """Return the constants of an effect, and which of them these data leave open."""
+    """Return the constants of an effect, and which of them these data do not determine."""
     told = [
         f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
         + f" (95 % {interval(p.ci95)})"
@@ -108,7 +107,7 @@ def _law_chosen(laws: Sequence[LawFit]) -> str:
     """Return which law was taken of several, and from which these runs do not tell it."""
     best, *others = laws
     alike = [LAWS[one.law].title for one in others if (one.probability or 0.0) > _ALIKE]
-    told = f"; these runs do not tell it from {several(alike, 'and')}" if alike else ""
+    told = f"; these runs do not exclude {several(alike, 'and')}" if alike else ""
     ends = f" ({several(list(best.at_end), 'and')} at an end of its range)" if best.at_end else ""
     return f"of {len(laws)} laws {best.title}{ends} was taken{told}"
 
@@ -121,4 +120,4 @@ def named(name: str, parameter: StageParameter) -> str:
     if not parameter.degree:
         return f"{text} (one for all modes; the interval lets them differ)"
     time = significant(parameter.mean_time_s, 3)
-    return f"{text} (it differs from mode to mode) at a relaxation time of {time} s"
+    return f"{text} (varies from mode to mode) at λ = {time} s"

@@ -69,7 +69,7 @@ def error_rows(result: LoopResult) -> list[dict[str, Any]]:
         rows[0]["held_out_range"] = before
         rows.append(
             {
-                "model": "as found without each run",
+                "model": "runs left out in turn",
                 "fit": None,
                 "fit_range": None,
                 "held_out": result.error_after.held_out,
@@ -171,7 +171,7 @@ def inclusion(result: LoopResult) -> str:
     effects = [(effect_title(name), p) for name, p in told.inclusion.items()][:_MOST_INCLUDED]
     if not effects:
         return ""
-    return f"Something {listed(kinds.items())}; of the effects, {listed(effects)}."
+    return f"{listed(effects)} (any effect {listed(kinds.items())})."
 
 
 _MOST_INCLUDED = 8
@@ -251,25 +251,25 @@ _SHARES = ("error", "floor", "gain", "clock")
 
 
 _REMAINING = {
-    "structured": "structure left in the residual",
+    "structured": "systematic residual",
     "error": "error on the fitted runs",
     "noise floor": "noise",
     "linear error": "error of the linear sweep",
-    "autocorrelation": "correlation of noise from sample to sample",
-    "outliers": "outliers, which did not count",
+    "autocorrelation": "lag-1 correlation of the noise",
+    "outliers": "outliers (excluded)",
     "outlier times s": "their times in s",
-    "probability": "probability of such a residual, were it noise",
-    "untested": "what leaves it untested",
-    "without fluid": "records show nothing of the fluid",
-    "worst run": "run missed most",
+    "probability": "p-value of the residual, if noise",
+    "untested": "not tested for lack of",
+    "without fluid": "no signal of the fluid",
+    "worst run": "worst run",
     "worst run error": "its error",
-    "bench / stress gain": "stress gain, fitted along",
-    "bench / clock": "relaxation times, fitted along: relative deviation",
-    "bench / rate gain": "rate gain, fitted along",
-    "bench / tool compliance": "compliance of the tool, fitted along, 1/Pa",
-    "bench / time delay": "delay, fitted along, s",
-    "loading deviation": "loadings are taken to differ by, relative standard deviation",
-    "description": "in words",
+    "bench / stress gain": "stress gain, fitted jointly",
+    "bench / clock": "relaxation times, relative shift, fitted jointly",
+    "bench / rate gain": "rate gain, fitted jointly",
+    "bench / tool compliance": "tool compliance, fitted jointly, 1/Pa",
+    "bench / time delay": "delay, fitted jointly, s",
+    "loading deviation": "assumed scatter of loading, relative",
+    "description": "summary",
 }
 """What is said of the residual, for those who do not read the JSON."""
 
@@ -278,7 +278,8 @@ def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
     """Return what is said of the residual, as names and values."""
     # factors of loadings have a table of their own
     content = {key: value for key, value in result.remaining.items() if key != "loading"}
-    return [(_REMAINING.get(key, key), value) for key, value in _flatten(content)]
+    said = {"none", "None", "", "{}"}  # a row that says nothing is none
+    return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
 
 
 def loadings(result: LoopResult) -> list[dict[str, Any]]:

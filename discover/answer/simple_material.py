@@ -1,0 +1,329 @@
+"""A yield stress, a viscous fluid, a solid: recognised before any search for a viscoelastic law.
+
+Each is fitted to all runs by least squares and held against laws that relax, by Schwarz's criterion
+BIC = n ln(S/n) + k ln n   [Schwarz 1978, Ann. Stat. 6, 461]. Flow curves: Newtonian and
+Herschel-Bulkley against Carreau with a second plateau. Sweeps and transients: Newtonian and
+Kelvin-Voigt against one Maxwell mode with a solvent.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from scipy.integrate import cumulative_trapezoid
+from scipy.optimize import least_squares
+from scipy.stats import t as student
+
+from discover.answer.answer import Constant
+from discover.dataset import Run
+from discover.protocols.kinematics import MODULI
+from discover.statistics.projection import rms
+
+Kind = Literal["yield_stress", "viscous", "solid"]
+
+_FEWEST = 6
+"""Samples from which on a law of three constants can be recognised."""
+
+_AHEAD = 6.0
+"""BIC by which it must lead laws that relax: strong evidence
+[Kass & Raftery 1995, JASA 90, 773]."""
+
+_MISFIT = {"steady": 0.1, "oscillation": 0.05, "rate": 0.05}
+"""Largest relative misfit of a law that is named, by what was imposed."""
+
+_STANDS_OUT = 4.0
+"""Standard errors by which a yield stress or a modulus must exceed zero."""
+
+_SEEN = 0.3
+"""Share of the smallest stress that a yield stress must be, to be measured and not extrapolated."""
+
+_PLATEAU = 3.0
+"""Relaxation time times the slowest rate, up to which a first Newtonian plateau is in the range."""
+
+Values = Float[np.ndarray, " k"]
+
+
+@dataclass(frozen=True)
+class SimpleMaterial:
+    """Material without relaxation, as recognised.
+
+    Attributes
+    ----------
+    kind, title, law
+        What it is, the name for readers, and that in results.
+    constants
+        With 95 % intervals.
+    error
+        Relative misfit of the fitted runs.
+    latex, python
+        Law written out.
+    """
+
+    kind: Kind
+    title: str
+    law: str
+    constants: tuple[Constant, ...]
+    error: float
+    latex: str
+    python: str
+
+    def predict(self, run: Run) -> Float[np.ndarray, " n"] | None:
+        """Return what it records in a run; None in a flow that it does not describe."""
+        if not _is_simple(run):
+            return None
+        return _predicted(self.law, np.array([one.value for one in self.constants]), run)
+
+
+def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
+    """Return the simple material that runs show; None where a law that relaxes may be needed.
+
+    Parameters
+    ----------
+    runs
+        Those that are fitted: flow curves, sweeps of both moduli, or shear at a given rate.
+    """
+    controls = {run.protocol.control for run in runs}
+    count = sum(len(run) for run in runs)
+    if len(controls) != 1 or not all(map(_is_simple, runs)) or count < _FEWEST:
+        return None
+    (control,) = controls
+    if control == "steady":
+        named, others = ("newtonian", "herschel_bulkley"), ("carreau",)
+    else:
+        named, others = ("newtonian", "kelvin_voigt"), ("maxwell", "two_modes")
+    fits = {law: _fit(law, runs) for law in (*named, *others)}
+    best = min(named, key=lambda law: fits[law].criterion)
+    rival = min(fits[law].criterion for law in others)
+    chosen = fits[best]
+    # Newtonian and Kelvin-Voigt are limits of a Maxwell mode, so that a lower criterion is enough
+    if chosen.criterion > rival - (_AHEAD if best == "herschel_bulkley" else 0.0):
+        return None
+    if chosen.error > _MISFIT[control] or not _stands_out(best, chosen, runs):
+        return None
+    return _material(best, chosen)
+
+
+def _is_simple(run: Run) -> bool:
+    control = run.protocol.control
+    if control == "oscillation":
+        return run.quantity in MODULI and run.strain is not None
+    if run.flow != "shear" or run.quantity != "sigma12":
+        return False
+    if control == "steady":
+        return bool(np.all(run.rate != 0.0) and np.all(run.stress != 0.0))
+    return control == "rate" and run.from_rest
+
+
+# laws ---------------------------------------------------------------------------------------------
+
+
+def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
+    """Return what a law records in a run, of constants in their units."""
+    if run.protocol.control == "oscillation":
+        storage = run.quantity == MODULI[0]
+        omega = run.angular_frequency
+        if law in ("maxwell", "two_modes"):
+            each = [_of_mode(omega * time, storage) * g for g, time in _modes(law, values)]
+            whole = np.sum(each, axis=0)
+            return whole if storage or law == "two_modes" else whole + values[2] * omega
+        if storage:
+            return np.full(len(run), values[0] if law == "kelvin_voigt" else 0.0)
+        return values[-1] * omega
+    rate = run.rate
+    if law == "newtonian":
+        return values[0] * rate
+    if law == "herschel_bulkley":
+        yield_stress, consistency, index = values
+        size = np.abs(rate)
+        return np.sign(rate) * (yield_stress + consistency * size**index)
+    if law == "carreau":
+        zero, infinite, time, index = values
+        # without a first plateau in the range it would be a yield stress by another name
+        time = min(time, _PLATEAU / float(np.min(np.abs(rate))))
+        thinned = (1.0 + (time * rate) ** 2) ** (0.5 * index - 0.5)
+        return (infinite + (zero - infinite) * thinned) * rate
+    if law == "kelvin_voigt":
+        return values[0] * _strain(run) + values[1] * rate
+    whole = np.sum([g * _relaxing(run, time) for g, time in _modes(law, values)], axis=0)
+    return whole if law == "two_modes" else whole + values[2] * rate
+
+
+def _modes(law: str, values: Values) -> list[tuple[float, float]]:
+    pairs = [(values[0], values[1]), (values[2], values[3])] if law == "two_modes" else [values[:2]]
+    return [(float(modulus), float(time)) for modulus, time in pairs]
+
+
+def _of_mode(x: np.ndarray, storage: bool) -> np.ndarray:
+    return (x**2 if storage else x) / (1.0 + x**2)
+
+
+def _strain(run: Run) -> Float[np.ndarray, " n"]:
+    if run.strain is not None:
+        return run.strain
+    return np.asarray(cumulative_trapezoid(run.rate, run.time, initial=0.0)) + (
+        run.rate[0] * run.time[0]
+    )
+
+
+def _relaxing(run: Run, time: float) -> Float[np.ndarray, " n"]:
+    """Return the stress over the modulus of a Maxwell mode, exact for a rate linear in steps."""
+    step = np.diff(run.time, prepend=0.0)
+    before = np.concatenate([run.rate[:1], run.rate[:-1]])
+    kept = np.exp(-step / time)
+    gained = 0.5 * (before + run.rate) * time * (-np.expm1(-step / time))
+    found, stress = np.zeros(len(step)), 0.0
+    for i, (keep, gain) in enumerate(zip(kept, gained, strict=True)):
+        stress = stress * keep + gain
+        found[i] = stress
+    return found
+
+
+# fits ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Fit:
+    values: Values
+    deviation: Values
+    error: float
+    criterion: float
+    count: int
+    quantile: float
+
+
+def _sizes(run: Run) -> Float[np.ndarray, " n"]:
+    """Return in what a misfit is counted: each value of a flow curve, |G*|, the rms of a record."""
+    if run.protocol.control == "steady":
+        return np.abs(run.stress)
+    if run.protocol.control != "oscillation":
+        return np.full(len(run), rms(run.stress) or 1.0)
+    both = run.storage_modulus, run.loss_modulus
+    if both[0] is None or both[1] is None:
+        return np.maximum(np.abs(run.recorded), 1e-300)
+    return np.maximum(np.hypot(both[0], both[1]), 1e-300)
+
+
+def _fit(law: str, runs: Sequence[Run]) -> _Fit:
+    sizes = np.concatenate([_sizes(run) for run in runs])
+    recorded = np.concatenate([run.recorded for run in runs])
+
+    def off(logs: Values) -> np.ndarray:
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = np.exp(np.clip(logs, -60.0, 60.0))
+            found = np.concatenate([_predicted(law, values, run) for run in runs])
+        return np.clip(np.nan_to_num((found - recorded) / sizes, nan=1e6), -1e6, 1e6)
+
+    ends = [least_squares(off, start, x_scale=1.0) for start in _starts(law, runs)]
+    best = min(ends, key=lambda end: end.cost)
+    n, k = len(recorded), len(best.x)
+    square = max(2.0 * best.cost / n, 1e-20)
+    values = np.exp(np.clip(best.x, -60.0, 60.0))
+    inverse = np.linalg.pinv(best.jac.T @ best.jac)
+    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0) * square * n / max(n - k, 1))
+    criterion = n * np.log(square) + k * np.log(n)
+    quantile = float(student.ppf(0.975, max(n - k, 1)))
+    return _Fit(values, spread, float(np.sqrt(square)), float(criterion), k, quantile)
+
+
+def _starts(law: str, runs: Sequence[Run]) -> list[Values]:
+    """Return logarithms of constants from which fits start."""
+    rate = np.concatenate([np.abs(run.rate) for run in runs])
+    if runs[0].protocol.control == "oscillation":
+        rate = np.concatenate([run.angular_frequency for run in runs])
+    size = np.concatenate([np.abs(run.recorded) for run in runs])
+    moving = rate > 0.0
+    low, high = float(np.min(rate[moving])), float(np.max(rate[moving]))
+    least, most = float(np.min(size[size > 0.0])), float(np.max(size))
+    viscosity = float(np.median(size[moving] / rate[moving]))
+    if law == "newtonian":
+        return [np.log([viscosity])]
+    if law == "herschel_bulkley":
+        return [
+            np.log([share * least, max(most - share * least, 1e-3 * most) / high**n, n])
+            for share in (0.01, 0.5, 0.95)
+            for n in (0.3, 0.6, 1.0)
+        ]
+    if law == "carreau":
+        return [
+            np.log([least / low, share * most / high, time, n])
+            for share in (1e-3, 0.5)
+            for time in np.geomspace(0.3 / high, 3.0 / low, 4)
+            for n in (0.2, 0.6)
+        ]
+    strain = max(float(np.max(np.abs(_strain(run)))) for run in runs)
+    modulus = most if runs[0].protocol.control == "oscillation" else most / max(strain, 1e-12)
+    if law == "kelvin_voigt":
+        return [np.log([share * modulus, viscosity]) for share in (0.01, 0.5, 1.0)]
+    longest = max(float(run.time[-1]) for run in runs)
+    times = np.geomspace(0.1 / high, 10.0 / low, 8)
+    if runs[0].protocol.control == "rate":
+        times = np.geomspace(1e-3 * longest, 1e2 * longest, 8)
+    if law == "maxwell":
+        return [np.log([modulus, time, 0.1 * viscosity]) for time in times]
+    pairs = [(first, second) for first in times[::2] for second in times[1::2] if second > first]
+    return [np.log([modulus, first, modulus, second]) for first, second in pairs]
+
+
+def _stands_out(law: str, fit: _Fit, runs: Sequence[Run]) -> bool:
+    """Return whether what gives the material its name is there."""
+    if law == "newtonian":
+        return True
+    first, deviation = fit.values[0], fit.deviation[0]  # of the logarithm
+    if deviation * _STANDS_OUT > 1.0:
+        return False
+    if law == "herschel_bulkley":
+        least = min(float(np.min(np.abs(run.stress))) for run in runs)
+        return bool(first > _SEEN * least and fit.values[2] < 1.5)
+    return True
+
+
+# words --------------------------------------------------------------------------------------------
+
+_NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
+    "newtonian": ("viscous", "viscous fluid (Newtonian)", (("viscosity_Pa_s", "Pa s"),)),
+    "herschel_bulkley": (
+        "yield_stress",
+        "yield-stress fluid (Herschel–Bulkley)",
+        (("yield_stress_Pa", "Pa"), ("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+    ),
+    "kelvin_voigt": (
+        "solid",
+        "solid (Kelvin–Voigt)",
+        (("elastic_modulus_Pa", "Pa"), ("viscosity_Pa_s", "Pa s")),
+    ),
+}
+
+_LATEX: dict[str, Callable[[Sequence[str]], str]] = {
+    "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
+    "herschel_bulkley": lambda v: (
+        rf"\sigma_{{12}} = \tau_y + K\dot\gamma^n, \qquad "
+        rf"\tau_y = {v[0]},\; K = {v[1]},\; n = {v[2]}"
+    ),
+    "kelvin_voigt": lambda v: (
+        rf"\sigma_{{12}} = G\gamma + \eta\,\dot\gamma, \qquad G = {v[0]},\; \eta = {v[1]}"
+    ),
+}
+
+_PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
+    "newtonian": lambda v: f"def stress(rate):\n    return {v[0]} * rate\n",
+    "herschel_bulkley": lambda v: (
+        f"def stress(rate):\n    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
+    ),
+    "kelvin_voigt": lambda v: (
+        f"def stress(strain, rate):\n    return {v[0]} * strain + {v[1]} * rate\n"
+    ),
+}
+
+
+def _material(law: str, fit: _Fit) -> SimpleMaterial:
+    kind, title, names = _NAMES[law]
+    constants = []
+    for (name, unit), value, deviation in zip(names, fit.values, fit.deviation, strict=True):
+        low, high = value * np.exp(np.array([-1.0, 1.0]) * fit.quantile * deviation)
+        constants.append(Constant(name, float(value), (float(low), float(high)), unit))
+    numbers = [f"{value:.6g}" for value in fit.values]
+    return SimpleMaterial(
+        kind, title, law, tuple(constants), fit.error, _LATEX[law](numbers), _PYTHON[law](numbers)
+    )

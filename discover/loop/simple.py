@@ -1,0 +1,110 @@
+"""A closed loop that needs no search: a yield stress, a viscous fluid, a solid."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from discover.answer.simple_material import SimpleMaterial, recognise
+from discover.dataset import Run
+from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.inference.by_mode.constants import StageParameter
+from discover.loop.loop_result import LoopResult
+from discover.loop.parts import Explanation, Explanations, Stage
+from discover.loop.run_record import RunRecord, errors_of, record_runs
+from discover.loop.runs import why_untested
+from discover.statistics.residual import fast_part
+
+_EFFECT = {
+    "yield_stress": "yield_stress",
+    "viscous": "solvent_viscosity",
+    "solid": "relaxation_mode",
+}
+"""Effect of the contract that a Maxwell fluid lacks to be such a material."""
+
+_ALREADY = ("saramito",)
+"""Laws that hold a yield stress themselves."""
+
+_AS_WELL = 1.1
+
+
+def simple_result(
+    declared: DeclaredModel,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    spikes: Mapping[str, Sequence[float]],
+    seconds: float,
+) -> LoopResult | None:
+    """Return the result for runs of a simple material; None where a law that relaxes is needed.
+
+    Parameters
+    ----------
+    declared
+        The model to start from.
+    fitted, held_out
+        Runs that are fitted, and runs that only test.
+    spikes
+        Times of samples set aside as outliers, by run.
+    seconds
+        Time taken so far.
+    """
+    if declared.law_name in _ALREADY:
+        return None
+    material = recognise(fitted)
+    if material is None or any(material.predict(run) is None for run in held_out):
+        return None
+    records: list[RunRecord] = []
+    for runs, held in ((fitted, False), (held_out, True)):
+        if runs:
+            records += record_runs(runs, _predicted(declared, material, fitted, runs), held)
+    before, after = errors_of(records, 0), errors_of(records, 1)
+    if material.kind == "viscous" and before.fit <= _AS_WELL * after.fit:
+        return None  # the declared law has this viscosity, and may have more
+    left = [record.relative_residual[1] for record in records if not record.held_out]
+    noise = float(np.mean([fast_part(one) if len(one) > 2 else 0.0 for one in left]))
+    parameters = {
+        one.name: StageParameter(one.value, one.ci95 or (one.value, one.value), one.unit)
+        for one in material.constants
+    }
+    effect = _EFFECT[material.kind]
+    stage = Stage(
+        effect, "constitutive", parameters, (), after, 0.0, material.latex,
+        "least squares, held against laws that relax by Schwarz's criterion", CHECKS[material.kind],
+    )  # fmt: skip
+    values = {one.name: one.value for one in material.constants}
+    explanation = Explanation((effect,), 1.0, after, {effect: values})
+    return LoopResult(
+        "effects_added", before, after, noise or after.fit, (stage,),
+        {
+            "structured": False, "error": after.fit, "noise_floor": noise or after.fit,
+            "outliers": sum(map(len, spikes.values())), "outlier_times_s": spikes,
+            "untested": why_untested(len(values), fitted, held_out),
+            "description": f"Recognised as a {material.title} before any search.",
+        },
+        records=tuple(records),
+        explanations=Explanations((explanation,), 0.0, {effect: 1.0}, {"constitutive": 1.0}),
+        material=material,
+        seconds=seconds,
+    )  # fmt: skip
+
+
+def _predicted(
+    declared: DeclaredModel, material: SimpleMaterial, fitted: Sequence[Run], runs: Sequence[Run]
+) -> np.ndarray:
+    batch = make_batch(runs)
+    model = AugmentedModel(declared, [], data_scales(fitted), make_batch(fitted))
+    with np.errstate(all="ignore"):
+        first = model.predictions([model.zero()], batch)[0]
+    second = np.zeros_like(first)
+    for i, run in enumerate(runs):
+        found = material.predict(run)
+        assert found is not None
+        second[i, : len(run)] = found
+    return np.stack([first, second])
+
+
+CHECKS = {
+    "yield_stress": "Creep just below and just above τy: it shows whether the material flows.",
+    "viscous": "N1, or a start-up: a constant viscosity alone does not show elasticity.",
+    "solid": "Creep or relaxation over a longer time: it shows whether the material flows.",
+}
+"""What to measure next of each material."""

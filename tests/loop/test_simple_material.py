@@ -1,0 +1,92 @@
+"""A yield stress, a viscous fluid, a solid are recognised at once; laws that relax are not."""
+
+import numpy as np
+import pytest
+
+from discover.answer.simple_material import recognise
+from discover.dataset import Dataset, LinearSweep, Run
+from discover.forward import DeclaredModel
+from discover.loop import run_loop
+from discover.protocols import start_up, steady_rates
+
+RATES = np.geomspace(0.01, 100.0, 25)
+FREQUENCIES = np.geomspace(0.1, 100.0, 25)
+
+
+def noisy(values, noise, seed=0):
+    return values * (1.0 + noise * np.random.default_rng(seed).standard_normal(len(values)))
+
+
+def flow_curve(stress, rates=RATES, noise=0.02):
+    times = np.arange(1.0, len(rates) + 1.0)
+    return Run("flow_curve.csv", times, steady_rates(rates), rates, noisy(stress(rates), noise))
+
+
+def giesekus(rates, alpha=0.3, modulus=100.0):
+    """Steady shear stress of a Giesekus fluid with λ = 1 s   [Giesekus 1982, eq. 56]."""
+    own = 8.0 * alpha * (1.0 - alpha) * rates**2
+    chi = np.sqrt((np.sqrt(1.0 + 2.0 * own) - 1.0) / own)
+    f = (1.0 - chi) / (1.0 + (1.0 - 2.0 * alpha) * chi)
+    return modulus * rates * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
+
+
+def sweep(storage, loss, noise=0.01):
+    lot, size = np.random.default_rng(1), noise * np.hypot(storage, loss)
+    moduli = [one + size * lot.standard_normal(len(size)) for one in (storage, loss)]
+    data = Dataset("sweep", (), LinearSweep(FREQUENCIES, *np.maximum(moduli, 1e-9)))
+    return list(data.with_material_functions(["lve"]).runs)
+
+
+def start_ups(stress, noise=0.01):
+    times = np.linspace(0.05, 10.0, 100)
+    return [
+        Run(f"{rate}", times, start_up(rate), np.full(100, rate), noisy(stress(times, rate), noise))
+        for rate in (0.1, 1.0)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("runs", "law", "constants"),
+    [
+        ([flow_curve(lambda r: 12.0 + 3.0 * r**0.45)], "herschel_bulkley", (12.0, 3.0, 0.45)),
+        ([flow_curve(lambda r: 5.0 + 0.2 * r)], "herschel_bulkley", (5.0, 0.2, 1.0)),
+        ([flow_curve(lambda r: 2.0 * r)], "newtonian", (2.0,)),
+        (start_ups(lambda t, rate: 5.0 * rate + 0.0 * t), "newtonian", (5.0,)),
+        (sweep(np.full(25, 50.0), 2.0 * FREQUENCIES), "kelvin_voigt", (50.0, 2.0)),
+        (start_ups(lambda t, rate: rate * (50.0 * t + 20.0)), "kelvin_voigt", (50.0, 20.0)),
+    ],
+)
+def test_a_simple_material_is_named_with_its_constants(runs, law, constants):
+    found = recognise(runs)
+    assert found is not None
+    assert found.law == law
+    for constant, truth in zip(found.constants, constants, strict=True):
+        low, high = constant.ci95
+        # twice the 95 % interval: six worlds of one seed each, three constants
+        assert abs(constant.value - truth) < 2.0 * (high - low)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.5, 0.9])
+def test_a_giesekus_flow_curve_is_no_yield_stress(alpha):
+    assert recognise([flow_curve(lambda r: giesekus(r, alpha))]) is None
+    fast = np.geomspace(1.0, 1000.0, 25)
+    assert recognise([flow_curve(lambda r: giesekus(r, alpha), fast)]) is None
+
+
+def test_a_maxwell_fluid_and_a_power_law_are_none_of_them():
+    w = FREQUENCIES
+    assert recognise(sweep(100.0 * w**2 / (1.0 + w**2), 100.0 * w / (1.0 + w**2))) is None
+    assert recognise(start_ups(lambda t, rate: 100.0 * rate * (1.0 - np.exp(-t)))) is None
+    assert recognise([flow_curve(lambda r: 3.0 * r**0.5)]) is None
+
+
+def test_a_loop_names_a_yield_stress_without_a_search():
+    data = Dataset("carbopol", (flow_curve(lambda r: 15.0 + 4.0 * r**0.5),))
+    lines = []
+    found = run_loop(data, DeclaredModel.named("ucm", {}, [1.0], [1.0]), progress=lines.append)
+    assert not any("search" in line for line in lines)
+    assert found.answer.headline.startswith("Yield-stress fluid (Herschel–Bulkley), τy = 1")
+    assert found.use["law"] == "herschel_bulkley"
+    assert found.use["constants"]["yield_stress_Pa"]["unit"] == "Pa"
+    assert "stress(rate)" in found.answer.written["python"]
+    assert "Use in shear, 0.01–100 1/s" in found.answer.written["python"]
