@@ -59,9 +59,7 @@ def compare(data: dc.Dataset, world: World) -> dict:
     from discover.report.predictions import comparison_predictions
 
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    found = dc.compare(
-        data, base, held_out=_held_out(data), learners=["tensor_sindy"]
-    )
+    found = dc.compare(data, base, held_out=_held_out(data), learners=["tensor_sindy"])
     exact, lines = world.make(None), comparison_predictions(found)
     lines = lines[(lines["role"] == "held_out") & (lines["source"] != "declared")]
     bands = []

@@ -182,8 +182,9 @@ def _leave_out_other_readings(patch: pytest.MonkeyPatch) -> None:
 
 
 def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:
-    from discover.comparison import judgement, learning
     from discover.comparison.judging.next_measurement import NextMeasurement
+
+    from discover.comparison import judgement, learning
 
     nothing = judgement.Beside((), None, ())
     patch.setattr(judgement, "look_beside", lambda *_: nothing)

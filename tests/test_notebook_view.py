@@ -3,8 +3,9 @@
 import numpy as np
 import pandas as pd
 import pytest
-
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.design.experiment_outcome import LawOutcome
+
 from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
 from discover.identify import (
@@ -15,7 +16,6 @@ from discover.identify import (
     RivalTable,
     Twin,
 )
-from discover.identify.design.experiment_outcome import LawOutcome
 from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import replace
 
+from discover.answer import TOLERANCE
 from discover.comparison.bands import flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
@@ -141,7 +142,9 @@ def compare(
         flows=frame.shown,
         before=frame.alone(),
         outcomes=outcomes,
-        posterior=replace(found.result(), title=study.name),
+        posterior=replace(
+            found.result(), title=study.name, tolerance=study.verdict.tolerance or TOLERANCE
+        ),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=lacks_of_fit(
             outcomes, frame.shown, expectation_of(study, declared, data),

@@ -109,11 +109,20 @@ def run_loop(
         runs.
     """
     started = time.perf_counter()
-    found = search_runs(
+    asked = _asked(
         dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
-        laws, progress, loading,
-    ).with_curves()  # fmt: skip
-    found.task.say("bands, intervals and the next test")
+        progress, loading,
+    )  # fmt: skip
+    task = asked.task
+    if max_effects and (effects is None or effects == "named"):
+        task.say("yield stress, viscous fluid or solid")
+        simple = simple_result(
+            asked.declared, task.fitted, task.held_out, asked.spikes, time.perf_counter() - started
+        )
+        if simple is not None:
+            return simple
+    found = asked.found(laws).with_curves()
+    task.say("bands, intervals and the next test")
     return found.result(explanations, time.perf_counter() - started)
 
 
@@ -159,9 +168,7 @@ class Found:
     def ended(self, explanations: int = MOST_LISTED) -> Ended:
         """Return what is reported of the posterior, with so many explanations at most."""
         posterior = self.posterior
-        return Ended(
-            posterior, without_fluid(posterior), self.order, explanations, self.curves
-        )
+        return Ended(posterior, without_fluid(posterior), self.order, explanations, self.curves)
 
     def result(self, explanations: int = MOST_LISTED, seconds: float = 0.0) -> LoopResult:
         """Return the result of a closed loop."""
@@ -188,6 +195,44 @@ def search_runs(
 
     Runs that were computed know no instrument, a sound one either.
     """
+    return _asked(
+        dataset, declared, fit, held_out, effects, max_effects, strain, noise, most_samples,
+        progress, loading, computed,
+    ).found(laws)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A task, and what is told of its runs."""
+
+    task: "Task"
+    declared: DeclaredModel
+    order: Sequence[str]
+    spikes: Mapping[str, Sequence[float]]
+    of_rates: str
+
+    def found(self, laws: Sequence[str]) -> Found:
+        """Search, with the likeliest of some laws in place of the declared one."""
+        declared, tried = self.task.choose(self.declared, laws)
+        posterior = _by_mode(self.task, self.task.explained(declared))
+        return Found(self.task, posterior, tried, self.order, self.spikes, self.of_rates)
+
+
+def _asked(
+    dataset: Dataset,
+    declared: DeclaredModel,
+    fit: Sequence[str] | None,
+    held_out: Sequence[str],
+    effects: Sequence[str | AbstractEffect] | str | None,
+    max_effects: int,
+    strain: tuple[float, float] | None,
+    noise: float | None,
+    most_samples: int,
+    progress: Say | None,
+    loading: float | None,
+    computed: bool = False,
+) -> _Asked:
+    """Return the task that runs, model and candidates make; parameters as in `run_loop`."""
     if max_effects < 0:
         raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
     say = progress or (lambda line: None)
@@ -198,18 +243,11 @@ def search_runs(
     fitted, held = every[: len(fitted)], every[len(fitted) :]
     require_samples(fitted, declared)
     candidates = candidates_beside(declared, effects, [*fitted, *held])
-    if max_effects and (effects is None or effects == "named"):
-        say("yield stress, viscous fluid or solid")
-        simple = simple_result(declared, fitted, held, spikes, time.perf_counter() - started)
-        if simple is not None:
-            return simple
     of_rates = unfelt_scatter(declared, fitted)
     if of_rates:
         fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
     task = Task(candidates, fitted, held, noise, loading or 0.0, max_effects, say, computed)
-    declared, tried = task.choose(declared, laws)
-    posterior = _by_mode(task, task.explained(declared))
-    return Found(task, posterior, tried, dataset.names, spikes, of_rates)
+    return _Asked(task, declared, dataset.names, spikes, of_rates)
 
 
 @dataclass(frozen=True)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation
-
 from discover.comparison.judging.next_measurement import bands_of_law
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from independent import Giesekus, oscillation
+
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import measured_rate, oscillatory_shear

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
 from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
 from discover.comparison.outcomes.flows import Flow
+from scipy.integrate import solve_ivp
+
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.protocols.protocol import oscillatory_shear, start_up
 from discover.study.declared_model import DeclaredModel

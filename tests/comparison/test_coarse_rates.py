@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation
-
-import discover as dc
 from discover.comparison.fitting.sampled_rates import coarse_rates_of, with_sampled_rates
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from independent import Giesekus, oscillation
+
+import discover as dc
 from discover.laws import Fluid, make_law
 from discover.learners import RecoveredTerm
 from discover.protocols import measured_rate, oscillatory_shear, sampled_rate

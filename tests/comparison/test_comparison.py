@@ -6,15 +6,15 @@ import time
 import jax.numpy as jnp
 import numpy as np
 import pytest
-
-from discover.comparison import LearnerOutcome, compare, relative_errors
-from discover.comparison.comparison import Comparison
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import find_rivals
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.statements import make_statements
 from discover.comparison.outcomes.flows import comparison_flows, predict
 from discover.comparison.outcomes.truth import true_terms
+
+from discover.comparison import LearnerOutcome, compare, relative_errors
+from discover.comparison.comparison import Comparison
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted_instrument import MOBILITY, oscillations
-
 from discover.comparison.instrument import FittedAlong, corrected
 from discover.comparison.outcomes.constant import in_words
+from planted_instrument import MOBILITY, oscillations
+
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tensor_sindy import TensorSINDy

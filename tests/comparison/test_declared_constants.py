@@ -5,9 +5,6 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import Giesekus, UpperConvectedMaxwell, oscillation, start_up
-from independent.instruments import Instrument
-
 from discover.comparison.judging.constants.beside_other_constants import with_other_coefficients
 from discover.comparison.judging.constants.declared_constants import (
     beside,
@@ -18,6 +15,9 @@ from discover.comparison.judging.constants.declared_constants import (
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
+from independent import Giesekus, UpperConvectedMaxwell, oscillation, start_up
+from independent.instruments import Instrument
+
 from discover.laws import make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners import RecoveredTerm

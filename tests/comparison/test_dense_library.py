@@ -6,10 +6,6 @@ import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from independent import Thixotropic, UpperConvectedMaxwell
-from independent import start_up as start_up_of_scipy
-from independent.instruments import Instrument
-
 from discover.comparison.judging.bands.dense_library import (
     open_where_dense_is_wide,
     with_gain_in_dense,
@@ -19,11 +15,15 @@ from discover.comparison.judging.constants.declared_constants import OtherConsta
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.learners.results.weighted_laws import WeightedLaws
+from independent import Thixotropic, UpperConvectedMaxwell
+from independent import start_up as start_up_of_scipy
+from independent.instruments import Instrument
+
 from discover.laws import Fluid
 from discover.laws.textbook.giesekus import Giesekus
 from discover.learners import LearnerResult
 from discover.learners.results import weighted_laws
-from discover.learners.results.weighted_laws import WeightedLaws
 from discover.protocols import start_up
 from discover.statistics.residual import Expectation
 

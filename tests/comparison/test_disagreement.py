@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from discover.comparison.judging.disagreement import contested, disagreements, open_where_contested
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
+
 from discover.protocols import start_up
 
 TIMES = np.linspace(0.0, 4.0, 9)

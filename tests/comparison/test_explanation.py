@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, PomPom, oscillation
-from independent.noise import correlated, white
-
 from discover.comparison.fitting.sampled_rates import with_sampled_rates
 from discover.comparison.judging.band_check import check_band
 from discover.comparison.judging.explanation import Explanation, explain
@@ -14,8 +11,11 @@ from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.judging.statements import IN_LIBRARY, claimed, make_statements
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.identify import HiddenStresses
 from discover.identify.rivals.bands import PredictionBand
+from independent import Giesekus, PomPom, oscillation
+from independent.noise import correlated, white
+
+from discover.identify import HiddenStresses
 from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
 from discover.laws import Fluid, make_law
 from discover.protocols.control import steady_rates

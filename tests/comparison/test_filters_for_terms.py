@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-from independent import Giesekus, PhanThienTanner, oscillation, start_up
-from scipy.integrate import cumulative_trapezoid
-
 from discover.comparison.judging.other_causes.filters_for_terms import (
     filter_for_terms,
     holding_filters,
@@ -12,6 +9,9 @@ from discover.comparison.judging.other_causes.filters_for_terms import (
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
+from independent import Giesekus, PhanThienTanner, oscillation, start_up
+from scipy.integrate import cumulative_trapezoid
+
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law

@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import curve_fit
-
-import discover as dc
 from discover.comparison.judging.bands.constants_in_bands import (
     law_with_fitted,
     with_fitted_constants,
@@ -14,6 +11,9 @@ from discover.comparison.judging.bands.constants_in_bands import (
 from discover.comparison.outcomes.flows import run_flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
+from scipy.optimize import curve_fit
+
+import discover as dc
 from discover.learners import RecoveredTerm
 from discover.study.data import StudyData
 from discover.study.in_memory import declared_fluid

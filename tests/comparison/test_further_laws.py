@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from discover.comparison.fitting.further_laws import fit_further_laws
+from discover.comparison.outcomes.flows import Flow
 from independent import RoliePoly
 from independent.flow import start_up as independent_start_up
 
-from discover.comparison.fitting.further_laws import fit_further_laws
-from discover.comparison.outcomes.flows import Flow
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell

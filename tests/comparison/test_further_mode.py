@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
-
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.other_causes.further_mode import clear_further_mode
 from discover.comparison.judging.other_causes.misread_runs import readings_of, with_further_modes
 from discover.comparison.outcomes.flows import Flow
+from discover.statistics.reading.misread import CLEAR, misread
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
+
 from discover.laws.registry import make_law
 from discover.protocols import oscillatory_shear, start_up
-from discover.statistics.reading.misread import CLEAR, misread
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import DeclaredModel
 from tensor_library.law_terms import LawTerms

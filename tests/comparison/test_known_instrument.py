@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.comparison.instrument import absorbed, corrected
 from planted_instrument import MOBILITY, oscillations, slow_start_ups
 
 from discover.comparison import compare
 from discover.comparison.in_memory import compare as compare_in_memory
-from discover.comparison.instrument import absorbed, corrected
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.laws import Fluid, make_law

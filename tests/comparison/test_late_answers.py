@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, start_up
-from scipy.integrate import cumulative_trapezoid
-
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.other_causes.late_answers import hold_against_late_answers
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
+from independent import Giesekus, start_up
+from scipy.integrate import cumulative_trapezoid
+
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import Expectation

@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Modes, PhanThienTanner, multimode_giesekus
-from independent.flow import start_up as independent_start_up
-
 from discover.comparison.fitting import law_by_mode
 from discover.comparison.fitting.coefficients_in_modes import (
     CoefficientsInModes,
@@ -26,11 +23,14 @@ from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.inference.by_mode.draws import ConstantsDrawn
+from independent import Modes, PhanThienTanner, multimode_giesekus
+from independent.flow import start_up as independent_start_up
+
 from discover.dataset import Dataset, Run
 from discover.dataset.loading import Loading
 from discover.effects import make_effect
 from discover.inference.by_mode.constants import ConstantByMode
-from discover.inference.by_mode.draws import ConstantsDrawn
 from discover.laws import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm

@@ -4,8 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation, start_up
-
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.other_causes.misread_runs import (
@@ -17,6 +15,8 @@ from discover.comparison.judging.other_causes.small_faults import holding_small_
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
+from independent import Giesekus, oscillation, start_up
+
 from discover.laws.registry import make_law
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import oscillatory_shear

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.comparison.instrument import FittedAlong, before_learning
+from discover.comparison.instrument.before_learning import CLASSICAL_EFFECTS
 from independent import PhanThienTanner, steps
 
 import discover as dc
-from discover.comparison.instrument import FittedAlong, before_learning
-from discover.comparison.instrument.before_learning import CLASSICAL_EFFECTS
 from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.study.data import StudyData

@@ -4,10 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import FenePeterlin, Giesekus, Thixotropic, UpperConvectedMaxwell
-from independent import start_up as start_up_of_scipy
-from independent.instruments import Instrument
-
 from discover.comparison.fitting.named_effects import (
     NamedExplanation,
     _admitted,
@@ -27,10 +23,14 @@ from discover.comparison.judging.bands.named_bands import (
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from discover.identify.rivals.bands import PredictionBand
+from independent import FenePeterlin, Giesekus, Thixotropic, UpperConvectedMaxwell
+from independent import start_up as start_up_of_scipy
+from independent.instruments import Instrument
+
 from discover.dataset import Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.effects import make_effect
-from discover.identify.rivals.bands import PredictionBand
 from discover.laws import make_law
 from discover.protocols import start_up
 from discover.statistics import LackOfFit

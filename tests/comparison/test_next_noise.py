@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-
 from discover.comparison.judging.next_measurement import LEAST_NOISE, next_measurement
 from discover.comparison.outcomes.outcome import LearnerOutcome
+
 from discover.laws import Fluid, make_law
 from discover.study.compare_section import NextExperiment
 

@@ -4,6 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.comparison.judging.explanation import explain
+from discover.comparison.outcomes.flows import Flow
+from discover.comparison.outcomes.outcome import LearnerOutcome
 from hostile_materials import Heated
 from independent import UpperConvectedMaxwell
 from independent import start_up as flow_of
@@ -12,9 +15,6 @@ from independent.instruments import Instrument
 from independent.material import StressLaw, rate_tensor, stretched
 from independent.noise import correlated, white
 
-from discover.comparison.judging.explanation import explain
-from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import start_up, step_rates
 from discover.statistics.residual import Expectation

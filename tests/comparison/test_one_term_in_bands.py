@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from discover.comparison.judging.bands.one_term_in_bands import holding_one_term_more
 from discover.comparison.judging.identifiability import FOUND
 from discover.comparison.outcomes.flows import Flow
-from discover.identify import HiddenStresses
 from discover.identify.rivals.bands import PredictionBand
+
+from discover.identify import HiddenStresses
 from discover.identify.structure.one_term_more import OneTermMore
 from discover.identify.structure.structure import LawStructure, Structure
 from discover.protocols import start_up

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from discover.comparison.fitting import law_by_mode
 from discover.comparison.fitting.law_by_mode import SparseLaw, fit_laws_by_mode
-from discover.dataset import Run
 from discover.inference.by_mode.degrees import Degree
+
+from discover.dataset import Run
 from discover.protocols.protocol import start_up
 from discover.statistics import LackOfFit
 from discover.statistics.residual import Expectation

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from independent import Giesekus, Modes, PhanThienTanner
-from independent import start_up as independent_start_up
-
 from discover.comparison.fitting.coefficients_in_modes import coefficients_in_modes
 from discover.comparison.judging.constants.modes_apart import said_of_each_mode
 from discover.comparison.outcomes.flows import Flow
+from independent import Giesekus, Modes, PhanThienTanner
+from independent import start_up as independent_start_up
+
 from discover.dataset import Run
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm

@@ -6,21 +6,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from independent import Giesekus, start_up
-
-import discover as dc
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.comparison.own_loadings import with_own_loadings
-from discover.dataset import Dataset, Run
 from discover.identify.rivals.bands import PredictionBand
+from discover.report.comparison.certainty import how_sure
+from discover.statistics.reading.loadings import LoadingFound
+from independent import Giesekus, start_up
+
+import discover as dc
+from discover.dataset import Dataset, Run
 from discover.protocols import imposed_stress
 from discover.protocols import start_up as protocol
-from discover.report.comparison.certainty import how_sure
 from discover.statistics import LackOfFit
-from discover.statistics.reading.loadings import LoadingFound
 from discover.study.data import StudyData
 from discover.study.in_memory import data_in_memory
 

@@ -3,14 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
-from independent import Giesekus
-from independent import start_up as independent_start_up
-
 from discover.comparison.judging.bands.rates_in_bands import holding_rate_errors
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.outcomes.flows import Flow, predict
-from discover.dataset import Run
 from discover.identify.rivals.bands import PredictionBand
+from independent import Giesekus
+from independent import start_up as independent_start_up
+
+from discover.dataset import Run
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners import RecoveredTerm
 from discover.protocols import sampled_rate

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from discover.comparison.judging.bands.room_left import room_left
 from discover.comparison.judging.identifiability import Rival
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+
 from discover.protocols import start_up
 from discover.protocols.protocol import in_flow
 from tensor_library.law_terms import LawTerms

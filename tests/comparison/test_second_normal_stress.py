@@ -2,15 +2,15 @@
 
 import numpy as np
 import pytest
-from independent import KBKZ, JohnsonSegalman, PhanThienTanner
-from independent import start_up as start_up_of_scipy
-
 from discover.comparison.judging.bands.dense_library import ANY_N2, DENSE, open_where_dense_is_wide
 from discover.comparison.judging.bands.second_normal_stress import with_any_second_normal_stress
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.statements import Statement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from independent import KBKZ, JohnsonSegalman, PhanThienTanner
+from independent import start_up as start_up_of_scipy
+
 from discover.protocols import in_flow, start_up
 from discover.statistics import LackOfFit
 

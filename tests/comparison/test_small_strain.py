@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-
 from discover.comparison.judging.constants.declared_constants import OtherConstant
 from discover.comparison.judging.constants.small_strain import with_small_strain_told
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.outcomes.outcome import LearnerOutcome
+
 from discover.learners import RecoveredTerm
 from discover.statistics import LackOfFit
 

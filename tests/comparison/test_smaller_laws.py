@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, PhanThienTanner, start_up
-from independent.instruments import Instrument
-
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.moved_law import MovedLaw
 from discover.comparison.judging.other_causes.smaller_laws import (
@@ -15,6 +12,9 @@ from discover.comparison.judging.other_causes.smaller_laws import (
 )
 from discover.comparison.outcomes.flows import Flow, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from independent import Giesekus, PhanThienTanner, start_up
+from independent.instruments import Instrument
+
 from discover.laws.registry import make_law
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import start_up as protocol

@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.comparison.fitting.step_instants import with_step_instants
 from independent import Giesekus
 from independent.flow import start_up, steps
 from independent.folders import write_folder
 from independent.instruments import Instrument
 
 import discover as dc
-from discover.comparison.fitting.step_instants import with_step_instants
 from discover.study.in_memory import data_in_memory, declared_fluid
 from tensor_library import TermLibrary, parse_term
 

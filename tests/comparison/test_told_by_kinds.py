@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from discover.learners.tensor_sindy.told_by_kinds import told_by_kinds
+from discover.report.told_by import told_by_table
 from independent import Giesekus, start_up
 
 import discover as dc
 from discover.learners.tensor_sindy import TensorSINDy
-from discover.learners.tensor_sindy.told_by_kinds import told_by_kinds
 from discover.protocols.control import steady_rates
-from discover.report.told_by import told_by_table
 from tensor_library.library import build_library
 
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01

@@ -8,9 +8,8 @@ import functools
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
 from discover.comparison.outcomes.truth import true_terms
+from scipy.integrate import solve_ivp
 
 XI, ALPHA, EPSILON, LIMIT = 0.4, 0.3, 0.2, 12.0
 UNIT = np.eye(3)

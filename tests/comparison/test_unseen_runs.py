@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, RoliePoly, start_up
-from independent.noise import white
-
 from discover.comparison.judging.explanation import Explanation, explain
 from discover.comparison.judging.unseen_runs import hold_against_unseen, outliers_of
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import bands_of_predictions
+from independent import Giesekus, RoliePoly, start_up
+from independent.noise import white
+
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.protocols import start_up as protocol
 from discover.statistics.lack_of_fit import LackOfFit

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.identify.rivals.bands import bands_of_predictions
+from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from independent import Giesekus
 from independent.sweeps import modulus_of
 from scipy.stats import norm
 
-from discover.identify.rivals.bands import bands_of_predictions
-from discover.identify.side_by_side.many_laws import Contender, draws, fluid_of, predict_laws
 from discover.laws import Fluid, make_law
 from discover.protocols.control import oscillations
 from tensor_library.law_terms import LawTerms

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-
-from discover.errors import InputError
 from discover.identify.design.experiment_outcome import judge_laws
 from discover.identify.design.experiments import candidate_experiments
 from discover.identify.design.next_experiment import (
@@ -19,6 +17,8 @@ from discover.identify.side_by_side.many_laws import (
     predict_laws,
     sigma_points,
 )
+
+from discover.errors import InputError
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
 from discover.protocols.classes import FLOW_CLASSES
 from discover.simulate import simulate

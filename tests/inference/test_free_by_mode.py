@@ -5,15 +5,15 @@ from functools import cache
 
 import numpy as np
 import pytest
+from discover.inference.by_mode.as_fitted import constants_by_mode
+from discover.inference.by_mode.degrees import FREE, Degree, choose_degrees, one_degree_more
+from discover.inference.by_mode.draws import draw_constants
+from discover.inference.by_mode.varying_constant import freer_fits
 from modes_in_start_up import noisy_start_ups
 
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.inference.by_mode import degrees as of_degrees
-from discover.inference.by_mode.as_fitted import constants_by_mode
-from discover.inference.by_mode.degrees import FREE, Degree, choose_degrees, one_degree_more
-from discover.inference.by_mode.draws import draw_constants
-from discover.inference.by_mode.varying_constant import freer_fits
 from discover.inference.fit_uncertainty import intervals
 from discover.inference.problem import FitProblem
 

@@ -1,9 +1,9 @@
 """Runs held out refute a degree of constants by mode, and the next is held against them too."""
 
 import pytest
+from discover.inference.by_mode.degrees import lowest_not_refuted
 
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
-from discover.inference.by_mode.degrees import lowest_not_refuted
 from discover.report.plots.by_mode import by_mode_sentence
 
 

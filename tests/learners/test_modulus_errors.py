@@ -5,13 +5,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from discover.comparison.fitting import training
+from discover.identify.side_by_side.many_laws import Contender, draws
 from independent import Giesekus, start_up
 
 import discover as dc
-from discover.comparison.fitting import training
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.identify.side_by_side.many_laws import Contender, draws
 from discover.inference.fit_uncertainty import intervals
 from discover.inference.least_squares import fit_batch
 from discover.inference.modulus_errors import modulus_shifts

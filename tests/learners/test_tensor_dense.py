@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from discover.learners.tensor_dense import TensorDense
 from independent import KBKZ, Giesekus, RoliePoly, UpperConvectedMaxwell
 from independent import oscillation as imposed
 from independent.noise import white
@@ -11,7 +12,6 @@ from independent.noise import white
 import discover as dc
 from discover.dataset import Run
 from discover.errors import InputError
-from discover.learners.tensor_dense import TensorDense
 from discover.protocols import oscillatory_shear
 from discover.protocols.protocol import shear_rates
 from tensor_library import build_library

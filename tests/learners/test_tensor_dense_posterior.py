@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from sklearn.linear_model import BayesianRidge
-
 from discover.learners.tensor_dense.posterior import log_evidence, most_evident, spread
 from discover.statistics.weighted_quantiles import weighted_quantiles
+from sklearn.linear_model import BayesianRidge
 
 RECORDS, TERMS = 400.0, 12
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
-
 from discover.comparison.judging.next_measurement import contenders
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from scipy.integrate import solve_ivp
+
 from discover.dataset.run import Run
 from discover.learners.tensor_sindy.deviance import draws_of_fit
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty

@@ -3,11 +3,11 @@
 import html
 
 import numpy as np
-
-from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import Rival
 from discover.comparison.judging.statements import IN_LIBRARY, Statement
+
+from discover.comparison import Comparison, Flow, LearnerOutcome
 from discover.learners import RecoveredTerm
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison

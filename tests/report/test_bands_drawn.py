@@ -3,12 +3,12 @@
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
-from matplotlib.path import Path
-
-from discover.comparison.comparison import Comparison
 from discover.comparison.judging.bands.dense_library import DENSE, NAMED_BESIDE
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
+from matplotlib.path import Path
+
+from discover.comparison.comparison import Comparison
 from discover.protocols import start_up
 from discover.report.plots.comparison.flows import _condition, _draw_band
 from discover.report.plots.cycles import shade_between

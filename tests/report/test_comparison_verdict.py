@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_comparison import TIMES, left, made_up, page_of
-
 from discover.comparison.judging.band_check import unbounded
 from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.statements import (
@@ -15,8 +13,10 @@ from discover.comparison.judging.statements import (
     Statement,
     no_flow_left,
 )
-from discover.dataset.records.repeats import Repeats
 from discover.identify.rivals.bands import PredictionBand
+from made_up_comparison import TIMES, left, made_up, page_of
+
+from discover.dataset.records.repeats import Repeats
 from discover.protocols.control import oscillations, steady_rates
 from discover.protocols.kinematics import ONLY_STATES
 from discover.protocols.protocol import start_up

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-
-from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
+
+from discover.comparison.comparison import Comparison
 from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.report.predictions import (

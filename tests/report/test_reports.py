@@ -12,12 +12,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from standing_alone import SCRIPT, stands_alone
-
-from discover.comparison import compare
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
+from standing_alone import SCRIPT, stands_alone
+
+from discover.comparison import compare
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.report.comparison.report import write_comparison

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
-
 from discover.statistics.reading.any_correlation import probability_over_correlations
+from scipy.signal import lfilter
 
 RUNS, SAMPLES, DRAWS = 4, 80, 100
 ROWS = np.split(np.arange(RUNS * SAMPLES), RUNS)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from discover.statistics.reading.beyond_sweep import beyond_the_sweep
+from discover.statistics.reading.reading_faults import Reading
 
 from discover.dataset import LinearSweep
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
-from discover.statistics.reading.beyond_sweep import beyond_the_sweep
-from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.residual import Expectation
 
 TIMES = np.geomspace(0.02, 8.0, 100)

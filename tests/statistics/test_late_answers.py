@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
+from discover.statistics.reading.late_answers import AGREED, Response, late_answer
 from independent import Giesekus, oscillation, start_up
 from independent.noise import correlated
 from scipy.integrate import cumulative_trapezoid
 from scipy.signal import lfilter
-
-from discover.statistics.reading.late_answers import AGREED, Response, late_answer
 
 _GROWTH, _WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 _FLOWS = [

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from independent import Giesekus, Modes, oscillation, start_up
-
 from discover.statistics.reading.misread import CLEAR, POSSIBLE, misread, reads
 from discover.statistics.reading.reading_faults import Reading
+from independent import Giesekus, Modes, oscillation, start_up
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {

@@ -1,11 +1,10 @@
 """One Maxwell mode in noise correlated to 0.95, by closed forms: no fault of reading is there."""
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.signal import lfilter
-
 from discover.statistics.reading.misread import CLEAR, misread
 from discover.statistics.reading.reading_faults import Reading
+from scipy.optimize import least_squares
+from scipy.signal import lfilter
 
 TIMES = np.linspace(0.1, 8.0, 80)
 RATES = (0.3, 1.0, 3.0)

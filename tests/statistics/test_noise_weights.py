@@ -1,7 +1,6 @@
 """How much each run weighs: by its own noise, where a law misses no run by more than noise."""
 
 import numpy as np
-
 from discover.statistics.noise_weights import weights_by_noise
 
 TIMES = np.linspace(0.0, 1.0, 80)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from discover.statistics.one_more import one_more
 
 DRAWN = 4000

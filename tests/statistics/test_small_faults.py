@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from independent import Giesekus, oscillation, start_up
-
 from discover.statistics.reading.reading_faults import Reading
 from discover.statistics.reading.small_faults import WIDTHS, small_faults
+from independent import Giesekus, oscillation, start_up
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {

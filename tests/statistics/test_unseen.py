@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from discover.statistics.unseen import Unseen, refutes
 from independent import Giesekus, RoliePoly, start_up
 from independent.noise import white
 
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.residual import Expectation, fast_part
-from discover.statistics.unseen import Unseen, refutes
 
 TIMES = np.geomspace(0.05, 10.0, 80)
 ALPHA, STEP = 0.3, 1e-3

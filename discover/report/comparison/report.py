@@ -7,6 +7,7 @@ from discover.comparison.comparison import Comparison
 from discover.equations.spelling.latex import PREAMBLE, law_latex
 from discover.learners.registry import learner_title
 from discover.plain_json import json_text
+from discover.report.answer_screen import answer_screen
 from discover.report.comparison.pictures import comparison_pictures
 from discover.report.comparison.sections import sections
 from discover.report.comparison.verdict import comparison_verdict
@@ -66,6 +67,7 @@ def write_comparison(
         "comparison.html",
         data={PREDICTIONS: predictions, "comparison.json": content},
         comparison=comparison,
+        screen=answer_screen(comparison.answer),
         questions=QUESTIONS,
         sentences=[] if isinstance(sentences, Missing) else sentences,
         lost=[sentences] if isinstance(sentences, Missing) else [],
