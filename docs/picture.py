@@ -6,7 +6,7 @@ python docs/picture.py
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from discover.comparison.outcomes.flows import QUANTITIES
+from discover.comparison.flows import QUANTITIES
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from discover.comparison.fitting.classical import CLASSICAL, fit_classical_laws
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.classical import CLASSICAL, fit_classical_laws
+from discover.comparison.flows import Flow
 from scipy.integrate import solve_ivp
 
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell

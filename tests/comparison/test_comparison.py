@@ -10,8 +10,8 @@ from discover.comparison.judging.explanation import Explanation
 from discover.comparison.judging.identifiability import find_rivals
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.statements import make_statements
-from discover.comparison.outcomes.flows import comparison_flows, predict
-from discover.comparison.outcomes.truth import true_terms
+from discover.comparison.flows import comparison_flows, predict
+from discover.comparison.truth import true_terms
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison

@@ -5,7 +5,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from discover.comparison.fitting.prepared import thinned_to
+from discover.comparison.prepared import thinned_to
 from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison import compare

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.range import place
+from discover.comparison.flows import Flow
+from discover.comparison.placement import place
 
 from discover.protocols.protocol import in_flow, oscillatory_shear, start_up
 

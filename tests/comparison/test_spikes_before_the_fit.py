@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from discover.comparison.fitting.prepared import without_spikes_in_fit
+from discover.comparison.prepared import without_spikes_in_fit
 from independent import Giesekus, start_up
 from independent.noise import white
 

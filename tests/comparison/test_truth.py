@@ -8,7 +8,7 @@ import functools
 
 import numpy as np
 import pytest
-from discover.comparison.outcomes.truth import true_terms
+from discover.comparison.truth import true_terms
 from scipy.integrate import solve_ivp
 
 XI, ALPHA, EPSILON, LIMIT = 0.4, 0.3, 0.2, 12.0

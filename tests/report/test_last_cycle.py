@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.flows import Flow
 
 from discover.protocols import measured_rate, oscillatory_shear
 from discover.report.plots.comparison.flows import last_cycle

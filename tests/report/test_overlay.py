@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from discover.comparison.outcomes.flows import Flow
+from discover.comparison.flows import Flow
 from independent import authors
 from independent.homogeneous import UNIT
 
