@@ -6,9 +6,8 @@ python docs/picture.py
 from importlib.resources import as_file, files
 from pathlib import Path
 
-from discover.comparison.flows import QUANTITIES
-
 from discover.comparison.comparison import Comparison
+from discover.comparison.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64

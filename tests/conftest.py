@@ -172,45 +172,6 @@ def optimised():
         yield
 
 
-def _leave_out_other_readings(patch: pytest.MonkeyPatch) -> None:
-    from discover.comparison import judgement
-
-    # each of these is asked on functions and in comparisons of its own (`tests/comparison`)
-    for name in ("hold_against_late_answers", "hold_against_misreading"):
-        patch.setattr(judgement, name, lambda explanation, *_: explanation)
-    patch.setattr(judgement, "holding_other_records", lambda own, bands, *_, **__: (own, bands, ()))
-
-
-def _leave_out_what_stands_beside_a_verdict(patch: pytest.MonkeyPatch) -> None:
-    from discover.comparison.judging.next_measurement import NextMeasurement
-
-    from discover.comparison import judgement, learning
-
-    nothing = judgement.Beside((), None, ())
-    patch.setattr(judgement, "look_beside", lambda *_: nothing)
-    _leave_out_other_readings(patch)
-    patch.setattr(judgement, "next_measurement", lambda *_: NextMeasurement())
-    patch.setattr(learning, "physics_of", lambda *_: {"checks": []})
-
-
-@pytest.fixture
-def verdict_alone(monkeypatch):
-    """Leave out what stands beside the verdict of a comparison, and has tests of its own."""
-    _leave_out_what_stands_beside_a_verdict(monkeypatch)
-
-
-@pytest.fixture(scope="session")
-def left_to_the_verdict():
-    """Return what does the same as `verdict_alone` to a patch of longer life than a test."""
-    return _leave_out_what_stands_beside_a_verdict
-
-
-@pytest.fixture(scope="session")
-def left_to_the_page():
-    """Let a patch leave out whether records were misread, of which a page has a sentence alone."""
-    return _leave_out_other_readings
-
-
 @pytest.fixture(scope="session")
 def measured_data() -> Path:
     """Return the folder of measured data sets, or skip and say why."""

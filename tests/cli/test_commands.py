@@ -57,7 +57,7 @@ def trained(monkeypatch):
 
 
 @pytest.fixture
-def undrawn(monkeypatch, verdict_alone):
+def undrawn(monkeypatch):
     """A page of the verdict without pictures, where what a command does with it is asked."""
     monkeypatch.setattr(
         "discover.report.comparison.report.comparison_pictures", lambda *_: ([], [])

@@ -5,11 +5,11 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from discover.comparison.prepared import thinned_to
 from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison import compare
 from discover.comparison.description import data_in_words
+from discover.comparison.prepared import thinned_to
 from discover.dataset import Dataset, Run
 from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
 from discover.protocols import measured_rate

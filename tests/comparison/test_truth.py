@@ -8,8 +8,9 @@ import functools
 
 import numpy as np
 import pytest
-from discover.comparison.truth import true_terms
 from scipy.integrate import solve_ivp
+
+from discover.comparison.truth import true_terms
 
 XI, ALPHA, EPSILON, LIMIT = 0.4, 0.3, 0.2, 12.0
 UNIT = np.eye(3)

@@ -1,15 +1,13 @@
 """Intervals and bands beside modes from a noisy sweep: sweeps by closed form, records by scipy."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
-from discover.comparison.fitting import training
-from discover.identify.side_by_side.many_laws import Contender, draws
 from independent import Giesekus, start_up
 
 import discover as dc
+from discover.comparison import training
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.inference.fit_uncertainty import intervals
@@ -19,11 +17,9 @@ from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
 from discover.learners.tensor_sindy.intervals import parameter_uncertainty
 from discover.learners.tensor_sindy.refit import refit
 from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.trajectories.modulus_errors import ModulusErrors
 from discover.learners.trajectories.problem import make_problem
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
-from tensor_library.law_terms import LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -153,19 +149,6 @@ def test_parameters_move_with_the_moduli_as_the_response_says():
         assert change == pytest.approx(-0.3 * errors.response[0, direction], rel=0.1, abs=1e-5)
 
 
-def test_moduli_are_drawn_with_the_parameters_that_go_with_them():
-    errors = ModulusErrors(root=np.diag([2.0, 0.0]), response=np.array([[0.1, 0.0]]))
-    law = Contender(
-        "law", LawTerms({"sigma": 1.0}), covariance=np.array([[0.01]]), modulus_errors=errors
-    )
-    drawn = draws(law, 50, np.random.default_rng(0), np.array([10.0, 5.0]))
-    terms = np.array([one.law.coefficients["sigma"] for one in drawn[1:]])
-    moduli = np.array([one.modulus for one in drawn[1:]])
-    # all of the parameter's variance comes from the first modulus: θ = 1 − 0.1 u, G = 10 + 2 u
-    np.testing.assert_allclose(moduli[:, 0], 10.0 - 20.0 * (terms - 1.0), atol=1e-6)
-    np.testing.assert_allclose(moduli[:, 1], 5.0)
-
-
 @pytest.mark.parametrize("covariance", [np.eye(2), np.full((3, 3), np.nan), np.triu(np.ones(3))])
 def test_a_covariance_that_is_none_is_refused(covariance):
     with pytest.raises(InputError, match="symmetric matrix in Pa²"):
@@ -209,39 +192,16 @@ def test_a_study_hands_every_learner_what_it_knows(monkeypatch):
         met[type(self).__name__] = self
         raise InterruptedError
 
-    for name in ("TensorSINDy", "TensorDense", "TBNNUDE"):
+    for name in ("TensorSINDy", "TBNNUDE"):
         monkeypatch.setattr(getattr(dc, name), "fit", fit)
     data = dc.Dataset("planted", tuple(records(0)), sweep(0))
     declared = declared_fluid(dc.Fluid.from_sweep(data.linear_sweep), data)
     study = Study.model_validate({"data": {"folder": "planted"}, "model": {"law": "ucm"}})
-    for learner in ("tensor_sindy", "tensor_dense", "tbnn_ude"):
+    for learner in ("tensor_sindy", "tbnn_ude"):
         with pytest.raises(InterruptedError):
             training.train(learner, study, declared, data.runs)
-    for name in ("TensorSINDy", "TensorDense"):
+    for name in ("TensorSINDy",):
         np.testing.assert_array_equal(met[name].modulus_covariance, declared.modulus_covariance)
-
-
-@pytest.mark.slow
-def test_the_dense_band_holds_normal_stresses_beside_modes_of_a_noisy_sweep():
-    """Where moduli count as exact that of the laws at hand does not: a fifth or less was inside."""
-    inside = {}
-    unseen = records(0, rates=(4.0,))
-    exact = stress(4.0, "N1")[1]
-    spectrum = sweep(0).relaxation_spectrum()
-    for known in (True, False):
-        dense = dc.TensorDense(
-            modulus=spectrum.modulus,
-            relaxation_time=spectrum.relaxation_time,
-            modulus_covariance=spectrum.modulus_covariance if known else None,
-        ).fit(records(0))
-        # Giesekus, one of the named laws, fits only with moduli that may be others
-        assert (dense.draws_.optima is None) == known
-        dense.draws_ = replace(dense.draws_, optima=None)
-        low, _, high = dense.predict_band(unseen)[0]["N1"]
-        inside[known] = np.mean((exact >= low) & (exact <= high))
-    # relaxation times count as exact, which costs some of it
-    assert inside[True] > 0.85
-    assert inside[False] < 0.7
 
 
 @pytest.mark.slow

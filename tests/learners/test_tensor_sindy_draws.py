@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from discover.comparison.judging.next_measurement import contenders
-from discover.comparison.outcomes.outcome import LearnerOutcome
 from scipy.integrate import solve_ivp
 
 from discover.dataset.run import Run
@@ -124,20 +122,6 @@ def test_amplitude_and_exponent_of_a_nearly_linear_law_have_no_linearised_interv
     else:
         # weighed: no law that fits has an amplitude of none or of another sign
         assert term.ci95[0] * term.ci95[1] > 0.0
-
-
-@pytest.mark.slow
-def test_without_draws_the_law_has_no_band_and_it_is_not_a_narrow_one(exchanged):
-    details = {
-        "covariance": exchanged.uncertainty.total_covariance.tolist(),
-        "draws": exchanged.draws.to_json(),
-    }
-    nothing = (np.zeros(0), np.zeros(0))
-    outcome = LearnerOutcome("tensor_sindy", (exchanged.term,), 1.0, nothing, details)
-    kept = LearnerOutcome.from_state(outcome.to_state())  # as after an interruption
-    chosen, _ = contenders(kept, [])
-    assert bool(chosen.without_band) == (exchanged.draws.method == "none")
-    assert (chosen.drawn is not None) == (exchanged.draws.method == "weighed")
 
 
 @pytest.mark.slow

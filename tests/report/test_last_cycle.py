@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from discover.comparison.flows import Flow
 
+from discover.comparison.flows import Flow
 from discover.protocols import measured_rate, oscillatory_shear
 from discover.report.plots.comparison.flows import last_cycle
 

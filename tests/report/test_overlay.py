@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from discover.comparison.flows import Flow
 from independent import authors
 from independent.homogeneous import UNIT
 
+from discover.comparison.flows import Flow
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
