@@ -86,7 +86,6 @@ _KNOWN_TO = ("0.10",)
 # in these the tests spend more time than it takes to optimise them
 _WORTH_OPTIMISING = (
     "discover.learners.tensor_sindy.refit._descend",
-    "discover.learners.tensor_dense.posterior._descend",
     "discover.identify.side_by_side.many_laws._predict",
 )
 

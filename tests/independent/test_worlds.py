@@ -180,7 +180,7 @@ def test_a_comparison_on_a_sound_maxwell_fluid_is_explained_and_its_bands_hold(t
     found = ask("calibration", "0", "compare", 7, str(tmp_path), 3600.0)
     assert (found["law"], found["flaw"], found["verdict"]) == ("Maxwell", "sound", "explained")
     assert found["terms"] == []
-    assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "tensor_dense"}
+    assert {b["source"] for b in found["bands"]} == {"tensor_sindy", "posterior"}
     held = [b["inside"] for b in found["bands"] if "inside" in b]
     assert held
     assert min(held) > 0.9

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +14,7 @@ from independent.folders import write_folder
 from independent.instruments import Instrument
 
 import discover as dc
-from discover.forward import DeclaredModel
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.batches.rate_steps import RateSteps
 from discover.inference.step_instants import with_places, with_rate_steps
 from discover.report.loop.verdict import loop_verdict
@@ -127,6 +128,12 @@ class TestRateSteps:
         assert np.max(np.abs(np.diff(rates, axis=0))) < 2.0 * 4 * 1.5 / 100 * 1.01
 
 
+def maxwell_after_a_step(times, instant):
+    """Return σ12 of a Maxwell fluid, 1 then 3 1/s from an instant on, in closed form."""
+    late = np.maximum(times - instant, 0.0)
+    return 100.0 * (1.0 - np.exp(-times) + 2.0 * (1.0 - np.exp(-late)))
+
+
 def test_what_else_a_run_recorded_shares_its_instants():
     times = np.linspace(0.1, 8.0, 80)
     rate = np.where(times < 3.95, 1.0, 3.0)
@@ -143,3 +150,19 @@ def test_what_else_a_run_recorded_shares_its_instants():
     )
     assert declared.step_instants == 2
     assert [one.rate_steps[0].place for one in (*fitted, *held)] == [0, 1, 0]
+
+
+def test_a_fitted_instant_takes_the_place_of_the_run_s_own():
+    times = np.linspace(0.1, 8.0, 80)
+    rate = np.where(times < 3.95, 1.0, 3.0)
+    run = dc.Run("a.csv", times, dc.measured_rate(times, rate), rate, rate)
+    declared, (run,), _ = with_places(DeclaredModel.maxwell(100.0, 1.0), [with_rate_steps(run)], [])
+    model, batch = AugmentedModel(declared, []), make_batch([run])
+    theta = model.zero()
+    assert model.free_positions == [model.size - 1]
+    theta[model.instants] = 0.7
+    moved = eqx.tree_at(lambda b: b.parts[0].steps.share, batch, jnp.array([[0.2]]))
+    assert model.predict(theta, batch)[0] == pytest.approx(
+        maxwell_after_a_step(times, 3.97), abs=0.02
+    )
+    np.testing.assert_array_equal(model.predict(theta, moved), model.predict(theta, batch))
