@@ -65,7 +65,7 @@ _LONG = (
     "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
     "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
     "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
-    "test_modulus_errors.py", "test_modes_of_a_stiff_fluid.py", "test_flows_of_fluids.py",
+    "test_modulus_errors.py", "test_flows_of_fluids.py",
     "test_constants_by_mode.py", "test_loop.py", "test_law_choice.py",
 )  # fmt: skip
 
@@ -84,10 +84,7 @@ _COMPILED_SOON = (
 _KNOWN_TO = ("0.10",)
 
 # in these the tests spend more time than it takes to optimise them
-_WORTH_OPTIMISING = (
-    "discover.learners.tensor_sindy.refit._descend",
-    "discover.identify.side_by_side.many_laws._predict",
-)
+_WORTH_OPTIMISING = ("discover.learners.tensor_sindy.refit._descend",)
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -56,8 +56,12 @@ def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
     told = [f"{len(times)} of {run.name}" for run, times in parts if times]
     if not told:
         return data, ""
-    fit = replace(data.fit, runs=tuple(run for run, _ in parts))
-    return replace(data, fit=fit), (
+    cleaned = {run.name: run for run, _ in parts}
+    dataset, fit = (
+        replace(part, runs=tuple(cleaned.get(run.name, run) for run in part.runs))
+        for part in (data.dataset, data.fit)
+    )
+    return replace(data, dataset=dataset, fit=fit), (
         f"Left out before the fit, for they stand alone: {', '.join(told)} samples"
     )
 

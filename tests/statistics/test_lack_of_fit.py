@@ -142,9 +142,8 @@ def test_what_looks_like_correlated_noise_is_no_noise_once_the_model_is_refuted(
     found = lack_of_fit([residual], [record])
     assert found.verdict == "explained"
     assert found.noise == pytest.approx(np.sqrt(np.mean(residual**2)) / 7.07, rel=0.1)
-    assert not found.noise_unsure
     refuted = found.refuted("missed elsewhere")
-    assert (refuted.verdict, refuted.noise_unsure) == ("unexplained", True)
+    assert refuted.verdict == "unexplained"
     # third differences of such noise: 20 − 30ρ + 12ρ² − 2ρ³ of 20 of its variance
     share = np.sqrt((20 - 30 * 0.85 + 12 * 0.85**2 - 2 * 0.85**3) / 20)
     assert refuted.noise == pytest.approx(share * found.noise, rel=0.2)
