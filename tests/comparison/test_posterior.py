@@ -56,18 +56,20 @@ def test_the_gain_is_found_and_what_the_learner_saw_is_the_fluid(found):
     assert found.determined_terms
 
 
-def test_the_band_of_n1_holds_the_truth_and_is_narrow(found, records):
+def test_the_band_of_n1_holds_the_truth_and_both_readings_of_a_tenth(found, records):
     (flow,) = found.judged
     band, truth = found.bands[flow.key], records["held.csv"].N1
     # 95 % of the samples should lie inside, and those of one run err together
     assert np.mean((band.low["N1"] <= truth) & (truth <= band.high["N1"])) > 0.9
-    assert band.half_widths()["N1"] < 0.1
+    # a transducer that reads a tenth too much, or a fluid a tenth stiffer: N1 differs by a tenth
+    assert 0.05 < band.half_widths()["N1"] < 0.2
+    # of the record itself both say the same
+    assert band.half_widths()["sigma12"] < 0.01
 
 
-def test_n2_is_open_though_its_band_is_narrow(found):
-    # T1 tr(γ̇²)/2 − T5 acts on σ33 alone: σ12 never sees it
-    assert "N2" in found.undetermined
-    assert "N1" not in found.undetermined
+def test_normal_stresses_are_open(found):
+    # N2: T1 tr(γ̇²)/2 − T5 acts on σ33 alone, which σ12 never sees; N1: see above
+    assert set(found.undetermined) == {"N1", "N2"}
 
 
 def test_classical_laws_stand_beside_the_same_gain_and_the_right_one_is_best(found):
