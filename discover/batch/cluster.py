@@ -24,24 +24,12 @@ def run_on_cluster(
 ) -> None:
     """Run jobs side by side.
 
-    Parameters
-    ----------
-    run
-        What a worker calls with a job, and with a function for its progress.
-    jobs
-        Paths in them must mean the same in the workers as here.
-    scheduler
-        Address of the scheduler. For ``tls://`` the certificates are those that dask's own settings
-        name, ``distributed.comm.tls``.
-    say
-        Called with the position of a job, what is going on in it, and the fraction done.
-    end
-        Called with the position of a job that has ended, and how.
-
-    Raises
-    ------
-    InputError
-        If dask is not installed, or no scheduler answers at the address.
+    `run`: what a worker calls with a job, and with a function for its progress. `jobs`: paths in
+    them must mean the same in the workers as here. `scheduler`: address of the scheduler. For
+    ``tls://`` the certificates are those that dask's own settings name, ``distributed.comm.tls``.
+    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
+    called with the position of a job that has ended, and how. Raises InputError if dask is not
+    installed, or no scheduler answers at the address.
     """
     try:
         from distributed import as_completed

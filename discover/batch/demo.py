@@ -12,12 +12,7 @@ def run_demo(
 ) -> dict[str, Path]:
     """Run the demonstration and return its pages by title.
 
-    Parameters
-    ----------
-    out
-        Folder for the results; the comparison in it, the loop in its folder ``loop``.
-    seed, overwrite, progress
-        As in `discover.batch.tasks.run_compare`.
+    `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
     """
     part = by_shares(progress, {"comparison": 0.9, "loop": 0.1})
     studies = files("discover.batch") / "demo_studies"

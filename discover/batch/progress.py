@@ -16,10 +16,7 @@ class BatchProgress:
     Studies whose result was there already do not count: time left is estimated from the fraction
     done, and finding a result takes no time.
 
-    Parameters
-    ----------
-    progress
-        Called with what is going on and the fraction done.
+    `progress`: called with what is going on and the fraction done.
     """
 
     def __init__(self, names: list[str], progress: Progress):

@@ -18,12 +18,8 @@ QUANTITIES = ("sigma12", "N1", "N2")
 class LearnerRow:
     """What one learner found in one study.
 
-    Attributes
-    ----------
-    terms
-        Term, coefficient and inner parameters.
-    errors
-        Largest relative error of each quantity in flows that no fit saw.
+    `terms`: term, coefficient and inner parameters.
+    `errors`: largest relative error of each quantity in flows that no fit saw.
     """
 
     terms: tuple[tuple[str, float, Mapping[str, float]], ...]
@@ -43,22 +39,14 @@ class LearnerRow:
 class StudyRow:
     """One study as the tables of a batch show it; everything empty where it failed.
 
-    Attributes
-    ----------
-    learners
-        By name.
-    rivals
-        Number of laws that its data do not tell from the one found.
-    undetermined
-        Quantities that they do not decide.
-    chosen
-        Terms that each rule for choosing a law takes, by rule.
-    effects
-        Effects that a closed loop added.
-    verdict
-        Of the closed loop, or of the comparison.
-    error_before, error_after
-        On its held-out runs, or on the fitted ones where none were held out.
+    `learners`: by name.
+    `rivals`: number of laws that its data do not tell from the one found.
+    `undetermined`: quantities that they do not decide.
+    `chosen`: terms that each rule for choosing a law takes, by rule.
+    `effects`: effects that a closed loop added.
+    `verdict`: of the closed loop, or of the comparison.
+    `error_before`, `error_after`: on its held-out runs, or on the fitted ones where none were held
+        out.
     """
 
     learners: Mapping[str, LearnerRow] = field(default_factory=dict)

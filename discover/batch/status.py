@@ -15,18 +15,11 @@ from discover.notebook_view import NotebookView
 class StudyStatus:
     """How one study ended.
 
-    Attributes
-    ----------
-    name, task
-        Folder under the batch's, and ``compare`` or ``close-loop``.
-    status
-        ``waiting``, ``done``, ``complete`` (was there already) or ``failed``.
-    text
-        The verdict, or the reason of the failure.
-    input_error
-        Whether the failure is the user's to mend.
-    seconds
-        Time taken now.
+    `name`, `task`: folder under the batch's, and ``compare`` or ``close-loop``.
+    `status`: ``waiting``, ``done``, ``complete`` (was there already) or ``failed``.
+    `text`: the verdict, or the reason of the failure.
+    `input_error`: whether the failure is the user's to mend.
+    `seconds`: time taken now.
     """
 
     name: str
@@ -46,14 +39,9 @@ class StudyStatus:
 class BatchResult(NotebookView):
     """How every study of a batch ended.
 
-    Attributes
-    ----------
-    studies
-        In the order given.
-    index
-        The summary page.
-    rows
-        What they found, in the same order.
+    `studies` in the order given.
+    `index`: the summary page.
+    `rows`: what they found, in the same order.
     """
 
     studies: tuple[StudyStatus, ...]

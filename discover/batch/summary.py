@@ -20,12 +20,7 @@ _PAUSE = 5.0  # seconds for which news are gathered before the page is written a
 class Summary:
     """Writes ``index.html``, ``table.csv`` and ``batch.json``.
 
-    Parameters
-    ----------
-    out
-        Folder of the batch.
-    jobs
-        Name and task of every study, in their order.
+    `out`: folder of the batch. `jobs`: name and task of every study, in their order.
     """
 
     def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):

@@ -33,14 +33,9 @@ def nothing_to_note(study: Study) -> None:
 class TaskResult:
     """Where a task's results lie, and what they say in a few lines.
 
-    Attributes
-    ----------
-    report, json_file
-        The page and the JSON.
-    text
-        The verdict, for a terminal.
-    was_complete
-        Whether everything was there already.
+    `report`, `json_file`: the page and the JSON.
+    `text`: the verdict, for a terminal.
+    `was_complete`: whether everything was there already.
     """
 
     report: Path
@@ -86,23 +81,10 @@ def run_compare(
 ) -> TaskResult:
     """Run both learners of a study and write the comparison report.
 
-    Parameters
-    ----------
-    out
-        Folder for the results; goes on there if it holds unfinished ones.
-    seed
-        Overrides the study's seeds.
-    overwrite
-        Start afresh.
-    progress
-        Called with what is going on and the fraction done.
-    note
-        Called with the study once it was read.
-
-    Raises
-    ------
-    InputError
-        If the study, its data or the folder is wrong.
+    `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides the
+    study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and the
+    fraction done. `note`: called with the study once it was read. Raises InputError if the study,
+    its data or the folder is wrong.
     """
     study, folder, there = _begin("compare", path, out, seed, overwrite, note)
     if there is not None:
@@ -204,10 +186,7 @@ def fit_declared(model, dataset):
     learners can correct that: a wrong relaxation time is a term in ``sigma``, a wrong modulus one
     in ``gammadot``.
 
-    Raises
-    ------
-    InputError
-        If the declared law cannot be integrated through the runs.
+    Raises InputError if the declared law cannot be integrated through the runs.
     """
     if not model.free:
         return model

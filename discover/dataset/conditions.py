@@ -11,13 +11,9 @@ _TEMPERATURE = ("temperature_C", "temperature_C_measured")
 def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
     """Return material and temperature of some runs in words; empty where neither is told.
 
-    Parameters
-    ----------
-    runs
-        With the columns ``material``, ``sample`` or ``sample_label``, and ``temperature_C`` or
-        ``temperature_C_measured``, of runs.csv.
-    material
-        What a study calls the material, in place of the columns.
+    `runs`: with the columns ``material``, ``sample`` or ``sample_label``, and ``temperature_C`` or
+    ``temperature_C_measured``, of runs.csv. `material`: what a study calls the material, in place
+    of the columns.
     """
     runs = list(runs)
     names, temperatures = [], []

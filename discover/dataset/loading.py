@@ -15,12 +15,8 @@ class Loading:
     Filling, trimming and temperature differ by some per cent, as a factor on every stress that is
     recorded of one loading.
 
-    Attributes
-    ----------
-    deviation
-        Standard deviation of the factor.
-    noise
-        Relative noise of the record, where it is known.
+    `deviation`: standard deviation of the factor.
+    `noise`: relative noise of the record, where it is known.
     """
 
     deviation: float

@@ -49,17 +49,8 @@ def read_run(
 ) -> Run:
     """Return the run on one line of ``runs.csv``.
 
-    Parameters
-    ----------
-    root, index, row
-        The folder, its ``runs.csv``, and the line, counted from 0.
-    clock_factor, rate_is_measured, rate_window, rate_before
-        As in `discover.dataset.load.load_dataset`, for this run.
-
-    Raises
-    ------
-    InputError
-        If its file is missing or wrong.
+    `root`, `index`, `row`: the folder, its ``runs.csv``, and the line, counted from 0. Raises
+    InputError if its file is missing or wrong.
     """
     name = index.columns["file"][row]
     table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")

@@ -83,10 +83,7 @@ def wave_of(
 ) -> tuple[float, float] | None:
     """Return frequency (rad/s) and amplitude (1/s) of a rate in samples, if it alternates.
 
-    Parameters
-    ----------
-    time, rate
-        In s and 1/s.
+    `time`, `rate` in s and 1/s.
     """
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)

@@ -16,12 +16,8 @@ from tensor_library.law_terms import LawTerm
 class AugmentedLaw(AbstractExtendedLaw):
     """A law with the extra terms of constitutive effects.
 
-    Attributes
-    ----------
-    base
-        The declared law.
-    linear_relaxation
-        As in the declared law.
+    `base`: the declared law.
+    `linear_relaxation`: as in the declared law.
     """
 
     base: AbstractConstitutiveLaw
@@ -45,10 +41,7 @@ class AugmentedLaw(AbstractExtendedLaw):
 
         None if the declared law is no sum of library terms.
 
-        Raises
-        ------
-        InputError
-            If what an effect adds is none.
+        Raises InputError if what an effect adds is none.
         """
         below = self.base.as_terms()
         return None if below is None else below + self._added_terms()
@@ -56,10 +49,7 @@ class AugmentedLaw(AbstractExtendedLaw):
     def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
         """Return the declared law, and the terms of the effects.
 
-        Raises
-        ------
-        InputError
-            If what an effect adds is no sum of library terms.
+        Raises InputError if what an effect adds is no sum of library terms.
         """
         core, terms = self.base.split()
         return core, terms + self._added_terms()

@@ -18,14 +18,8 @@ def flow_numbers(
 
     Wi = λ̄ max|γ̇|. De = λ̄ω in oscillation and λ̄/T in a flow of length T that does not oscillate.
 
-    Parameters
-    ----------
-    times, shear_rate
-        In s and 1/s.
-    relaxation_time
-        λ̄ in s.
-    frequency
-        ω in rad/s where known; otherwise from the time between changes of sign of the rate.
+    `times`, `shear_rate` in s and 1/s. `relaxation_time`: λ̄ in s. `frequency`: ω in rad/s where
+    known; otherwise from the time between changes of sign of the rate.
     """
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:

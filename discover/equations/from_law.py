@@ -26,10 +26,7 @@ def law_terms(law: AbstractConstitutiveLaw) -> tuple[LawTerm, ...]:
 def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[LawTerm, ...]:
     """Return what a constitutive effect adds to h as a sum of terms.
 
-    Parameters
-    ----------
-    values
-        Its parameters in their order, shape (p,).
+    `values`: its parameters in their order, shape (p,).
     """
     terms = effect.as_terms([float(value) for value in values])
     if terms is None:

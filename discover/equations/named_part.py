@@ -13,17 +13,11 @@ from tensor_library.isotropic_function import IsotropicFunction
 class NamedPart:
     """A law by its name.
 
-    Attributes
-    ----------
-    law
-        Key of `discover.laws.LAWS`.
-    constants
-        Its parameters, dimensionless: once for all modes, or once for each.
+    `law`: key of `discover.laws.LAWS`.
+    `constants`: its parameters, dimensionless: once for all modes, or once for each.
 
-    Raises
-    ------
-    InputError
-        If there is no such law, or a parameter is missing, unknown or outside its range.
+    Raises InputError if there is no such law, or a parameter is missing, unknown or outside its
+    range.
 
     Examples
     --------
@@ -47,10 +41,7 @@ class NamedPart:
     def built(self) -> AbstractConstitutiveLaw:
         """Return the law, ready to simulate.
 
-        Raises
-        ------
-        InputError
-            If the constants differ from mode to mode.
+        Raises InputError if the constants differ from mode to mode.
         """
         if self.differing:
             raise InputError(
@@ -74,10 +65,7 @@ class NamedPart:
     def function(self) -> IsotropicFunction:
         """The law written out.
 
-        Raises
-        ------
-        InputError
-            If nobody said how it is written.
+        Raises InputError if nobody said how it is written.
         """
         written = LAWS[self.law].written
         if written is None:

@@ -22,10 +22,7 @@ def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[Law
 
     A law with constants of its own in each mode needs a name.
 
-    Raises
-    ------
-    InputError
-        If it is neither.
+    Raises InputError if it is neither.
     """
     if law.as_terms() is not None:
         return None, law_terms(law)

@@ -18,15 +18,8 @@ AUGMENTED = "augmented"
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     """Return the laws in a folder of results by name: those of the learners, or the augmented one.
 
-    Parameters
-    ----------
-    folder
-        What ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
-
-    Raises
-    ------
-    InputError
-        If there is no result, it is damaged, or its law cannot be written out.
+    `folder`: what ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
+    Raises InputError if there is no result, it is damaged, or its law cannot be written out.
     """
     path = Path(folder)
     if path.suffix == ".json":

@@ -14,18 +14,11 @@ class StatePart:
     The state is one for all modes. It multiplies their stress, or their relaxation times wherever
     these occur in their equations.
 
-    Attributes
-    ----------
-    effect
-        Name of the effect, one of `dc.effects()` with a state.
-    values
-        Its parameters by name, in their units.
+    `effect`: name of the effect, one of `dc.effects()` with a state.
+    `values`: its parameters by name, in their units.
 
-    Raises
-    ------
-    InputError
-        If there is no such effect, it has no state or nobody said how it is written, or a parameter
-        is missing, unknown or outside its range.
+    Raises InputError if there is no such effect, it has no state or nobody said how it is written,
+    or a parameter is missing, unknown or outside its range.
 
     Examples
     --------
@@ -73,12 +66,8 @@ class StatePart:
     ) -> tuple[list[str], str, str]:
         """Return the rates of change, and the factors on stress and times, as text.
 
-        Parameters
-        ----------
-        spelled
-            Writes an expression with given texts for its scalars.
-        letters
-            The texts of the parameters, the levels, ``shear_rate`` and ``shear_stress``.
+        `spelled`: writes an expression with given texts for its scalars. `letters`: the texts of
+        the parameters, the levels, ``shear_rate`` and ``shear_stress``.
         """
         import sympy
 

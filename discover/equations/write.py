@@ -33,19 +33,9 @@ def write_equation(
 ) -> str:
     """Return an equation as text.
 
-    Parameters
-    ----------
-    equation
-        The equation.
-    form
-        Key of `FORMATS`.
-    density_kg_m3, tolerance
-        For ``rheotool`` only; see `discover.equations.formats.rheotool.rheotool_text`.
-
-    Raises
-    ------
-    InputError
-        If there is no such format, an option does not belong to it, or it has not this law.
+    `equation`: the equation. `form`: key of `FORMATS`. `density_kg_m3`, `tolerance`: for
+    ``rheotool`` only; see `discover.equations.formats.rheotool.rheotool_text`. Raises InputError if
+    there is no such format, an option does not belong to it, or it has not this law.
     """
     if form not in FORMATS:
         raise InputError(unknown_name("format", form, FORMATS))

@@ -80,12 +80,8 @@ def knots_between(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return knots whose straight lines lie on the curve, and have its area in each interval.
 
-    Parameters
-    ----------
-    times, rates
-        The samples, shape (n,), at increasing times; of a test at a given stress, the stress.
-    another
-        Whether to take another curve through them: see `another_between_samples`.
+    `times`, `rates`: the samples, shape (n,), at increasing times; of a test at a given stress, the
+    stress. `another`: whether to take another curve through them: see `another_between_samples`.
     """
     stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
@@ -117,12 +113,7 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
     taken, monotonic where straight lines were   [Fritsch & Carlson 1980, SIAM J. Numer. Anal. 17,
     238]. None where the rate was commanded: constant, a wave, or steps.
 
-    Parameters
-    ----------
-    protocol
-        Any.
-    times
-        Of the samples, in s.
+    `protocol`: any. `times`: of the samples, in s.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -160,12 +151,8 @@ def samples_of(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return the samples of a rate that was read in samples: times in s and rates in 1/s.
 
-    Parameters
-    ----------
-    protocol
-        Whose table holds nothing from before the record.
-    times
-        Of the record; where that was thinned, what its rate was read in before.
+    `protocol`: whose table holds nothing from before the record. `times`: of the record; where that
+    was thinned, what its rate was read in before.
     """
     return _samples(np.asarray(protocol.table_times), np.asarray(protocol.table_rates), times)
 

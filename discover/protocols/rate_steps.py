@@ -21,16 +21,10 @@ _SMALLEST = 0.01
 class RateStep:
     """A step of the rate between two samples.
 
-    Attributes
-    ----------
-    start, end
-        Times of the two samples in s.
-    change
-        Of the rate in 1/s, from the one to the other.
-    share
-        Of the interval at whose end the rate steps, if that is not fitted.
-    place
-        Which of the fitted shares is its own; None if it is not fitted.
+    `start`, `end`: times of the two samples in s.
+    `change`: of the rate in 1/s, from the one to the other.
+    `share`: of the interval at whose end the rate steps, if that is not fitted.
+    `place`: which of the fitted shares is its own; None if it is not fitted.
     """
 
     start: float
@@ -53,12 +47,8 @@ def steps_between_samples(
     between the two samples stands for a step halfway, which errs by up to half the strain of the
     interval.
 
-    Parameters
-    ----------
-    protocol
-        Of the record. A rate that was given as a function of time has no such step.
-    time, rate
-        Of the samples in s and 1/s.
+    `protocol`: of the record. A rate that was given as a function of time has no such step. `time`,
+    `rate`: of the samples in s and 1/s.
     """
     if protocol.control != "rate" or np.any(np.asarray(protocol.amplitudes)) or len(time) < 4:
         return ()

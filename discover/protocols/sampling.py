@@ -15,14 +15,7 @@ def sampling_interval(
     a strain, a normal stress, an extension, the points of a table of states, cycles that a
     rheometer has averaged. Their noise need not be correlated as that of the others.
 
-    Parameters
-    ----------
-    time
-        Of the samples.
-    protocol
-        What was imposed.
-    quantity
-        What was recorded.
+    `time`: of the samples. `protocol`: what was imposed. `quantity`: what was recorded.
     """
     plain = protocol.control == "rate" and float(protocol.begins) == 0.0
     if not plain or {quantity, protocol.quantity} != {"sigma12"} or len(time) < 2:

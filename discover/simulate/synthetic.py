@@ -24,14 +24,9 @@ from discover.statistics.projection import rms
 class SyntheticDataset(Dataset):
     """A data set whose law is known.
 
-    Attributes
-    ----------
-    truth
-        The fluid that made it.
-    exact
-        Noise-free stresses of each run, normal stresses included.
-    noise
-        Standard deviation of the noise over the root-mean-square stress of each run.
+    `truth`: the fluid that made it.
+    `exact`: noise-free stresses of each run, normal stresses included.
+    `noise`: standard deviation of the noise over the root-mean-square stress of each run.
     """
 
     truth: Fluid | None = None

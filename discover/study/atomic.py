@@ -20,19 +20,10 @@ def write_text(path: str | Path, text: str) -> Path:
     The text goes to a temporary file in the same folder, which then takes the name. A file that it
     replaces hands on who may read it; for a new one the user's umask decides.
 
-    Parameters
-    ----------
-    path
-        The file; its folder must exist.
-    text
-        The content, written as UTF-8; what UTF-8 cannot hold as ``\udcff``.
-
-    Raises
-    ------
-    InputError
-        If something that is no plain file has the name, or a file that this command has read.
-    OSError
-        If the disk is full, say; names the file. What the file held before is still there.
+    `path`: the file; its folder must exist. `text`: the content, written as UTF-8; what UTF-8
+    cannot hold as ``\udcff``. Raises InputError if something that is no plain file has the name, or
+    a file that this command has read. Raises OSError if the disk is full, say; names the file. What
+    the file held before is still there.
     """
     path = Path(path)
     before = replaceable(path)
@@ -69,10 +60,7 @@ def remove_file(path: str | Path) -> None:
 def replaceable(path: Path) -> os.stat_result | None:
     """Return what the system says of a file that may be replaced; None if there is none.
 
-    Raises
-    ------
-    InputError
-        If what has the name is no plain file, or a file that this command has read.
+    Raises InputError if what has the name is no plain file, or a file that this command has read.
     """
     try:
         found = os.lstat(path)
@@ -95,17 +83,8 @@ def replaceable(path: Path) -> os.stat_result | None:
 def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
     """Refuse a folder that holds files of these names, where nothing shows that they are ours.
 
-    Parameters
-    ----------
-    names
-        Of results that are about to be written there.
-    mark
-        Name of what is always written first, and shows that the rest is ours.
-
-    Raises
-    ------
-    InputError
-        If one of them would be written over.
+    `names`: of results that are about to be written there. `mark`: name of what is always written
+    first, and shows that the rest is ours. Raises InputError if one of them would be written over.
     """
     if os.path.lexists(folder / mark):
         return

@@ -20,12 +20,8 @@ from discover.words import unknown_name
 class StudyData:
     """The data of a study, split.
 
-    Attributes
-    ----------
-    fit, held_out
-        Runs that fits may see, and runs that only judge.
-    each
-        Whether every fitted run is also to be held out in turn.
+    `fit`, `held_out`: runs that fits may see, and runs that only judge.
+    `each`: whether every fitted run is also to be held out in turn.
     """
 
     dataset: Dataset
@@ -42,16 +38,8 @@ class StudyData:
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     """Return the data of a study, split into runs to fit and runs held out.
 
-    Parameters
-    ----------
-    seed
-        Overrides the seed of synthetic noise.
-
-    Raises
-    ------
-    InputError
-        If a file is wrong, a named run does not exist, a run held out is a copy of one to fit, or
-        those to fit hold no signal.
+    `seed`: overrides the seed of synthetic noise. Raises InputError if a file is wrong, a named run
+    does not exist, a run held out is a copy of one to fit, or those to fit hold no signal.
     """
     data = study.data
     if data.synthetic is not None:

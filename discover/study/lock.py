@@ -43,10 +43,7 @@ class FolderLock:
 def lock_folder(folder: str | Path) -> FolderLock:
     """Lock a folder for this process; returns the same lock if this process holds it already.
 
-    Raises
-    ------
-    InputError
-        If another process works in the folder; the message names it.
+    Raises InputError if another process works in the folder; the message names it.
     """
     path = Path(folder).resolve() / LOCK_FILE
     held = _held.get(str(path))

@@ -28,20 +28,9 @@ class RunFolder:
     where it was. A part carries the fingerprint and a hash: one that was damaged, edited or left by
     another study is computed again. While the object lives, no other process can open the folder.
 
-    Parameters
-    ----------
-    path
-        The folder; made if it does not exist.
-    fingerprint
-        From `discover.study.fingerprint`.
-    overwrite
-        Forget what is there.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another study's results and `overwrite` is not set, cannot be written
-        to, or is in use by another process.
+    `path`: the folder; made if it does not exist. `fingerprint`: from `discover.study.fingerprint`.
+    `overwrite`: forget what is there. Raises InputError if the folder holds another study's results
+    and `overwrite` is not set, cannot be written to, or is in use by another process.
     """
 
     def __init__(self, path: str | Path, fingerprint: str, overwrite: bool = False):

@@ -32,10 +32,7 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
     that ratio at most, which is the same strain. Shear thickening and yielding break these rules by
     less than another unit of stress or of time does. Another unit of rate may pass for thinning.
 
-    Parameters
-    ----------
-    runs
-        Those that load; less than two start-ups say nothing.
+    `runs`: those that load; less than two start-ups say nothing.
     """
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
         alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
@@ -45,10 +42,8 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
     """Yield that runs at several temperatures are taken for those of one fluid, if they are.
 
-    Parameters
-    ----------
-    runs
-        Those whose times nobody has shifted to one temperature, with ``temperature_C`` of runs.csv.
+    `runs`: those whose times nobody has shifted to one temperature, with ``temperature_C`` of
+    runs.csv.
     """
     told = {run.name: run.metadata.get("temperature_C") for run in runs}
     known = {name: float(t) for name, t in told.items() if isinstance(t, int | float)}

@@ -42,12 +42,8 @@ def doubts_of_normal_stress(
 ) -> Iterator[Finding]:
     """Yield why the N1 of a start-up of shear cannot be right.
 
-    Parameters
-    ----------
-    run
-        Any run; nothing is said of one that is no start-up of shear with its N1.
-    sweep, spectrum
-        The linear sweep and its modes, without which a run is held against itself alone.
+    `run`: any run; nothing is said of one that is no start-up of shear with its N1. `sweep`,
+    `spectrum`: the linear sweep and its modes, without which a run is held against itself alone.
     """
     normal = run.first_normal_stress_difference
     if normal is None:
@@ -60,12 +56,8 @@ def doubts_of_normal_stress(
 class _Fault:
     """Why an N1 cannot be right.
 
-    Attributes
-    ----------
-    why
-        The rest of a sentence that begins with the record, and what to do.
-    until
-        Time in s from which on the record may be right; infinite if that is never.
+    `why`: the rest of a sentence that begins with the record, and what to do.
+    `until`: time in s from which on the record may be right; infinite if that is never.
     """
 
     why: str
@@ -77,16 +69,8 @@ def sound_normal_stress(
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return from when on the N1 of runs may be right, and why of those of which it never is.
 
-    Parameters
-    ----------
-    runs
-        Any; those without N1, or of which nothing can be said, are in neither.
-    sweep
-        The linear sweep, if there is one.
-
-    Returns
-    -------
     Times in s by name of the run, the samples up to which cannot be right; and reasons by name.
+    Runs without N1, or of which nothing can be said, are in neither.
     """
     there = [(run, n1) for run in runs if (n1 := run.first_normal_stress_difference) is not None]
     spectrum = _spectrum(sweep) if there and sweep is not None else None

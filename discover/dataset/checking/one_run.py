@@ -129,12 +129,7 @@ def stress_noise(run: Run) -> float:
 def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
     """Return the standard deviation of the noise around each sample of a record, shape (n,).
 
-    Parameters
-    ----------
-    time
-        In s, increasing.
-    values
-        In any unit, which is that of the noise.
+    `time` in s, increasing. `values` in any unit, which is that of the noise.
     """
     off = np.abs(_bends(time, values))
     if not len(off):

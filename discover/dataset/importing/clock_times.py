@@ -30,12 +30,8 @@ def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
     Durations are as they stand. Clocks of the day and time stamps count from the first, since they
     are later than the whole record is long; past midnight they go on.
 
-    Parameters
-    ----------
-    cells
-        As `is_clock` knows them.
-    unit
-        As the export writes it; ``hh:mm`` says that the first of two numbers is hours.
+    `cells`: as `is_clock` knows them. `unit`: as the export writes it; ``hh:mm`` says that the
+    first of two numbers is hours.
     """
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it

@@ -26,16 +26,10 @@ from discover.errors import InputError
 class ImportedFolder:
     """A data folder, not yet written.
 
-    Attributes
-    ----------
-    files
-        Text of every file by name.
-    mapping
-        Everything that was used, guesses included, so that the import can be repeated.
-    said
-        What was understood and done, a line each.
-    unread
-        Files and tables that could not be read, and why, a line each.
+    `files`: text of every file by name.
+    `mapping`: everything that was used, guesses included, so that the import can be repeated.
+    `said`: what was understood and done, a line each.
+    `unread`: files and tables that could not be read, and why, a line each.
     """
 
     files: dict[str, str] = field(default_factory=dict)
@@ -94,17 +88,9 @@ def import_files(
     are dropped, and counted in `said`. A file that cannot be understood does not keep the others
     from being read; it is named in `unread`.
 
-    Parameters
-    ----------
-    mapping
-        What is known about them; what it leaves open is found from names, units and numbers.
-    sweep
-        File of which the first frequency sweep becomes ``lve.csv``, if any.
-
-    Raises
-    ------
-    InputError
-        If no file can be understood; says which columns it has.
+    `mapping`: what is known about them; what it leaves open is found from names, units and numbers.
+    `sweep`: file of which the first frequency sweep becomes ``lve.csv``, if any. Raises InputError
+    if no file can be understood; says which columns it has.
     """
     state = _Import(mapping)
     sources = []

@@ -16,10 +16,7 @@ from discover.errors import InputError
 def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     """Return the tables of a file with their numbers, from 1; those that the user chose.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, holds no table, or none of those chosen.
+    Raises InputError if it cannot be read, holds no table, or none of those chosen.
     """
     layout = mapping.layout
     found = blocks_of_importer(path, layout.format)

@@ -36,14 +36,9 @@ _CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "st
 class NamedRecord:
     """A test and where it comes from.
 
-    Attributes
-    ----------
-    name
-        Of its file, if it is a run, without ending.
-    source, block
-        Name of the file, and what that calls the block.
-    chosen
-        Whether the user chose it as the table of its kind.
+    `name`: of its file, if it is a run, without ending.
+    `source`, `block`: name of the file, and what that calls the block.
+    `chosen`: whether the user chose it as the table of its kind.
     """
 
     name: str

@@ -26,14 +26,9 @@ _TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 class Constant:
     """A number that holds for a whole block.
 
-    Attributes
-    ----------
-    name
-        As the file writes it.
-    value
-        With a decimal point; empty where the line gives a unit alone, as "Rate Unit: 1/s".
-    unit
-        Empty where the file gives none.
+    `name`: as the file writes it.
+    `value`: with a decimal point; empty where the line gives a unit alone, as "Rate Unit: 1/s".
+    `unit`: empty where the file gives none.
     """
 
     name: str

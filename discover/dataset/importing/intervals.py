@@ -46,14 +46,8 @@ def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) ->
     Words say that they are, or three rates of which the last is the first again, or rates that go
     up and then down with stresses that differ.
 
-    Parameters
-    ----------
-    blocks
-        Each with its number.
-    mapping
-        What the user says of them; a block that the user names a test for is left as it is.
-    file
-        Name of the file.
+    `blocks`: each with its number. `mapping`: what the user says of them; a block that the user
+    names a test for is left as it is. `file`: name of the file.
     """
     left, found = list(blocks), []
     while left:

@@ -46,12 +46,7 @@ def left_out(where: str, block: Block, reason: str) -> str:
 def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequence[str]) -> str:
     """Say which table is nearest to a test, what it lacks, and what to do.
 
-    Parameters
-    ----------
-    tables
-        Number and content of each.
-    reasons
-        Why some of them were left out, in words.
+    `tables`: number and content of each. `reasons`: why some of them were left out, in words.
     """
     if reasons:
         more = f" and {len(reasons) - 6} more" if len(reasons) > 6 else ""

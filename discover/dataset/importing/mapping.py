@@ -202,10 +202,7 @@ def key_of(file: str) -> str:
 def make_mapping(content: dict, where: str) -> Mapping:
     """Return a mapping from nested dictionaries.
 
-    Raises
-    ------
-    InputError
-        If a key is unknown or a value is wrong; names it.
+    Raises InputError if a key is unknown or a value is wrong; names it.
     """
     return validated(Mapping, content, where)
 
@@ -213,10 +210,7 @@ def make_mapping(content: dict, where: str) -> Mapping:
 def read_mapping(path: Path) -> Mapping:
     """Return the mapping in a TOML file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read or is wrong.
+    Raises InputError if it cannot be read or is wrong.
     """
     content, _ = read_toml(path, "mapping file", f"Write it like the {MAPPING_FILE} of an import.")
     return make_mapping(content, path.name)

@@ -39,10 +39,7 @@ def alternates(values: Values) -> bool:
 def frequency_of(time: Values, values: Values) -> float:
     """Return the angular frequency in rad/s at which a sine with an offset fits best.
 
-    Parameters
-    ----------
-    time
-        In s, increasing.
+    `time` in s, increasing.
     """
     span = float(time[-1] - time[0])
     centred = values - np.mean(values)
@@ -89,12 +86,8 @@ def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
 
     Its first cycle repeats in the next, or its first sample is far from rest.
 
-    Parameters
-    ----------
-    time
-        In s.
-    imposed, answer
-        What was imposed, and what the fluid answered: strain and stress, or stress and strain.
+    `time` in s. `imposed`, `answer`: what was imposed, and what the fluid answered: strain and
+    stress, or stress and strain.
     """
     period = 2.0 * np.pi / frequency_of(time, imposed)
     size = float(np.max(np.abs(answer)))

@@ -62,17 +62,8 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
 
     Columns without a single number are passed over; a clock is a time only if no number is.
 
-    Parameters
-    ----------
-    given
-        Names of columns that the user gave; they win over guesses.
-    table
-        What quantities are called.
-
-    Raises
-    ------
-    InputError
-        If a name that was given stands above two columns.
+    `given`: names of columns that the user gave; they win over guesses. `table`: what quantities
+    are called. Raises InputError if a name that was given stands above two columns.
     """
     count = range(len(block.columns))
     numbers = [any(is_number(row[i]) for row in block.cells) for i in count]
@@ -142,12 +133,8 @@ def _is_unit_of(key: str, unit: str) -> bool:
 def fits(key: str, name: str, unit: str) -> bool:
     """Return whether a short name, which may mean several things, has a unit of the quantity.
 
-    Parameters
-    ----------
-    key
-        From `QUANTITIES`.
-    name, unit
-        Of the column; a longer name fits whatever its unit is, so that a wrong one is said.
+    `key`: from `QUANTITIES`. `name`, `unit`: of the column; a longer name fits whatever its unit
+    is, so that a wrong one is said.
     """
     if name.strip() == "T" and not unit:
         return key == "temperature"
@@ -186,19 +173,9 @@ def to_celsius(value: float, unit: str) -> float | None:
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     """Return the factor from a column's unit to SI.
 
-    Parameters
-    ----------
-    key
-        What they are, from `QUANTITIES`.
-    unit
-        Their unit as the export or the user writes it.
-    column, name
-        Column and file, for messages.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown or a unit of something else.
+    `key`: what they are, from `QUANTITIES`. `unit`: their unit as the export or the user writes it.
+    `column`, `name`: column and file, for messages. Raises InputError if the unit is unknown or a
+    unit of something else.
     """
     quantity = QUANTITIES[key]
     if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):

@@ -30,14 +30,9 @@ Rows = Bool[np.ndarray, " n"]
 class Recognised:
     """What some rows of a block are taken for.
 
-    Attributes
-    ----------
-    kind
-        The test.
-    rows
-        Which rows of the block it has.
-    why
-        What in the block says so.
+    `kind`: the test.
+    `rows`: which rows of the block it has.
+    `why`: what in the block says so.
     """
 
     kind: TestName
@@ -48,10 +43,7 @@ class Recognised:
 def recognise(readings: Readings) -> list[Recognised]:
     """Return which tests a block holds; the tests of one table are apart already.
 
-    Raises
-    ------
-    InputError
-        If a unit is missing or wrong.
+    Raises InputError if a unit is missing or wrong.
     """
     said = said_of(readings.block, readings.name)
     _find_time(readings)

@@ -17,13 +17,9 @@ from tensor_library.registry import Registry
 class Importer:
     """A reader of one kind of file.
 
-    Attributes
-    ----------
-    read
-        Takes the path of a file and returns its blocks of columns; names and units are understood,
-        and units converted, as those of a text export are.
-    suffixes
-        Endings of the names of such files, such as ``.npz``; these need no ``--format``.
+    `read`: takes the path of a file and returns its blocks of columns; names and units are
+        understood, and units converted, as those of a text export are.
+    `suffixes`: endings of the names of such files, such as ``.npz``; these need no ``--format``.
     """
 
     read: Callable[[Path], Sequence[Block]]
@@ -84,15 +80,8 @@ def register_importer(
 def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
     """Return the blocks of a file that an importer reads; None if it is to be read as text.
 
-    Parameters
-    ----------
-    form
-        Name of the importer; by the suffix of the file if None.
-
-    Raises
-    ------
-    InputError
-        If there is no such importer, or it cannot read the file.
+    `form`: name of the importer; by the suffix of the file if None. Raises InputError if there is
+    no such importer, or it cannot read the file.
     """
     if form == TEXT:
         return None

@@ -39,10 +39,8 @@ _TEMPERATURE = ("temperature", "°C")
 def read_reptate(path: Path) -> list[Block]:
     """Return the one block of a file of RepTate.
 
-    Raises
-    ------
-    InputError
-        If it has too few columns of numbers, or lacks a parameter that such a file needs.
+    Raises InputError if it has too few columns of numbers, or lacks a parameter that such a file
+    needs.
     """
     suffix = path.suffix.lower()
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT)

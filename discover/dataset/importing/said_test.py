@@ -56,14 +56,9 @@ _LONGEST = 8
 class Said:
     """What words say of a test.
 
-    Attributes
-    ----------
-    test
-        Which it is.
-    words
-        Those that say it, as the file has them.
-    by_file_name
-        Whether only the name of the file says so, which the numbers overrule.
+    `test`: which it is.
+    `words`: those that say it, as the file has them.
+    `by_file_name`: whether only the name of the file says so, which the numbers overrule.
     """
 
     test: SaidTest

@@ -22,10 +22,8 @@ _LONGEST_CELL = 1000  # characters
 def read_spreadsheet(path: Path) -> list[Block]:
     """Return the blocks of numbers in all sheets of a spreadsheet; a sheet names what has no name.
 
-    Raises
-    ------
-    InputError
-        If it is no spreadsheet, is larger than a measurement, or holds no numbers under names.
+    Raises InputError if it is no spreadsheet, is larger than a measurement, or holds no numbers
+    under names.
     """
     from openpyxl import load_workbook
 

@@ -46,10 +46,7 @@ class _Piece:
 def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
     """Return the tests that stand one below the other, or row by row in turn.
 
-    Parameters
-    ----------
-    mapping, name
-        What the user says of the file, and its name.
+    `mapping`, `name`: what the user says of the file, and its name.
     """
     readings = Readings.of(block, mapping, name)
     pieces = [_Piece(np.arange(len(readings)), block.apart)]

@@ -140,12 +140,8 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     Lines that begin with a word are a block of their own for each word, such as the name of an
     action or the number of a segment.
 
-    Parameters
-    ----------
-    rows
-        The cells of each line, numbers with decimal points.
-    header_row
-        Line of the names, if the line above the numbers is not it; then only the block below.
+    `rows`: the cells of each line, numbers with decimal points. `header_row`: line of the names, if
+    the line above the numbers is not it; then only the block below.
     """
     blocks: list[Block] = []
     header: _Columns | None = None

@@ -44,19 +44,9 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    Parameters
-    ----------
-    delimiter
-        Name from `DELIMITERS`; found from the file if None.
-    decimal
-        Decimal sign; found from the file if None.
-    encoding
-        Of the text; found from the file if None.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or its decimal sign cannot be told from its thousands separator.
+    `delimiter`: name from `DELIMITERS`; found from the file if None. `decimal`: decimal sign; found
+    from the file if None. `encoding`: of the text; found from the file if None. Raises InputError
+    if the file cannot be read, or its decimal sign cannot be told from its thousands separator.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()
@@ -87,19 +77,9 @@ def with_points(
 ) -> list[list[str]]:
     """Return rows of cells without spaces around them, numbers with decimal points.
 
-    Parameters
-    ----------
-    rows
-        The cells of each line.
-    name
-        Of the file, for messages.
-    decimal
-        Decimal sign; found from the cells if None.
-
-    Raises
-    ------
-    InputError
-        If the decimal sign cannot be told from the thousands separator.
+    `rows`: the cells of each line. `name`: of the file, for messages. `decimal`: decimal sign;
+    found from the cells if None. Raises InputError if the decimal sign cannot be told from the
+    thousands separator.
     """
     rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
     sign = decimal or _decimal(rows, name)

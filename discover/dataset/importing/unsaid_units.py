@@ -45,12 +45,8 @@ _SHARE = 0.05
 class UnsaidUnit:
     """A unit in which a column is read although the file does not give it.
 
-    Attributes
-    ----------
-    how
-        Told by the numbers, assumed, or to be asked for: until then `unit` stands in for it.
-    why
-        What tells it.
+    `how`: told by the numbers, assumed, or to be asked for: until then `unit` stands in for it.
+    `why`: what tells it.
     """
 
     column: str
@@ -62,16 +58,9 @@ class UnsaidUnit:
 def unsaid_unit(key: str, column: str, raw: Values, get: Get, table: NameTable) -> UnsaidUnit:
     """Return the unit of a column without one.
 
-    Parameters
-    ----------
-    key
-        What it holds, from `QUANTITIES`.
-    raw
-        Its numbers.
-    get
-        Gives other columns of the block in SI units, None where it has no such column.
-    table
-        What quantities are called: an angular frequency is one in rad/s, a frequency may count.
+    `key`: what it holds, from `QUANTITIES`. `raw`: its numbers. `get`: gives other columns of the
+    block in SI units, None where it has no such column. `table`: what quantities are called: an
+    angular frequency is one in rad/s, a frequency may count.
     """
     choices = _CHOICES.get(key)
     if key == "omega" and "frequency" not in table.find(column):

@@ -20,20 +20,13 @@ _FEWEST = 4
 class Agreement:
     """How well the modes of one linear test predict another.
 
-    Attributes
-    ----------
-    source
-        The test that the modes come from: ``lve``, ``relaxation`` or ``creep``.
-    test
-        The one predicted.
-    celsius
-        Temperature of both.
-    error
-        Root-mean-square relative error of the prediction over the times that the source reaches.
-    bias
-        Mean relative error over them: a gain of one of the two shows here.
-    times
-        First and last of those times in s, 1/ω for a sweep.
+    `source`: the test that the modes come from: ``lve``, ``relaxation`` or ``creep``.
+    `test`: the one predicted.
+    `celsius`: temperature of both.
+    `error`: root-mean-square relative error of the prediction over the times that the source
+        reaches.
+    `bias`: mean relative error over them: a gain of one of the two shows here.
+    `times`: first and last of those times in s, 1/ω for a sweep.
     """
 
     source: str
@@ -60,10 +53,7 @@ def linear_agreements(tests: Tests) -> list[Agreement]:
     Times that both reach are compared, 1/ω of a frequency: the modes of a test say nothing of
     others.
 
-    Parameters
-    ----------
-    tests
-        By kind and temperature in °C, as measured or as moved to one.
+    `tests`: by kind and temperature in °C, as measured or as moved to one.
     """
     spectra = {}
     found = []

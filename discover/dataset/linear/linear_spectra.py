@@ -43,16 +43,7 @@ def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
 def _fewest_modes(
     fit: Callable[[int, float], tuple[np.ndarray, np.ndarray, float]], most: int
 ) -> RelaxationSpectrum:
-    """Return the spectrum with the fewest modes of those that fit nearly as well as any.
-
-    Parameters
-    ----------
-    fit
-        Moduli in Pa, relaxation times in s and relative error, of a number of modes and of how far
-        their times go beyond the data, in decades.
-    most
-        Largest number of modes.
-    """
+    """Return the spectrum with the fewest modes of those that fit nearly as well as any."""
     trials = [fit(n, margin) for n in range(1, most + 1) for margin in _MARGINS[: 2 * n]]
     best = min(error for _, _, error in trials)
     errors: dict[int, float] = {}
@@ -66,14 +57,8 @@ def _fewest_modes(
 def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.ndarray:
     """Return what a spectrum says of a kind of test, shape as the values of one.
 
-    Parameters
-    ----------
-    spectrum
-        The modes.
-    kind
-        ``lve``, ``relaxation`` or ``creep``.
-    argument
-        Frequencies in rad/s or times in s.
+    `spectrum`: the modes. `kind`: ``lve``, ``relaxation`` or ``creep``. `argument`: frequencies in
+    rad/s or times in s.
     """
     if kind == SWEEP:
         return np.stack(spectrum.moduli(argument))
@@ -112,14 +97,8 @@ def modes_of_retardation(
     and 1/η the matrix is symmetric, and its modes are those of relaxation   [Ferry 1980,
     Viscoelastic Properties of Polymers, ch. 3; the inverse of `creep_compliance`].
 
-    Parameters
-    ----------
-    instant
-        J_g in 1/Pa, positive.
-    fluidity
-        1/η in 1/(Pa s).
-    compliance, retardation_time
-        J_k in 1/Pa and τ_k in s.
+    `instant`: J_g in 1/Pa, positive. `fluidity`: 1/η in 1/(Pa s). `compliance`, `retardation_time`:
+    J_k in 1/Pa and τ_k in s.
     """
     there = compliance > 0.0
     rates = 1.0 / retardation_time[there]

@@ -13,16 +13,10 @@ from discover.errors import InputError
 class MovedTests:
     """What a folder of linear tests at several temperatures becomes.
 
-    Attributes
-    ----------
-    found
-        Tests and shifts.
-    own
-        What tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
-    agreements
-        How well tests predict one another at each temperature.
-    files
-        Moved tests as one, by name of the file; None where they do not become one.
+    `found`: tests and shifts.
+    `own`: what tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
+    `agreements`: how well tests predict one another at each temperature.
+    `files`: moved tests as one, by name of the file; None where they do not become one.
     """
 
     found: Superposition
@@ -39,21 +33,10 @@ def move_tests(
 ) -> MovedTests:
     """Return tests moved to one temperature, with what can be said of them.
 
-    Parameters
-    ----------
-    tests
-        By kind and temperature in °C.
-    reference
-        One of the temperatures; the middle one if None.
-    vertical
-        Whether moduli and compliances too may be moved.
-    between
-        Only temperatures from one to the other.
-
-    Raises
-    ------
-    InputError
-        If too few temperatures are left, or neighbours share too few values.
+    `tests`: by kind and temperature in °C. `reference`: one of the temperatures; the middle one if
+    None. `vertical`: whether moduli and compliances too may be moved. `between`: only temperatures
+    from one to the other. Raises InputError if too few temperatures are left, or neighbours share
+    too few values.
     """
     if between is not None:
         low, high = min(between), max(between)

@@ -15,16 +15,10 @@ from discover.statistics.projection import rms
 class ShiftLaw:
     """Shift factors as a function of temperature.
 
-    Attributes
-    ----------
-    name
-        ``WLF`` or ``Arrhenius``.
-    values
-        C1 and C2 in K, or the activation energy in J/mol, by name.
-    intervals
-        95 % interval of each; None where these shifts do not determine it.
-    error
-        Root-mean-square misfit of log10 a_T.
+    `name`: ``WLF`` or ``Arrhenius``.
+    `values`: C1 and C2 in K, or the activation energy in J/mol, by name.
+    `intervals`: 95 % interval of each; None where these shifts do not determine it.
+    `error`: root-mean-square misfit of log10 a_T.
     """
 
     name: str
@@ -44,14 +38,7 @@ def fit_shift_laws(
 ) -> tuple[ShiftLaw, ...]:
     """Return WLF and Arrhenius, fitted; fewer where there are too few temperatures.
 
-    Parameters
-    ----------
-    celsius
-        In °C.
-    log_shift
-        log10 a_T.
-    at
-        Which of them is the reference.
+    `celsius` in °C. `log_shift`: log10 a_T. `at`: which of them is the reference.
     """
     fitted = (_fit_law(name, celsius, log_shift, at) for name in _LAWS)
     return tuple(law for law in fitted if law is not None)

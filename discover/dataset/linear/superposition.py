@@ -32,24 +32,14 @@ _TWO_SIDED = float(norm.ppf(0.975))
 class Superposition:
     """Tests at several temperatures, moved to one.
 
-    Attributes
-    ----------
-    reference
-        In °C.
-    celsius
-        Temperatures, increasing, shape (n,).
-    tests
-        As measured, by kind and temperature.
-    leading
-        The kinds that the shifts were found from.
-    log_shift, log_vertical
-        log10 of a_T and b_T, shape (n,).
-    error
-        Standard errors of both, shape (n, 2).
-    laws
-        WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
-    apart
-        Temperatures in °C whose tests share no kind with the others', and are not moved.
+    `reference` in °C.
+    `celsius`: temperatures, increasing, shape (n,).
+    `tests`: as measured, by kind and temperature.
+    `leading`: the kinds that the shifts were found from.
+    `log_shift`, `log_vertical`: log10 of a_T and b_T, shape (n,).
+    `error`: standard errors of both, shape (n, 2).
+    `laws`: WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
+    `apart`: temperatures in °C whose tests share no kind with the others', and are not moved.
     """
 
     reference: float
@@ -131,19 +121,9 @@ def superpose(
 ) -> Superposition:
     """Return tests at several temperatures moved to one of them.
 
-    Parameters
-    ----------
-    tests
-        By kind and by temperature in °C; or sweeps by temperature.
-    reference
-        One of them; the middle one if None.
-    vertical
-        Whether moduli and compliances too may be moved.
-
-    Raises
-    ------
-    InputError
-        If the reference is none of the temperatures, or neighbours share too few values.
+    `tests`: by kind and by temperature in °C; or sweeps by temperature. `reference`: one of them;
+    the middle one if None. `vertical`: whether moduli and compliances too may be moved. Raises
+    InputError if the reference is none of the temperatures, or neighbours share too few values.
     """
     known = _by_kind(tests)
     several = {kind: at for kind, at in known.items() if len(at) > 1}

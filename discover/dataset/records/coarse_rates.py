@@ -33,17 +33,12 @@ the stress follows the rate less than in proportion."""
 class CoarseRates:
     """What another curve through the samples of rates would change.
 
-    Attributes
-    ----------
-    change
-        In the predicted stress: root mean square over that of the record, mean over fitted runs,
-        after the fitted constants have taken up what they can.
-    left
-        What the law leaves of the runs, likewise.
-    shifts
-        Of each fitted constant, over the half-width of its 95 % interval without it.
-    runs
-        The runs it is largest in, each with its samples a cycle; None where it does not alternate.
+    `change` in the predicted stress: root mean square over that of the record, mean over fitted
+        runs, after the fitted constants have taken up what they can.
+    `left`: what the law leaves of the runs, likewise.
+    `shifts`: of each fitted constant, over the half-width of its 95 % interval without it.
+    `runs`: the runs it is largest in, each with its samples a cycle; None where it does not
+        alternate.
     """
 
     change: float
@@ -112,10 +107,7 @@ def coarse_in(found: Mapping[str, Any] | None) -> CoarseRates | None:
 def samples_a_cycle(time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]) -> float | None:
     """Return how many samples a cycle has; None where the rate does not alternate.
 
-    Parameters
-    ----------
-    time, rate
-        In s and 1/s.
+    `time`, `rate` in s and 1/s.
     """
     wave = wave_of(time, rate) if len(time) > 3 else None
     if wave is None:

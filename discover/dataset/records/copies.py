@@ -19,10 +19,7 @@ written with other digits by far less."""
 def is_copy(one: Run, other: Run) -> bool:
     """Return whether two runs are one record, but for its name, its digits and samples left out.
 
-    Parameters
-    ----------
-    one, other
-        Runs, whatever is told of their rates.
+    `one`, `other`: runs, whatever is told of their rates.
     """
     if one.quantity != other.quantity or one.flow != other.flow:
         return False
@@ -49,10 +46,7 @@ def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
     Among fitted runs a copy makes intervals a little too narrow, of which a check of the folder
     warns.
 
-    Raises
-    ------
-    InputError
-        That names both.
+    Raises InputError that names both.
     """
     for run in held_out:
         copied = next((other.name for other in fitted if is_copy(run, other)), None)

@@ -11,17 +11,9 @@ from discover.errors import InputError
 def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
     """Return runs each of which is a loading of its own; as they are where nothing is said of it.
 
-    Parameters
-    ----------
-    deviation
-        Relative standard deviation by which loadings differ.
-    noise
-        Relative noise, where it is known.
-
-    Raises
-    ------
-    InputError
-        If they cannot differ so, or a stress was imposed, which a factor changes otherwise.
+    `deviation`: relative standard deviation by which loadings differ. `noise`: relative noise,
+    where it is known. Raises InputError if they cannot differ so, or a stress was imposed, which a
+    factor changes otherwise.
     """
     if deviation is None:
         return list(runs)

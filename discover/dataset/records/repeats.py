@@ -30,13 +30,9 @@ _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_se
 class Repeats:
     """Runs that repeat one another, and by how much they differ.
 
-    Attributes
-    ----------
-    groups
-        Names of the runs of each test that was repeated, of those whose difference counts.
-    error
-        Relative error of one run: root-mean-square of the difference of two, over √2 and over that
-        of the record; of several tests the root-mean-square.
+    `groups`: names of the runs of each test that was repeated, of those whose difference counts.
+    `error`: relative error of one run: root-mean-square of the difference of two, over √2 and over
+        that of the record; of several tests the root-mean-square.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -48,11 +44,6 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
 
     Of runs of one test (`repeated_tests`) those tell their error that cover half of each other, and
     differ by no more than loadings do.
-
-    Parameters
-    ----------
-    runs
-        As in `repeated_tests`.
     """
     named = {run.name: run for run in runs}
     groups, squares = [], []
@@ -74,10 +65,7 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
     their conditions. The rates have to agree over all of the longer run, where the shorter would go
     on as it was told, or over the time that both cover if that is half of it.
 
-    Parameters
-    ----------
-    runs
-        Runs; those of steady or periodic states and those at a given stress are passed over.
+    `runs`: runs; those of steady or periodic states and those at a given stress are passed over.
     """
     timed = [
         run
@@ -99,10 +87,7 @@ def count_flows(runs: Sequence[Run]) -> int:
 
     A test that was repeated is one flow. Each steady or periodic state of a table is one.
 
-    Parameters
-    ----------
-    runs
-        Runs; one that is there several times, with other quantities, counts once.
+    `runs`: runs; one that is there several times, with other quantities, counts once.
     """
     named = [*{run.name: run for run in runs}.values()]
     again = sum(len(group) - 1 for group in repeated_tests(named))

@@ -22,10 +22,8 @@ def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple
 
     Only strains are added up: what a held-out run did to the sample is known without its stress.
 
-    Parameters
-    ----------
-    order
-        Start times, or any numbers in the order of the runs; runs of equal number are parallel.
+    `order`: start times, or any numbers in the order of the runs; runs of equal number are
+    parallel.
     """
     totals = np.array([total_strain(run) for run in runs])
     return tuple(

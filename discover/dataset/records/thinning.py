@@ -37,14 +37,7 @@ def thin(
     cycle; and the largest and smallest stress and rate. Values are the recorded ones, and all but
     those four are chosen by their time alone, so that noise keeps its size and distribution.
 
-    Parameters
-    ----------
-    time
-        Sampling times in s, increasing.
-    shear_rate
-        In 1/s.
-    shear_stress
-        In Pa.
+    `time`: sampling times in s, increasing. `shear_rate` in 1/s. `shear_stress` in Pa.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
@@ -79,10 +72,7 @@ def thin_sweep(
     Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
     were recorded.
 
-    Parameters
-    ----------
-    angular_frequency
-        In rad/s, positive and increasing; some may be repeated.
+    `angular_frequency` in rad/s, positive and increasing; some may be repeated.
     """
     n = len(angular_frequency)
     if n <= MOST_FREQUENCIES:
@@ -100,12 +90,7 @@ def thin_sweep(
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
     """Return which of n samples to keep so that at most so many stay, evenly in their order.
 
-    Parameters
-    ----------
-    n
-        How many there are.
-    most
-        How many may stay, 2 or more.
+    `n`: how many there are. `most`: how many may stay, 2 or more.
     """
     keep = np.zeros(n, dtype=bool)
     keep[np.unique(np.round(np.linspace(0, n - 1, min(n, most))).astype(int))] = True
@@ -119,10 +104,7 @@ def thin_run(run: Run, most: int) -> Run:
     and more where it varies faster than these: see `followed_rate`. What was kept is said under
     ``thinned`` of its metadata.
 
-    Parameters
-    ----------
-    most
-        How many samples may stay, 2 or more.
+    `most`: how many samples may stay, 2 or more.
     """
     n = len(run)
     if n <= most:
@@ -156,12 +138,8 @@ def followed_rate(
     at some of them does. Its knots are the samples kept; intervals are halved until the strain is
     right to 0.1 % of its range everywhere, and the rate to 5 % of its largest.
 
-    Parameters
-    ----------
-    time, shear_rate
-        Of all samples, in s and 1/s.
-    keep
-        The samples that are knots in any case, the first and the last among them.
+    `time`, `shear_rate`: of all samples, in s and 1/s. `keep`: the samples that are knots in any
+    case, the first and the last among them.
     """
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)

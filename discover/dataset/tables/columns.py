@@ -9,17 +9,8 @@ from discover.errors import InputError
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
     """Return finite numbers as an array of shape (n,).
 
-    Parameters
-    ----------
-    values
-        A list, an array or a pandas series.
-    label
-        What they are, for messages.
-
-    Raises
-    ------
-    InputError
-        If they have a unit of their own, are not numbers, not finite, or of another shape.
+    `values`: A list, an array or a pandas series. `label`: what they are, for messages. Raises
+    InputError if they have a unit of their own, are not numbers, not finite, or of another shape.
     """
     if hasattr(values, "magnitude"):
         raise InputError(

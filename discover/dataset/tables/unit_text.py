@@ -48,14 +48,9 @@ _NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
 class Unit:
     """A unit as its factor to SI and its dimension.
 
-    Attributes
-    ----------
-    factor
-        Of the SI unit.
-    dimension
-        Exponents of kg, m and s. Angles and numbers have none.
-    cycles
-        Whether it counts cycles, as Hz does; 1 Hz is 2π rad/s where an angle is meant.
+    `factor`: of the SI unit.
+    `dimension`: exponents of kg, m and s. Angles and numbers have none.
+    `cycles`: whether it counts cycles, as Hz does; 1 Hz is 2π rad/s where an angle is meant.
     """
 
     factor: float = 1.0
@@ -75,10 +70,7 @@ def read_heading(suffix: str) -> Unit | None:
     The first word stands above the fraction line, the others below it: ``1_min``, ``rad_s``,
     ``dyn_cm2``.
 
-    Parameters
-    ----------
-    suffix
-        What follows the name and its underscore.
+    `suffix`: what follows the name and its underscore.
     """
     first, *below = suffix.split("_")
     if len(suffix) > _LONGEST or (first == "1" and not below):
@@ -98,10 +90,7 @@ def read_unit(text: str) -> Unit | None:
     Products are written with ``.``, ``*``, ``·`` or a space, exponents as ``cm2``, ``s-1``,
     ``s^-1``, ``s**-1`` or ``s⁻¹``. Empty, ``-`` and ``1`` mean a pure number.
 
-    Parameters
-    ----------
-    text
-        Such as ``kPa``, ``1/s``, ``N.m`` or ``dyn/cm²``.
+    `text`: such as ``kPa``, ``1/s``, ``N.m`` or ``dyn/cm²``.
     """
     text = tidy_unit(text)
     if text in ("", "-", "--", "1"):
@@ -133,12 +122,8 @@ _WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
 def name_and_unit(name: str, unit: str) -> tuple[str, str]:
     """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
 
-    Parameters
-    ----------
-    name
-        Of a column or a constant.
-    unit
-        As it stands beside or below the name; empty if it does not.
+    `name`: of a column or a constant. `unit`: as it stands beside or below the name; empty if it
+    does not.
     """
     name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
     if unit and _OPENING.get(unit[-1]) == unit[0]:

@@ -12,14 +12,9 @@ from discover.errors import InputError
 class Quantity:
     """A column that the software knows.
 
-    Attributes
-    ----------
-    stem
-        Beginning of the column's name, before the unit.
-    column
-        Name of the column in SI units.
-    unit
-        That unit; empty for a pure number.
+    `stem`: beginning of the column's name, before the unit.
+    `column`: name of the column in SI units.
+    `unit`: that unit; empty for a pure number.
     """
 
     stem: str
@@ -44,18 +39,9 @@ LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "Pa")
 def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
 
-    Parameters
-    ----------
-    suffix
-        What follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
-        ``dyn_cm2`` or ``percent``.
-    quantity
-        What the column holds.
-
-    Raises
-    ------
-    InputError
-        If the suffix is a unit of something else.
+    `suffix`: what follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
+    ``dyn_cm2`` or ``percent``. `quantity`: what the column holds. Raises InputError if the suffix
+    is a unit of something else.
     """
     unit = read_heading(suffix)
     if unit is None:
@@ -82,17 +68,8 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
 def heading_factor(column: str, quantity: Quantity) -> float:
     """Return the factor to SI of a column whose name is the user's; one where it names no unit.
 
-    Parameters
-    ----------
-    column
-        Its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
-    quantity
-        What it holds.
-
-    Raises
-    ------
-    InputError
-        If the name ends in a unit of something else.
+    `column`: its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
+    `quantity`: what it holds. Raises InputError if the name ends in a unit of something else.
     """
     words = column.split("_")
     endings = ["_".join(words[i:]) for i in range(1, len(words))]
@@ -129,10 +106,7 @@ def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
     """Return the column that holds a quantity and its factor to SI, or None if there is none.
 
-    Raises
-    ------
-    InputError
-        If two columns hold it, or its unit is wrong.
+    Raises InputError if two columns hold it, or its unit is wrong.
     """
     found = []
     for name in names:

@@ -42,18 +42,13 @@ _DIMENSIONS = {
 class RheoToolModel:
     """A law in rheoTool's words.
 
-    Attributes
-    ----------
-    type
-        Entry ``type``.
-    options
-        Entries that are words.
-    parameters
-        Parameters by rheoTool's name, times over the relaxation time and stresses over the modulus.
-    drive, relax
-        Factors on modulus and relaxation rate that the terms ``gammadot`` and ``sigma`` amount to.
-    notes
-        What was passed over.
+    `type`: entry ``type``.
+    `options`: entries that are words.
+    `parameters`: parameters by rheoTool's name, times over the relaxation time and stresses over
+        the modulus.
+    `drive`, `relax`: factors on modulus and relaxation rate that the terms ``gammadot`` and
+        ``sigma`` amount to.
+    `notes`: what was passed over.
     """
 
     type: str
@@ -91,17 +86,8 @@ _OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mappin
 def rheotool_law(kind: str, value: Callable[[str], float]) -> tuple[str, dict[str, float]] | None:
     """Return the law with a name that a type of rheoTool's is, with its constants.
 
-    Parameters
-    ----------
-    kind
-        Entry ``type``.
-    value
-        Returns an entry, times over the relaxation time and stresses over the modulus.
-
-    Raises
-    ------
-    InputError
-        If an entry that is fixed here has another value.
+    `kind`: entry ``type``. `value`: returns an entry, times over the relaxation time and stresses
+    over the modulus. Raises InputError if an entry that is fixed here has another value.
     """
     for law, (name, renamed, fixed, _) in _OF_NAME.items():
         if name != kind or (law == "rolie_poly" and value("chiMax") > 1.0):
@@ -129,15 +115,8 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
 
     Terms ``sigma`` and ``gammadot`` are another relaxation time and modulus, and are written so.
 
-    Parameters
-    ----------
-    tolerance
-        Relative deviation from a form of rheoTool's that is passed over.
-
-    Raises
-    ------
-    InputError
-        If rheoTool has no such law; says which term is in the way.
+    `tolerance`: relative deviation from a form of rheoTool's that is passed over. Raises InputError
+    if rheoTool has no such law; says which term is in the way.
     """
     if equation.named is not None:
         below = equation.named.built().as_terms()
@@ -198,12 +177,7 @@ def rheotool_text(
 ) -> str:
     """Return the file ``constant/constitutiveProperties``.
 
-    Parameters
-    ----------
-    density_kg_m3
-        rheoTool's solvers want a density; shear rheometry does not measure it.
-    tolerance
-        As in `rheotool_model`.
+    `density_kg_m3`: rheoTool's solvers want a density; shear rheometry does not measure it.
     """
     if equation.states:
         raise InputError(

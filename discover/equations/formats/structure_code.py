@@ -83,12 +83,7 @@ NOTHING = {
 def structure_fields(equation: Equation, notation: Any, language: str) -> dict[str, str]:
     """Return the fields of a template that say what states do.
 
-    Parameters
-    ----------
-    notation
-        How a text in Python writes scalars.
-    language
-        ``numpy``, ``ufl`` or ``sympy``.
+    `notation`: how a text in Python writes scalars. `language`: ``numpy``, ``ufl`` or ``sympy``.
     """
     if not equation.states:
         return NOTHING
@@ -131,10 +126,7 @@ def structure_fields(equation: Equation, notation: Any, language: str) -> dict[s
 def stepped(equation: Equation, variables: int) -> dict[str, str]:
     """Return the fields of the integrator in the text of numpy.
 
-    Parameters
-    ----------
-    variables
-        How many structure variables each mode has.
+    `variables`: how many structure variables each mode has.
     """
     levels = sum(len(part.names) for part in equation.states)
     last, viscous = (

@@ -99,12 +99,8 @@ def term_mathml(
 ) -> str:
     """Return a term by its canonical spelling, without `math` element.
 
-    Parameters
-    ----------
-    inner
-        Inner parameters by name; one that is missing stays a letter.
-    coefficient
-        Number in front.
+    `inner`: inner parameters by name; one that is missing stays a letter. `coefficient`: number in
+    front.
     """
     return parse_term(name).spell(MathmlNotation(), coefficient, inner)
 
