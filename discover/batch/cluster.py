@@ -9,8 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
 
-from discover.batch.progress import now_and_then
-from discover.batch.status import StudyStatus
+from discover.batch.status import StudyStatus, now_and_then
 from discover.batch.workers import Job
 from discover.errors import InputError
 

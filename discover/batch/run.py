@@ -7,8 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 from discover.batch.cluster import run_on_cluster
-from discover.batch.progress import BatchProgress
-from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.status import BatchProgress, BatchResult, StudyStatus
 from discover.batch.summary import STATES, SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, nothing_to_note, run_close_loop, run_compare
 from discover.batch.workers import run_in_workers

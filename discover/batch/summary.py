@@ -6,8 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from threading import RLock, Timer
 
-from discover.batch.rows import StudyRow, read_row
-from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.status import BatchResult, StudyRow, StudyStatus, read_row
 from discover.errors import InputError
 from discover.study.atomic import write_text
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
@@ -130,7 +131,7 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note)
     if there is not None:
         return there
-    from discover.dataset.conditions import material_and_temperature
+    from discover.dataset.run_table import material_and_temperature
     from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
     from discover.report.loop.verdict import loop_verdict
@@ -216,3 +217,18 @@ def fit_declared(model, dataset):
 def _scaled(modes, values, name, factor):
     """Return a constant of the modes as fitted: itself for one mode, a factor on several."""
     return np.array([values[name]]) if name in values else modes * values.get(factor, 1.0)
+
+
+def run_demo(
+    out: Path, seed: int | None, overwrite: bool, progress: Progress | None
+) -> dict[str, Path]:
+    """Run the demonstration and return its pages by title.
+
+    `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
+    """
+    part = by_shares(progress, {"comparison": 0.9, "loop": 0.1})
+    studies = files("discover.batch") / "demo_studies"
+    with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:
+        first = run_compare(comparison, out, seed, overwrite, part("comparison"))
+        second = run_close_loop(loop, out / "loop", seed, overwrite, part("loop"))
+    return {"Comparison of two learners": first.report, "Closed loop": second.report}

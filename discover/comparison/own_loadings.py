@@ -12,7 +12,7 @@ from discover.comparison.judging.bands.constants_in_bands import law_with_fitted
 from discover.comparison.judging.other_causes.loadings import OwnLoadings
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.records.own_loadings import with_loadings
+from discover.dataset.records.repeats import with_loadings
 from discover.study.data import StudyData
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary

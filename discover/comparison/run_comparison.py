@@ -23,7 +23,7 @@ from discover.comparison.own_loadings import judged, with_own_loadings
 from discover.comparison.own_noise import learned_by_noise
 from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.dataset import Dataset
-from discover.dataset.conditions import material_and_temperature
+from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
 from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.multimode import Fluid

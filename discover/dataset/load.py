@@ -12,8 +12,8 @@ from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.records.differentiation import DEFAULT_WINDOW
-from discover.dataset.records.sequence import in_sequence
+from discover.dataset.records.rates import DEFAULT_WINDOW
+from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units

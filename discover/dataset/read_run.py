@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.kind_of_test import DeclaredTest, declared_test
-from discover.dataset.records.differentiation import DEFAULT_WINDOW, differentiate
+from discover.dataset.records.rates import DEFAULT_WINDOW, differentiate
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation, wave_of

@@ -14,7 +14,7 @@ from discover.forward.augmented_model import AugmentedModel
 from discover.forward.batches import TransientFlows, make_batch
 from discover.forward.declared import DeclaredModel
 from discover.inference.least_squares import gauss_newton_step
-from discover.protocols.rate_steps import steps_between_samples
+from discover.protocols.between_samples import steps_between_samples
 
 _MOST = 40
 """Steps whose instants are fitted, at most: each costs a constant."""

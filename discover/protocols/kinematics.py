@@ -5,7 +5,7 @@ All of them share their principal third axis, so that the stress has four compon
 """
 
 from collections.abc import Iterable, Sequence
-from typing import Literal
+from typing import Literal, get_args
 
 import equinox as eqx
 import jax
@@ -171,3 +171,19 @@ def in_words(quantities: Iterable[str]) -> str:
     """Return in words what is recorded, of several quantities."""
     found = set(quantities)
     return listed([words for quantity, words in _IN_WORDS.items() if quantity in found])
+
+
+FlowClass = Literal[
+    "laos",
+    "start_up",
+    "cessation",
+    "steps",
+    "superposed",
+    "step_strain",
+    "flow_curve",
+    "creep",
+    "uniaxial",
+    "planar",
+    "biaxial",
+]
+FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)

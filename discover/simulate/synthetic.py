@@ -14,8 +14,14 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.plain_numbers import as_number, as_whole_number, short
 from discover.programs import compiled
-from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.protocol import FlowProtocol, recorded_at, require_flow, shear_rates
+from discover.protocols.protocol import (
+    TRAINING_DURATION,
+    FlowProtocol,
+    paper_training_protocols,
+    recorded_at,
+    require_flow,
+    shear_rates,
+)
 from discover.simulate.solve import ShearStress, simulate
 from discover.statistics.projection import rms
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from discover.dataset import Dataset
 from discover.dataset.load import load_dataset
 from discover.dataset.material_functions import TABLES
-from discover.dataset.records.copies import require_no_copies
+from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.errors import InputError
 from discover.laws.multimode import Fluid

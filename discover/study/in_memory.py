@@ -8,7 +8,7 @@ import numpy as np
 
 from discover.dataset import Dataset, Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
-from discover.dataset.records.copies import require_no_copies
+from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
 from discover.errors import InputError

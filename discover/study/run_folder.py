@@ -12,8 +12,7 @@ from typing import Any
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.plain_json import parse_json
-from discover.study.atomic import PART_SUFFIX, make_folder, require_ours, write_text
-from discover.study.lock import lock_folder
+from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_ours, write_text
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"

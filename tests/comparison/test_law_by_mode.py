@@ -27,7 +27,7 @@ from discover.comparison.judging.statements import IN_LIBRARY, Statement
 from discover.comparison.outcomes.flows import Flow, columns_of
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.dataset import Dataset, Run
-from discover.dataset.loading import Loading
+from discover.dataset.run import Loading
 from discover.effects import make_effect
 from discover.inference.by_mode.constants import ConstantByMode
 from discover.inference.by_mode.draws import ConstantsDrawn

@@ -20,7 +20,7 @@ from discover.identify.side_by_side.many_laws import (
     sigma_points,
 )
 from discover.laws import Fluid, UpperConvectedMaxwell, make_law
-from discover.protocols.classes import FLOW_CLASSES
+from discover.protocols.kinematics import FLOW_CLASSES
 from discover.simulate import simulate
 from discover.study.compare_section import NextExperiment
 from tensor_library.law_terms import LawTerms

@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.comparison.outcomes.flows import Flow, Stresses, predict
 from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.dataset.records.coarse_rates import (
+from discover.dataset.records.rates import (
     CoarseRates,
     coarse_in,
     samples_a_cycle,

@@ -14,8 +14,8 @@ from discover.dataset.records.repeats import Repeats
 from discover.learners.registry import BANDS_ONLY
 from discover.learners.results.recovered_term import RecoveredTerm
 from discover.learners.settings import ARITHMETIC
+from discover.protocols.between_samples import sampling_interval
 from discover.protocols.kinematics import FOLLOWED
-from discover.protocols.sampling import sampling_interval
 from discover.statistics import FitVerdict, LackOfFit, lack_of_fit
 from discover.statistics.residual import STRUCTURE, Expectation
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset.checking.among_runs import doubts_among_runs, doubts_of_temperature
-from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
 from discover.dataset.checking.normal_stress import doubts_of_normal_stress
-from discover.dataset.checking.one_run import doubts_of_run
+from discover.dataset.checking.runs import doubts_among_runs, doubts_of_run, doubts_of_temperature
 from discover.dataset.checking.start import doubts_of_start, doubts_of_unseen_start
+from discover.dataset.checking.sweeps import doubts_of_amplitude_sweep
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,

@@ -6,14 +6,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.one_run import stress_noise
-from discover.dataset.checking.sweep_inertia import sweep_inertia
+from discover.dataset.checking.runs import is_start_up, stress_noise
+from discover.dataset.checking.sweeps import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
-from discover.dataset.loading import LARGEST
-from discover.dataset.run import Run
+from discover.dataset.run import LARGEST, Run
 from discover.statistics import HALF_BAND
 from discover.statistics.projection import rms
 from discover.words import percent_of

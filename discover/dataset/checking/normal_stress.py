@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
-from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.one_run import local_noise
+from discover.dataset.checking.runs import is_start_up, local_noise
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, purer
-from discover.dataset.importing.said_test import Said
+from discover.dataset.importing.text_export import Said
 
 CONSTANT = 0.03
 """Spread, of the middle nine tenths of the samples, up to which an imposed quantity is constant."""

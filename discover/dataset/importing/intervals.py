@@ -14,8 +14,7 @@ from jaxtyping import Float
 from discover.dataset.importing.in_time import CONSTANT, every_row_differs, spread, up_and_down
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.said_test import said_of
-from discover.dataset.importing.text_export import Block
+from discover.dataset.importing.text_export import Block, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.errors import InputError
 

@@ -7,21 +7,26 @@ from pathlib import PurePath
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.importing.clock_times import is_clock, seconds
-from discover.dataset.importing.header_constants import Constant, temperature_in
 from discover.dataset.importing.mapping import Geometry, Mapping, key_of
 from discover.dataset.importing.names import NameTable, name_table
 from discover.dataset.importing.quantities import (
     QUANTITIES,
+    UnsaidUnit,
     factor_to_si,
     guess_columns,
     name_rank,
     to_celsius,
     unit_in_name,
+    unsaid_unit,
 )
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
-from discover.dataset.importing.unsaid_units import UnsaidUnit, unsaid_unit
+from discover.dataset.importing.text_rows import (
+    Constant,
+    is_clock,
+    is_number,
+    seconds,
+    temperature_in,
+)
 from discover.dataset.tables.table import shown
 from discover.errors import InputError
 

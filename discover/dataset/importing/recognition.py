@@ -11,11 +11,10 @@ from discover.dataset.importing.in_time import APART, Course, kind_of_course, up
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.said_test import Said, said_of
+from discover.dataset.importing.text_export import Said, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.unit_text import read_unit
-from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to
+from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to, read_unit
 from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02

@@ -1,4 +1,4 @@
-"""Fewer samples of a very long record, chosen so that what a law is judged on stays."""
+"""Fewer samples: of very long records, and without those that a knock or a spark made."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
+from discover.statistics.noise.outliers import isolated
 from discover.words import percent_of
 
 MOST_SAMPLES = 20_000
@@ -176,3 +177,35 @@ def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float
     whole = cumulative_trapezoid(rate, time, initial=0.0)
     part = cumulative_trapezoid(rate[keep], time[keep], initial=0.0)
     return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
+
+
+_CORNER = 0.01  # share of the largest rate, or stress, that was imposed
+_ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
+
+
+def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
+    """Return which samples are next to a step or a corner of what was imposed: rate or stress.
+
+    What is answered there may stand alone without a knock, as where the next interval of a
+    thixotropy test begins, or the way down of a loop.
+    """
+    imposed = run.stress if run.protocol.control == "stress" else run.rate
+    beside = np.zeros(len(imposed), dtype=bool)
+    if len(imposed) < 3:
+        return beside
+    bends = np.abs(np.diff(imposed, 2))
+    sharp = bends > _CORNER * np.max(np.abs(imposed)) + _ABOVE_BENDS * np.median(bends)
+    for shift in range(3):
+        beside[shift : shift + len(sharp)] |= sharp
+    return beside
+
+
+def without_spikes(run: Run) -> tuple[Run, list[float]]:
+    """Return a run without the samples that stand alone in it, and their times in s.
+
+    By the record alone (`isolated`): no law is asked, so whatever is fitted then has no part in it.
+    """
+    off = isolated(run.recorded) & ~beside_a_step(run)
+    if not np.any(off):
+        return run, []
+    return run.window(~off), [float(t) for t in run.time[off]]

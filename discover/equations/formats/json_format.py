@@ -5,8 +5,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from discover.equations.equation import Box, Equation, Tested
-from discover.equations.named_part import NamedPart
-from discover.equations.state_part import StatePart
+from discover.equations.parts import NamedPart, StatePart
 from discover.errors import InputError
 from discover.validation import Section, validated
 from tensor_library.law_terms import LawTerm

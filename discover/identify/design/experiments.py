@@ -9,9 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
-from discover.protocols.classes import FLOW_CLASSES, FlowClass
 from discover.protocols.control import imposed_stress, steady_rates
 from discover.protocols.history import after_step_strain
+from discover.protocols.kinematics import FLOW_CLASSES, FlowClass
 from discover.protocols.protocol import (
     FlowProtocol,
     in_flow,

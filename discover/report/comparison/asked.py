@@ -2,7 +2,7 @@
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.fitting.sampled_rates import coarse_rates_of
-from discover.dataset.records.coarse_rates import CoarseRates
+from discover.dataset.records.rates import CoarseRates
 from discover.report.wording import (
     learner_as_subject,
 )

@@ -3,7 +3,7 @@
 from discover.comparison.comparison import Comparison
 from discover.comparison.judging.next_measurement import NextMeasurement
 from discover.comparison.judging.statements import only_states
-from discover.dataset.records.coarse_rates import MORE_SAMPLES
+from discover.dataset.records.rates import MORE_SAMPLES
 from discover.protocols.kinematics import in_words
 from discover.report.comparison.asked import coarse_rates, left_open
 from discover.report.wording import (

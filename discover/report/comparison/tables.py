@@ -13,7 +13,7 @@ from discover.comparison.outcomes.constant import in_words as constant_in_words
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.equations import Equation
-from discover.equations.spelling.mathml import law_element, term_element, term_mathml
+from discover.equations.spelling.markup import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import BANDS_ONLY, learner_title

@@ -15,7 +15,7 @@ from discover.comparison.judging.refutation import Refutation, hold_against
 from discover.comparison.outcomes.flows import Flow
 from discover.comparison.outcomes.outcome import LearnerOutcome
 from discover.identify.rivals.bands import PredictionBand
-from discover.protocols.sampling import sampling_interval
+from discover.protocols.between_samples import sampling_interval
 from discover.statistics.reading.late_answers import AGREED, Late, Response, late_answer
 
 _DOES: Mapping[Late, str] = {
