@@ -83,9 +83,9 @@ def run_compare(
     """Run both learners of a study and write the comparison report.
 
     `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides the
-    study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and the
-    fraction done. `note`: called with the study once it was read. Raises InputError if the study,
-    its data or the folder is wrong.
+    study's seeds. `progress`: called with what is going on and the fraction done. `note`: called
+    with the study once it was read. Raises InputError if the study, its data or the folder is
+    wrong.
     """
     study, folder, there = _begin("compare", path, out, seed, overwrite, note)
     if there is not None:

@@ -106,9 +106,8 @@ def write_equation(
 ) -> str:
     """Return an equation as text.
 
-    `equation`: the equation. `form`: key of `FORMATS`. `density_kg_m3`, `tolerance`: for
-    ``rheotool`` only; see `discover.equations.formats.rheotool.rheotool_text`. Raises InputError if
-    there is no such format, an option does not belong to it, or it has not this law.
+    Raises InputError if there is no such format, an option does not belong to it, or it has not
+    this law.
     """
     if form not in FORMATS:
         raise InputError(unknown_name("format", form, FORMATS))

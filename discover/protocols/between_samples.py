@@ -113,7 +113,7 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
     taken, monotonic where straight lines were   [Fritsch & Carlson 1980, SIAM J. Numer. Anal. 17,
     238]. None where the rate was commanded: constant, a wave, or steps.
 
-    `protocol`: any. `times`: of the samples, in s.
+    `times`: of the samples, in s.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -301,8 +301,6 @@ def sampling_interval(
     Not a number of what other means record than those of a shear stress at a given rate, from rest:
     a strain, a normal stress, an extension, the points of a table of states, cycles that a
     rheometer has averaged. Their noise need not be correlated as that of the others.
-
-    `time`: of the samples. `protocol`: what was imposed. `quantity`: what was recorded.
     """
     plain = protocol.control == "rate" and float(protocol.begins) == 0.0
     if not plain or {quantity, protocol.quantity} != {"sigma12"} or len(time) < 2:

@@ -110,7 +110,7 @@ def drawn_against(
     Time where it goes on in time, of a flow curve the rate, of oscillations frequency or amplitude,
     whichever varies.
 
-    `control`: what is imposed. `time`, `rate`, `strain`: of the samples, shape (n,).
+    `time`, `rate`, `strain`: of the samples, shape (n,).
     """
     if control not in STATES:
         return "time (s)", time

@@ -124,8 +124,7 @@ def kind_of(kinematics: Kinematics | None) -> FlowKind:
 def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinematics:
     """Return the kinematics of a flow by its name.
 
-    `kind`: of `KINDS`. `quantity`: what is recorded; by default σ12 in shear and the tensile stress
-    in extension.
+    `quantity`: what is recorded; by default σ12 in shear and the tensile stress in extension.
     """
     if not isinstance(kind, str) or kind not in _GRADIENT:
         raise InputError(unknown_name("flow", kind, KINDS))

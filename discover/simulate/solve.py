@@ -93,12 +93,11 @@ def simulate(
     Tsitouras' explicit method, a wide one with an exponential method that is exact for linear
     relaxation.
 
-    `fluid`: the fluid, in the units of `times`; `Fluid.dimensionless` for a bare law. `protocol`:
-    shear rate as a function of time. `times`: sampling times, shape (n,), increasing, from 0 on.
-    `rtol`, `atol`: tolerances on the dimensionless stress of each mode. What begins with a periodic
-    state is followed in fixed steps instead, for that state is solved for. Raises InputError if the
-    flow is not at a given rate. Raises SimulationError if no solution to this tolerance was found
-    within 100,000 steps.
+    `fluid`: the fluid, in the units of `times`; `Fluid.dimensionless` for a bare law. `times`:
+    sampling times, shape (n,), increasing, from 0 on. `rtol`, `atol`: tolerances on the
+    dimensionless stress of each mode. What begins with a periodic state is followed in fixed steps
+    instead, for that state is solved for. Raises InputError if the flow is not at a given rate.
+    Raises SimulationError if no solution to this tolerance was found within 100,000 steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in ("stress", "oscillation"):
@@ -218,8 +217,8 @@ def simulate_homogeneous_flow(
 
     `velocity_gradient`: function of time that returns L, shape (3, 3). Flows that differ in the
     arrays of a `jax.tree_util.Partial` alone share a program. `times`: dimensionless sampling
-    times, shape (n,), increasing, from 0 on. `rtol`, `atol`: tolerances. Raises SimulationError if
-    the stress runs away, as it does in UCM beyond a critical extension rate.
+    times, shape (n,), increasing, from 0 on. Raises SimulationError if the stress runs away, as it
+    does in UCM beyond a critical extension rate.
     """
     found, successful = _solve_in_any_flow(
         law, velocity_gradient, jnp.asarray(times, dtype=float), rtol, atol

@@ -23,10 +23,9 @@ def write_text(path: str | Path, text: str) -> Path:
     The text goes to a temporary file in the same folder, which then takes the name. A file that it
     replaces hands on who may read it; for a new one the user's umask decides.
 
-    `path`: the file; its folder must exist. `text`: the content, written as UTF-8; what UTF-8
-    cannot hold as ``\udcff``. Raises InputError if something that is no plain file has the name, or
-    a file that this command has read. Raises OSError if the disk is full, say; names the file. What
-    the file held before is still there.
+    `text`: the content, written as UTF-8; what UTF-8 cannot hold as ``\udcff``. Raises InputError
+    if something that is no plain file has the name, or a file that this command has read. Raises
+    OSError if the disk is full, say; names the file. What the file held before is still there.
     """
     path = Path(path)
     before = replaceable(path)

@@ -38,8 +38,8 @@ class StudyData:
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     """Return the data of a study, split into runs to fit and runs held out.
 
-    `seed`: overrides the seed of synthetic noise. Raises InputError if a file is wrong, a named run
-    does not exist, a run held out is a copy of one to fit, or those to fit hold no signal.
+    Raises InputError if a file is wrong, a named run does not exist, a run held out is a copy of
+    one to fit, or those to fit hold no signal.
     """
     data = study.data
     if data.synthetic is not None:

@@ -125,9 +125,9 @@ def with_known(
 ) -> DeclaredModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
-    `declared`: from `declared_fluid`. `effects`: as ``[model] effects`` in a study; None for none.
-    `free`: names of its constants. `by_mode`: which of them, and which effects, may differ from
-    mode to mode. Raises InputError if an effect, a value or a constant is not as it should be.
+    `effects`: as ``[model] effects`` in a study; None for none. `by_mode`: which of them, and which
+    effects, may differ from mode to mode. Raises InputError if an effect, a value or a constant is
+    not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):

@@ -62,10 +62,7 @@ class Course:
 
 
 def kind_of_course(course: Course, said: Said | None) -> tuple[TestName, str]:
-    """Return which test a record is, and what says so.
-
-    `said`: what its words say.
-    """
+    """Return which test a record is, and what says so."""
     strain, stress = course.strain, course.stress
     swings = alternates(strain if strain is not None else course.moved) or alternates(stress)
     if swings and not held(stress):  # creep and recovery have a rate of both signs

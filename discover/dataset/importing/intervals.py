@@ -46,7 +46,7 @@ def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) ->
     up and then down with stresses that differ.
 
     `blocks`: each with its number. `mapping`: what the user says of them; a block that the user
-    names a test for is left as it is. `file`: name of the file.
+    names a test for is left as it is.
     """
     left, found = list(blocks), []
     while left:

@@ -195,8 +195,8 @@ def read_names(path: Path) -> dict[str, tuple[str, ...]]:
 def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
     """Check a user's names.
 
-    `names`: by quantity. `where`: the file, for messages. Raises InputError if there is no such
-    quantity, or a name is no text with a letter in it.
+    `names`: by quantity. Raises InputError if there is no such quantity, or a name is no text with
+    a letter in it.
     """
     for key, listed in names.items():
         if key not in shipped_names():

@@ -66,8 +66,8 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
 
     Columns without a single number are passed over; a clock is a time only if no number is.
 
-    `given`: names of columns that the user gave; they win over guesses. `table`: what quantities
-    are called. Raises InputError if a name that was given stands above two columns.
+    `given`: names of columns that the user gave; they win over guesses. Raises InputError if a name
+    that was given stands above two columns.
     """
     count = range(len(block.columns))
     numbers = [any(is_number(row[i]) for row in block.cells) for i in count]
@@ -137,8 +137,8 @@ def _is_unit_of(key: str, unit: str) -> bool:
 def fits(key: str, name: str, unit: str) -> bool:
     """Return whether a short name, which may mean several things, has a unit of the quantity.
 
-    `key`: from `QUANTITIES`. `name`, `unit`: of the column; a longer name fits whatever its unit
-    is, so that a wrong one is said.
+    `name`, `unit`: of the column; a longer name fits whatever its unit is, so that a wrong one is
+    said.
     """
     if name.strip() == "T" and not unit:
         return key == "temperature"
@@ -177,9 +177,8 @@ def to_celsius(value: float, unit: str) -> float | None:
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     """Return the factor from a column's unit to SI.
 
-    `key`: what they are, from `QUANTITIES`. `unit`: their unit as the export or the user writes it.
-    `column`, `name`: column and file, for messages. Raises InputError if the unit is unknown or a
-    unit of something else.
+    `unit`: their unit as the export or the user writes it. Raises InputError if the unit is unknown
+    or a unit of something else.
     """
     quantity = QUANTITIES[key]
     if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
@@ -245,9 +244,8 @@ class UnsaidUnit:
 def unsaid_unit(key: str, column: str, raw: Values, get: Get, table: NameTable) -> UnsaidUnit:
     """Return the unit of a column without one.
 
-    `key`: what it holds, from `QUANTITIES`. `raw`: its numbers. `get`: gives other columns of the
-    block in SI units, None where it has no such column. `table`: what quantities are called: an
-    angular frequency is one in rad/s, a frequency may count.
+    `get`: gives other columns of the block in SI units, None where it has no such column. `table`:
+    what quantities are called: an angular frequency is one in rad/s, a frequency may count.
     """
     choices = _CHOICES.get(key)
     if key == "omega" and "frequency" not in table.find(column):

@@ -42,8 +42,7 @@ def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
     Durations are as they stand. Clocks of the day and time stamps count from the first, since they
     are later than the whole record is long; past midnight they go on.
 
-    `cells`: as `is_clock` knows them. `unit`: as the export writes it; ``hh:mm`` says that the
-    first of two numbers is hours.
+    `unit`: as the export writes it; ``hh:mm`` says that the first of two numbers is hours.
     """
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
@@ -157,9 +156,8 @@ def with_points(
 ) -> list[list[str]]:
     """Return rows of cells without spaces around them, numbers with decimal points.
 
-    `rows`: the cells of each line. `name`: of the file, for messages. `decimal`: decimal sign;
-    found from the cells if None. Raises InputError if the decimal sign cannot be told from the
-    thousands separator.
+    `decimal`: decimal sign; found from the cells if None. Raises InputError if the decimal sign
+    cannot be told from the thousands separator.
     """
     rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
     sign = decimal or _decimal(rows, name)

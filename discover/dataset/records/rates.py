@@ -29,9 +29,9 @@ def differentiate(
     A cubic is fitted by least squares to the `window` samples nearest in order to each sample, and
     its slope taken there   [Savitzky & Golay 1964, Anal. Chem. 36, 1627, for any spacing].
 
-    `times`: sampling times in s, increasing. `values`: the record at those times. `window`: number
-    of samples in the window, 5 or more; fewer if the record is shorter. Raises InputError if the
-    window is too short, or the record has fewer than 5 samples.
+    `times`: sampling times in s, increasing. `window`: number of samples in the window, 5 or more;
+    fewer if the record is shorter. Raises InputError if the window is too short, or the record has
+    fewer than 5 samples.
     """
     if window < _DEGREE + 2:
         raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")

@@ -201,9 +201,8 @@ def _equal(one: Run, other: Run) -> bool:
 def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
     """Return runs each of which is a loading of its own; as they are where nothing is said of it.
 
-    `deviation`: relative standard deviation by which loadings differ. `noise`: relative noise,
-    where it is known. Raises InputError if they cannot differ so, or a stress was imposed, which a
-    factor changes otherwise.
+    `deviation`: relative standard deviation by which loadings differ. Raises InputError if they
+    cannot differ so, or a stress was imposed, which a factor changes otherwise.
     """
     if deviation is None:
         return list(runs)

@@ -91,7 +91,7 @@ def thin_sweep(
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
     """Return which of n samples to keep so that at most so many stay, evenly in their order.
 
-    `n`: how many there are. `most`: how many may stay, 2 or more.
+    `most`: how many may stay, 2 or more.
     """
     keep = np.zeros(n, dtype=bool)
     keep[np.unique(np.round(np.linspace(0, n - 1, min(n, most))).astype(int))] = True

@@ -150,11 +150,10 @@ def read_bytes(
 ) -> bytes:
     """Return the content of a regular file of reasonable size.
 
-    `name`: its name in messages. `if_missing`: remedy where there is no such file. `largest`,
-    `too_large`: bytes that it may have, and the remedy where it has more. `is_input`: whether a
-    command that reads it must not write over it; see `discover.inputs_kept`. Raises InputError if
-    it is missing, cannot be read, is no regular file (a pipe would never end), or is larger than it
-    may be.
+    `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
+    whether a command that reads it must not write over it; see `discover.inputs_kept`. Raises
+    InputError if it is missing, cannot be read, is no regular file (a pipe would never end), or is
+    larger than it may be.
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
@@ -224,8 +223,8 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
     commas and other encodings are recognised and refused, since guessing at numbers is no help.
 
-    `name`: its name in messages; the file's own by default. `if_missing`: remedy where there is no
-    such file. Raises InputError if the file is missing, empty or not a table.
+    `name`: its name in messages; the file's own by default. Raises InputError if the file is
+    missing, empty or not a table.
     """
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
@@ -371,8 +370,8 @@ def shown(cell: str) -> str:
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
     """Return finite numbers as an array of shape (n,).
 
-    `values`: A list, an array or a pandas series. `label`: what they are, for messages. Raises
-    InputError if they have a unit of their own, are not numbers, not finite, or of another shape.
+    `values`: A list, an array or a pandas series. Raises InputError if they have a unit of their
+    own, are not numbers, not finite, or of another shape.
     """
     if hasattr(values, "magnitude"):
         raise InputError(

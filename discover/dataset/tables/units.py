@@ -72,8 +72,6 @@ def read_heading(suffix: str) -> Unit | None:
 
     The first word stands above the fraction line, the others below it: ``1_min``, ``rad_s``,
     ``dyn_cm2``.
-
-    `suffix`: what follows the name and its underscore.
     """
     first, *below = suffix.split("_")
     if len(suffix) > _LONGEST or (first == "1" and not below):
@@ -92,8 +90,6 @@ def read_unit(text: str) -> Unit | None:
 
     Products are written with ``.``, ``*``, ``·`` or a space, exponents as ``cm2``, ``s-1``,
     ``s^-1``, ``s**-1`` or ``s⁻¹``. Empty, ``-`` and ``1`` mean a pure number.
-
-    `text`: such as ``kPa``, ``1/s``, ``N.m`` or ``dyn/cm²``.
     """
     text = tidy_unit(text)
     if text in ("", "-", "--", "1"):
@@ -125,8 +121,7 @@ _WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
 def name_and_unit(name: str, unit: str) -> tuple[str, str]:
     """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
 
-    `name`: of a column or a constant. `unit`: as it stands beside or below the name; empty if it
-    does not.
+    `unit`: as it stands beside or below the name; empty if it does not.
     """
     name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
     if unit and _OPENING.get(unit[-1]) == unit[0]:
@@ -260,8 +255,7 @@ def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
 
     `suffix`: what follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
-    ``dyn_cm2`` or ``percent``. `quantity`: what the column holds. Raises InputError if the suffix
-    is a unit of something else.
+    ``dyn_cm2`` or ``percent``. Raises InputError if the suffix is a unit of something else.
     """
     unit = read_heading(suffix)
     if unit is None:
@@ -289,7 +283,7 @@ def heading_factor(column: str, quantity: Quantity) -> float:
     """Return the factor to SI of a column whose name is the user's; one where it names no unit.
 
     `column`: its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
-    `quantity`: what it holds. Raises InputError if the name ends in a unit of something else.
+    Raises InputError if the name ends in a unit of something else.
     """
     words = column.split("_")
     endings = ["_".join(words[i:]) for i in range(1, len(words))]

@@ -290,11 +290,9 @@ def filled(
 ) -> str:
     """Return a module: a template with the law in a notation.
 
-    `template`: with the fields below. `equation`, `notation`: what to write, and how. `nothing`: h
-    where there is none. `constants`: what holds the constants of a named law; by default a list of
-    one table for each mode. `indent`: of the lines before h. `rates`: A template of what says how
-    structure variables change, for a law that has some. `structure`: fields of the states of the
-    whole fluid, from `structure_fields`.
+    `constants`: what holds the constants of a named law; by default a list of one table for each
+    mode. `rates`: A template of what says how structure variables change, for a law that has some.
+    `structure`: fields of the states of the whole fluid, from `structure_fields`.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)

@@ -97,8 +97,8 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
 def equation_from_json(content: object, where: str = "the law") -> Equation:
     """Return the equation that JSON holds.
 
-    `content`: what `equation_to_json` returned, after a way through a file. `where`: its place, for
-    messages. Raises InputError if something in it is missing, unknown or no number; names the key.
+    `content`: what `equation_to_json` returned, after a way through a file. Raises InputError if
+    something in it is missing, unknown or no number; names the key.
     """
     again = "Write the results again with --overwrite."
     try:

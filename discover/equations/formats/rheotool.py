@@ -88,8 +88,8 @@ _OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mappin
 def rheotool_law(kind: str, value: Callable[[str], float]) -> tuple[str, dict[str, float]] | None:
     """Return the law with a name that a type of rheoTool's is, with its constants.
 
-    `kind`: entry ``type``. `value`: returns an entry, times over the relaxation time and stresses
-    over the modulus. Raises InputError if an entry that is fixed here has another value.
+    `value`: returns an entry, times over the relaxation time and stresses over the modulus. Raises
+    InputError if an entry that is fixed here has another value.
     """
     for law, (name, renamed, fixed, _) in _OF_NAME.items():
         if name != kind or (law == "rolie_poly" and value("chiMax") > 1.0):

@@ -26,8 +26,8 @@ def law_latex(
 ) -> str:
     """Return a dimensionless law as one LaTeX equation.
 
-    `terms`: h as a sum. `linear_relaxation`: whether the −σ is there beside h. `digits`:
-    significant digits of the numbers. `named`: A law with a name to whose h the terms are added.
+    `linear_relaxation`: whether the −σ is there beside h. `named`: A law with a name to whose h the
+    terms are added.
     """
     # all on the left, so that each term has the sign that tables and files give it
     text = r"\overset{\nabla}{\boldsymbol{\sigma}}"
