@@ -201,7 +201,7 @@ CATALOGUE: Mapping[str, PublicDataset] = {
             )
         },
         convert=start_up_folder,
-    ),
+    )
 }
 """Public data sets by name."""
 

@@ -8,11 +8,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import KINDS
 from discover.words import did_you_mean
 
-_VALUES = {
-    "flow": KINDS,
-    "control": ("rate", "stress"),
-    "start": ("rest", "periodic", "steady"),
-}
+_VALUES = {"flow": KINDS, "control": ("rate", "stress"), "start": ("rest", "periodic", "steady")}
 """Columns of ``runs.csv`` that say what was done, with their values; the first is the default."""
 
 _LARGEST_STEP = 1000.0

@@ -13,11 +13,7 @@ from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
-from discover.protocols.control import (
-    imposed_stress,
-    oscillations,
-    steady_rates,
-)
+from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import start_up
 

@@ -130,11 +130,7 @@ def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
 
 
 def _rate(
-    table: Table,
-    test: DeclaredTest,
-    time: np.ndarray,
-    strain: np.ndarray | None,
-    window: int,
+    table: Table, test: DeclaredTest, time: np.ndarray, strain: np.ndarray | None, window: int
 ) -> tuple[Float[np.ndarray, " n"], bool]:
     """Return the rate of a run, and whether it is derived from its strain."""
     quantity = units.SHEAR_RATE if test.flow == "shear" else units.HENCKY_RATE

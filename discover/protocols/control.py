@@ -79,11 +79,7 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
             piece, parts = np.concatenate([parts[0], piece], axis=1), []
         parts.append(np.stack(knots_between(*piece)))
     knots, levels = np.concatenate(parts, axis=1)
-    return replace(
-        measured_rate(knots, levels),
-        control="stress",
-        begins=jnp.asarray(begins),
-    )
+    return replace(measured_rate(knots, levels), control="stress", begins=jnp.asarray(begins))
 
 
 def _jumps_at_once(stress: Float[np.ndarray, " n"], size: float) -> bool:

@@ -207,10 +207,7 @@ def _positive(name: str, value: float) -> float:
 
 
 def _begun(
-    protocol: FlowProtocol,
-    knots: np.ndarray,
-    rates: np.ndarray,
-    until: float = 0.0,
+    protocol: FlowProtocol, knots: np.ndarray, rates: np.ndarray, until: float = 0.0
 ) -> FlowProtocol:
     """Return the protocol with a table of rates before it, which holds until a time in s."""
     if np.any(np.asarray(protocol.amplitudes)):

@@ -125,10 +125,7 @@ def _with_tables(
 
 
 def _observed(
-    dataset: Dataset,
-    observe: Sequence[str],
-    held_out: Sequence[str],
-    fit: Sequence[str] | None,
+    dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str] | None
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
     """Return the data with every quantity as a record, those held out, and those fitted.
 

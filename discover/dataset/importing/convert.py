@@ -374,11 +374,7 @@ _WORDS = {
 
 
 def _summary(
-    where: str,
-    readings: Readings,
-    one: Recognised,
-    made: Record,
-    said: list[str] | None = None,
+    where: str, readings: Readings, one: Recognised, made: Record, said: list[str] | None = None
 ) -> str:
     """Say what a block was taken for and its columns, unless the columns have been said before."""
     understood = ", ".join(

@@ -291,10 +291,7 @@ class MovedTests:
 
 
 def move_tests(
-    tests: Tests,
-    reference: float | None,
-    vertical: bool,
-    between: tuple[float, float] | None,
+    tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
 ) -> MovedTests:
     """Return tests moved to one temperature, with what can be said of them.
 

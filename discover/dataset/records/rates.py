@@ -20,9 +20,7 @@ _CHUNK = 50_000
 
 
 def differentiate(
-    times: Float[np.ndarray, " n"],
-    values: Float[np.ndarray, " n"],
-    window: int = DEFAULT_WINDOW,
+    times: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"], window: int = DEFAULT_WINDOW
 ) -> Float[np.ndarray, " n"]:
     """Return the time derivative of a noisy record, from a moving cubic fit.
 

@@ -65,9 +65,7 @@ def thin(
     return keep, note
 
 
-def thin_sweep(
-    angular_frequency: Float[np.ndarray, " n"],
-) -> tuple[Bool[np.ndarray, " n"], str]:
+def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
 
     Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
@@ -129,9 +127,7 @@ def thin_run(run: Run, most: int) -> Run:
 
 
 def followed_rate(
-    time: Float[np.ndarray, " n"],
-    shear_rate: Float[np.ndarray, " n"],
-    keep: Bool[np.ndarray, " n"],
+    time: Float[np.ndarray, " n"], shear_rate: Float[np.ndarray, " n"], keep: Bool[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
 

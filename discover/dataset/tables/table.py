@@ -257,9 +257,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     if not rows:
         raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
     return Table(
-        name,
-        {column: [row[i].strip() for row in rows] for i, column in enumerate(header)},
-        lines,
+        name, {column: [row[i].strip() for row in rows] for i, column in enumerate(header)}, lines
     )
 
 
