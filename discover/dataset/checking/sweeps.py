@@ -23,22 +23,18 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
         return
     low, high = float(np.min(run.strain)), float(np.max(run.strain))
     if low > _LARGEST_FIRST and high > _LARGEST:
-        yield Finding(
-            "warning",
-            "units",
-            run.name,
+        text = (
             f"The strain in {run.name} goes from {low:.3g} to {high:.3g}. If that is in per cent, "
-            "rename the column to strain_percent.",
+            "rename the column to strain_percent."
         )
+        yield Finding("warning", "units", run.name, text)
     for name, values in (("G′", run.storage_modulus), ("G″", run.loss_modulus)):
         if np.any(values <= 0.0):
-            yield Finding(
-                "warning",
-                "sign",
-                run.name,
+            text = (
                 f"{np.count_nonzero(values <= 0.0)} values of {name} in {run.name} are not "
-                "positive, as those of a passive fluid are: they are noise, or the phase is wrong.",
+                "positive, as those of a passive fluid are: they are noise, or the phase is wrong."
             )
+            yield Finding("warning", "sign", run.name, text)
     if linear is None:
         return
     omega = run.angular_frequency
@@ -56,13 +52,11 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
     at = np.log(linear.angular_frequency)
     factor = float(np.median(found / np.exp(np.interp(np.log(omega[small]), at, np.log(expected)))))
     if abs(np.log(factor)) > _APART:
-        yield Finding(
-            "warning",
-            "sweep",
-            run.name,
+        text = (
             f"At strains up to {_SMALL:g} the modulus in {run.name} is {factor:.2g} times that of "
-            "lve.csv at the same frequency: another loading, another unit, or no linear range.",
+            "lve.csv at the same frequency: another loading, another unit, or no linear range."
         )
+        yield Finding("warning", "sweep", run.name, text)
 
 
 # Modes enough for any sweep of so many points; more would only fit its noise

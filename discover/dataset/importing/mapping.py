@@ -15,44 +15,13 @@ from discover.validation import Section, validated
 MAPPING_FILE = "import.toml"
 
 QuantityName = Literal[
-    "time",
-    "shear_rate",
-    "stress",
-    "strain",
-    "N1",
-    "N2",
-    "torque",
-    "angular_velocity",
-    "angle",
-    "normal_force",
-    "omega",
-    "Gp",
-    "Gpp",
-    "hencky_rate",
-    "tensile_stress",
-    "hencky_strain",
-    "relaxation_modulus",
-    "compliance",
-    "viscosity",
-    "strain_amplitude",
-    "stress_amplitude",
-    "complex_modulus",
-    "complex_viscosity",
-    "phase_angle",
-    "loss_factor",
-    "temperature",
-    "psi1",
-    "psi2",
-    "extensional_viscosity",
-    "radius",
-    "diameter",
-    "gap",
-    "cone_angle",
-    "strain_wave",
-    "stress_wave",
-    "wave_time",
-    "point",
-]
+    "time", "shear_rate", "stress", "strain", "N1", "N2", "torque", "angular_velocity", "angle",
+    "normal_force", "omega", "Gp", "Gpp", "hencky_rate", "tensile_stress", "hencky_strain",
+    "relaxation_modulus", "compliance", "viscosity", "strain_amplitude", "stress_amplitude",
+    "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor", "temperature", "psi1",
+    "psi2", "extensional_viscosity", "radius", "diameter", "gap", "cone_angle", "strain_wave",
+    "stress_wave", "wave_time", "point",
+]  # fmt: skip
 
 TestName = Literal[
     "frequency_sweep", "amplitude_sweep", "flow_curve", "relaxation", "creep", "run", "none"
@@ -220,9 +189,8 @@ def write_mapping(mapping: Mapping) -> str:
     """Return a mapping as TOML."""
     lines = [
         "# How this folder was imported. Repeat it with",
-        "#   discover data import --mapping ",
+        f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER",
     ]
-    lines[1] += "import.toml --out FOLDER"
     if mapping.start_time_s:
         lines.append(f"start_time_s = {mapping.start_time_s!r}")
     if mapping.temperature_C is not None:

@@ -18,46 +18,31 @@ from discover.dataset.tables.units import Quantity, read_heading, read_unit, tid
 from discover.errors import InputError
 from discover.words import listed
 
-QUANTITIES: dict[str, Quantity] = {
-    "time": units.TIME,
-    "shear_rate": units.SHEAR_RATE,
-    "stress": units.SHEAR_STRESS,
-    "strain": units.STRAIN,
-    "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
-    "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE,
-    "psi1": Quantity("psi1", "psi1_Pa_s2", "Pa*s^2"),
-    "psi2": Quantity("psi2", "psi2_Pa_s2", "Pa*s^2"),
-    "torque": Quantity("torque", "torque_N_m", "N*m"),
-    "angular_velocity": Quantity("angular_velocity", "angular_velocity_rad_s", "rad/s"),
-    "angle": Quantity("angle", "angle_rad", "rad"),
-    "normal_force": Quantity("normal_force", "normal_force_N", "N"),
-    "omega": units.ANGULAR_FREQUENCY,
-    "Gp": units.STORAGE_MODULUS,
-    "Gpp": units.LOSS_MODULUS,
-    "hencky_rate": units.HENCKY_RATE,
-    "tensile_stress": units.TENSILE_STRESS,
-    "hencky_strain": units.HENCKY_STRAIN,
-    "extensional_viscosity": Quantity(
-        "extensional_viscosity", "extensional_viscosity_Pa_s", "Pa*s"
-    ),
-    "relaxation_modulus": RELAXATION_MODULUS,
-    "compliance": COMPLIANCE,
-    "viscosity": Quantity("viscosity", "viscosity_Pa_s", "Pa*s"),
-    "strain_amplitude": Quantity("strain_amplitude", "strain_amplitude", ""),
-    "stress_amplitude": Quantity("stress_amplitude", "stress_amplitude_Pa", "Pa"),
-    "complex_modulus": Quantity("complex_modulus", "complex_modulus_Pa", "Pa"),
-    "complex_viscosity": Quantity("complex_viscosity", "complex_viscosity_Pa_s", "Pa*s"),
-    "phase_angle": Quantity("phase_angle", "phase_angle_rad", "rad"),
-    "loss_factor": Quantity("loss_factor", "loss_factor", ""),
+_QUANTITIES: dict[str, Quantity | str] = {
+    "time": units.TIME, "shear_rate": units.SHEAR_RATE, "stress": units.SHEAR_STRESS,
+    "strain": units.STRAIN, "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
+    "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE, "psi1": "Pa*s^2", "psi2": "Pa*s^2",
+    "torque": "N*m", "angular_velocity": "rad/s", "angle": "rad", "normal_force": "N",
+    "omega": units.ANGULAR_FREQUENCY, "Gp": units.STORAGE_MODULUS, "Gpp": units.LOSS_MODULUS,
+    "hencky_rate": units.HENCKY_RATE, "tensile_stress": units.TENSILE_STRESS,
+    "hencky_strain": units.HENCKY_STRAIN, "extensional_viscosity": "Pa*s",
+    "relaxation_modulus": RELAXATION_MODULUS, "compliance": COMPLIANCE, "viscosity": "Pa*s",
+    "strain_amplitude": "", "stress_amplitude": "Pa", "complex_modulus": "Pa",
+    "complex_viscosity": "Pa*s", "phase_angle": "rad", "loss_factor": "",
     "temperature": Quantity("temperature", "temperature_C", ""),
-    "radius": Quantity("radius", "radius_m", "m"),
-    "diameter": Quantity("diameter", "diameter_m", "m"),
-    "gap": Quantity("gap", "gap_m", "m"),
-    "cone_angle": Quantity("cone_angle", "cone_angle_rad", "rad"),
-    "strain_wave": Quantity("strain_wave", "strain_wave", ""),
-    "stress_wave": Quantity("stress_wave", "stress_wave_Pa", "Pa"),
-    "wave_time": Quantity("wave_time", "wave_time_s", "s"),
-    "point": Quantity("point", "point", ""),
+    "radius": "m", "diameter": "m", "gap": "m", "cone_angle": "rad", "strain_wave": "",
+    "stress_wave": "Pa", "wave_time": "s", "point": "",
+}  # fmt: skip
+"""What a column may hold: a quantity of data folders, or the SI unit of one of exports alone."""
+
+
+def _quantity(key: str, unit: str) -> Quantity:
+    suffix = re.sub(r"[*/]", "_", unit).replace("^", "")
+    return Quantity(key, "_".join(filter(None, (key, suffix))), unit)
+
+
+QUANTITIES: dict[str, Quantity] = {
+    key: _quantity(key, one) if isinstance(one, str) else one for key, one in _QUANTITIES.items()
 }
 
 
