@@ -118,7 +118,7 @@ plt.show()
 # tested. It can be read back and simulated.
 
 # %%
-from discover.equations.read import choose_law, read_result_laws
+from discover.equations.files import choose_law, read_result_laws
 
 law = choose_law(read_result_laws(out / "noise_10"))
 law

@@ -9,8 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
 
-from discover.batch.progress import now_and_then
-from discover.batch.status import StudyStatus
+from discover.batch.status import StudyStatus, now_and_then
 from discover.batch.workers import Job
 from discover.errors import InputError
 
@@ -24,24 +23,12 @@ def run_on_cluster(
 ) -> None:
     """Run jobs side by side.
 
-    Parameters
-    ----------
-    run
-        What a worker calls with a job, and with a function for its progress.
-    jobs
-        Paths in them must mean the same in the workers as here.
-    scheduler
-        Address of the scheduler. For ``tls://`` the certificates are those that dask's own settings
-        name, ``distributed.comm.tls``.
-    say
-        Called with the position of a job, what is going on in it, and the fraction done.
-    end
-        Called with the position of a job that has ended, and how.
-
-    Raises
-    ------
-    InputError
-        If dask is not installed, or no scheduler answers at the address.
+    `run`: what a worker calls with a job, and with a function for its progress. `jobs`: paths in
+    them must mean the same in the workers as here. `scheduler`: address of the scheduler. For
+    ``tls://`` the certificates are those that dask's own settings name, ``distributed.comm.tls``.
+    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
+    called with the position of a job that has ended, and how. Raises InputError if dask is not
+    installed, or no scheduler answers at the address.
     """
     try:
         from distributed import as_completed

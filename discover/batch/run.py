@@ -7,8 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 from discover.batch.cluster import run_on_cluster
-from discover.batch.progress import BatchProgress
-from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.status import BatchProgress, BatchResult, StudyStatus
 from discover.batch.summary import STATES, SUMMARY_FILES, Summary
 from discover.batch.tasks import Note, nothing_to_note, run_close_loop, run_compare
 from discover.batch.workers import run_in_workers
@@ -36,23 +35,11 @@ def run_batch(
     A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
     one with both does both.
 
-    Parameters
-    ----------
-    workers
-        Processes on this machine; with 1, everything happens in this one.
-    scheduler
-        Address of a dask scheduler to use instead; see `discover.batch.cluster`.
-    seed, overwrite
-        As in `discover.batch.tasks.run_compare`.
-    progress
-        Called with what is going on and the fraction done.
-    note
-        Called with every study that can be read, before the first runs.
-
-    Raises
-    ------
-    InputError
-        If two studies would write to one folder, or `out` cannot be written to.
+    `workers`: processes on this machine; with 1, everything happens in this one. `scheduler`:
+    address of a dask scheduler to use instead; see `discover.batch.cluster`. `progress`: called
+    with what is going on and the fraction done. `note`: called with every study that can be read,
+    before the first runs. Raises InputError if two studies would write to one folder, or `out`
+    cannot be written to.
     """
     make_folder(out)
     if not overwrite:
@@ -92,10 +79,7 @@ def folder_names(paths: Sequence[Path]) -> list[str]:
     Names that differ by upper and lower case alone are one name: on many disks they are. A study
     that has the name of one of the batch's own files gets ``study-`` before it.
 
-    Raises
-    ------
-    InputError
-        If two studies still have one name.
+    Raises InputError if two studies still have one name.
     """
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)

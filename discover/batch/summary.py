@@ -6,8 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from threading import RLock, Timer
 
-from discover.batch.rows import StudyRow, read_row
-from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.status import BatchResult, StudyRow, StudyStatus, read_row
 from discover.errors import InputError
 from discover.study.atomic import write_text
 
@@ -20,12 +19,7 @@ _PAUSE = 5.0  # seconds for which news are gathered before the page is written a
 class Summary:
     """Writes ``index.html``, ``table.csv`` and ``batch.json``.
 
-    Parameters
-    ----------
-    out
-        Folder of the batch.
-    jobs
-        Name and task of every study, in their order.
+    `out`: folder of the batch. `jobs`: name and task of every study, in their order.
     """
 
     def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):

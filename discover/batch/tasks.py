@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import as_file, files
 from pathlib import Path
 
 import numpy as np
@@ -34,14 +35,9 @@ def nothing_to_note(study: Study) -> None:
 class TaskResult:
     """Where a task's results lie, and what they say in a few lines.
 
-    Attributes
-    ----------
-    report, json_file
-        The page and the JSON.
-    text
-        The verdict, for a terminal.
-    was_complete
-        Whether everything was there already.
+    `report`, `json_file`: the page and the JSON.
+    `text`: the verdict, for a terminal.
+    `was_complete`: whether everything was there already.
     """
 
     report: Path
@@ -162,7 +158,7 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note, tolerance)
     if there is not None:
         return there
-    from discover.dataset.conditions import material_and_temperature
+    from discover.dataset.run_table import material_and_temperature
     from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
     from discover.report.overlay import loop_overlays, read_overlays
@@ -209,3 +205,18 @@ def _chosen(result) -> str:
 def _beside(model) -> str:
     """Return the effects of the declared model, in words."""
     return f", beside them {', '.join(e.text for e in model.effects)}" if model.effects else ""
+
+
+def run_demo(
+    out: Path, seed: int | None, overwrite: bool, progress: Progress | None
+) -> dict[str, Path]:
+    """Run the demonstration and return its pages by title.
+
+    `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
+    """
+    part = by_shares(progress, {"comparison": 0.9, "loop": 0.1})
+    studies = files("discover.batch") / "demo_studies"
+    with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:
+        first = run_compare(comparison, out, seed, overwrite, part("comparison"))
+        second = run_close_loop(loop, out / "loop", seed, overwrite, part("loop"))
+    return {"Comparison of two learners": first.report, "Closed loop": second.report}

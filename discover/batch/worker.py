@@ -27,8 +27,8 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asks hears Ctrl-C
     use_one_thread_from_the_start()
     keep_out_of_the_working_directory()
-    from discover.batch.progress import now_and_then
     from discover.batch.run import run_one
+    from discover.batch.status import now_and_then
 
     # what a library prints must not stand between the lines
     lines = os.fdopen(os.dup(1), "w", encoding="ascii")

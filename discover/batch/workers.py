@@ -37,16 +37,8 @@ def run_in_workers(
     A study whose worker dies goes to another, where it continues from its last finished part.
     Where no worker can be started, the studies run in this process, one after the other.
 
-    Parameters
-    ----------
-    run
-        What runs a job in this process.
-    workers
-        Processes to start.
-    say
-        Called with the position of a job, what is going on in it, and the fraction done.
-    end
-        Called with the position of a job that has ended, and how.
+    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
+    called with the position of a job that has ended, and how.
     """
     team = _Team(run)
     with on_stop(team.stop), ThreadPoolExecutor(workers) as threads:

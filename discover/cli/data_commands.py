@@ -157,8 +157,7 @@ def shift(
 ) -> None:
     """Move linear tests at several temperatures to one, and say how well that holds."""
     from discover.dataset.linear.linear_tests import read_linear_tests
-    from discover.dataset.linear.moving import move_tests
-    from discover.dataset.linear.superposition import shift_table
+    from discover.dataset.linear.superposition import move_tests, shift_table
     from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
     from discover.report.data.linear_agreement import agreement_words
     from discover.report.data.superposition import superposition_page, superposition_words

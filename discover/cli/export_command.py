@@ -44,8 +44,7 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
-    from discover.equations.read import choose_law, read_result_laws
-    from discover.equations.write import write_equation
+    from discover.equations.files import choose_law, read_result_laws, write_equation
     from discover.errors import InputError
     from discover.precision import enable_x64
     from discover.study.atomic import make_folder, replaceable, write_text

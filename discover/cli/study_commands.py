@@ -101,7 +101,7 @@ def demo(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
-    from discover.batch.demo import run_demo
+    from discover.batch.tasks import run_demo
 
     with progress_bar(quiet) as report:
         pages = run_demo(out, seed, overwrite, report)

@@ -6,7 +6,7 @@ from dataclasses import replace
 from discover.comparison.flows import QUANTITIES, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.equations import Equation, Tested, combined, law_parts
-from discover.equations.box import box_of, flow_numbers
+from discover.equations.equation import box_of, flow_numbers
 from discover.errors import InputError
 from discover.learners.registry import learner_title
 from discover.study.declared_model import DeclaredModel

@@ -12,10 +12,12 @@ from discover.dataset.run import Run, sizes_of
 from discover.laws.multimode import Fluid
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
-from discover.protocols.paper import TEST_DURATION, TRAINING_DURATION, paper_test_protocols
 from discover.protocols.protocol import (
+    TEST_DURATION,
+    TRAINING_DURATION,
     FlowProtocol,
     oscillatory_shear,
+    paper_test_protocols,
     recorded_at,
     shear_rates,
     strains_in_table,

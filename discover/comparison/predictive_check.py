@@ -7,8 +7,8 @@ import numpy as np
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.comparison.outcome import LearnerOutcome
 from discover.dataset.records.repeats import repeats_among
+from discover.protocols.between_samples import sampling_interval
 from discover.protocols.kinematics import FOLLOWED
-from discover.protocols.sampling import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.data import StudyData

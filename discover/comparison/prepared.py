@@ -5,8 +5,7 @@ from dataclasses import replace
 
 from discover.dataset import Run
 from discover.dataset.material_functions import as_compared
-from discover.dataset.records.spikes import without_spikes
-from discover.dataset.records.thinning import thin_run
+from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.errors import InputError
 from discover.learners.runs import waiting
 from discover.study.data import StudyData

@@ -28,7 +28,7 @@ from discover.comparison.statements import make_statements
 from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.comparison.training import study_library
 from discover.comparison.truth import true_terms
-from discover.dataset.conditions import material_and_temperature
+from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.results.result import LearnerResult

@@ -8,11 +8,7 @@ from discover.errors import InputError
 from discover.protocols.kinematics import KINDS
 from discover.words import did_you_mean
 
-_VALUES = {
-    "flow": KINDS,
-    "control": ("rate", "stress"),
-    "start": ("rest", "periodic", "steady"),
-}
+_VALUES = {"flow": KINDS, "control": ("rate", "stress"), "start": ("rest", "periodic", "steady")}
 """Columns of ``runs.csv`` that say what was done, with their values; the first is the default."""
 
 _LARGEST_STEP = 1000.0
@@ -23,16 +19,10 @@ _LARGEST_STEP = 1000.0
 class DeclaredTest:
     """What a line of ``runs.csv`` says was done.
 
-    Attributes
-    ----------
-    flow, control, start
-        As in the columns of these names.
-    step_strain
-        Strain put on before t = 0; zero where there was none.
-    step_time
-        Time over which it was put on, in s; zero is at once.
-    rate_before
-        Rate of the steady flow before t = 0, in 1/s.
+    `flow`, `control`, `start`: as in the columns of these names.
+    `step_strain`: strain put on before t = 0; zero where there was none.
+    `step_time`: time over which it was put on, in s; zero is at once.
+    `rate_before`: rate of the steady flow before t = 0, in 1/s.
     """
 
     flow: str
@@ -46,20 +36,9 @@ class DeclaredTest:
 def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
     """Return which test the run on a line of ``runs.csv`` is.
 
-    Parameters
-    ----------
-    index
-        ``runs.csv``.
-    row
-        Counted from 0.
-    rate_before
-        Rate of the steady flow before the run, in 1/s, where the study says so.
-
-    Raises
-    ------
-    InputError
-        If a column that says what was done holds something that it cannot, or two contradict each
-        other.
+    `index`: ``runs.csv``. `row`: counted from 0. `rate_before`: rate of the steady flow before the
+    run, in 1/s, where the study says so. Raises InputError if a column that says what was done
+    holds something that it cannot, or two contradict each other.
     """
     flow, control, start = (_value(index, row, column) for column in _VALUES)
     step, time = (_number(index, row, column) or 0.0 for column in ("step_strain", "step_time_s"))
@@ -86,17 +65,8 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
 def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
     """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
 
-    Parameters
-    ----------
-    index, row
-        As in `declared_test`.
-    rate_before
-        Whether it is known from which steady flow each run starts.
-
-    Raises
-    ------
-    InputError
-        As `declared_test`.
+    `rate_before`: whether it is known from which steady flow each run starts. Raises InputError as
+    `declared_test`.
     """
     if declared_test(index, row, None).start == "steady" and not rate_before:
         return (

@@ -9,7 +9,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from discover.dataset.linear.mode_search import ModeFit, ModeSearch, relative_moduli
-from discover.dataset.tables.columns import as_column
+from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.statistics.noise.independent_samples import independent_samples
 from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability

@@ -12,8 +12,8 @@ from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.records.differentiation import DEFAULT_WINDOW
-from discover.dataset.records.sequence import in_sequence
+from discover.dataset.records.rates import DEFAULT_WINDOW
+from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units
@@ -42,18 +42,10 @@ def folder_roots(base: str | Path | None = None) -> list[Path]:
 def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     """Return the path of a data folder.
 
-    Parameters
-    ----------
-    folder
-        Path of the folder. A relative one is looked for beside the study file, then in the
-        folder named by the environment variable DISCOVER_DATA, then in the working directory.
-    base
-        Folder of the study file, if there is one.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, or it has none of `DATA_FILES`.
+    `folder`: path of the folder. A relative one is looked for beside the study file, then in the
+    folder named by the environment variable DISCOVER_DATA, then in the working directory. `base`:
+    folder of the study file, if there is one. Raises InputError if there is no such folder, or it
+    has none of `DATA_FILES`.
     """
     if not isinstance(folder, str | os.PathLike):
         raise InputError(
@@ -223,10 +215,7 @@ def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"]
     The study names the column; without it, one whose name begins with ``rate_before`` holds the
     rates of those runs that are declared to start from a steady flow.
 
-    Raises
-    ------
-    InputError
-        If the column is missing or holds something other than numbers.
+    Raises InputError if the column is missing or holds something other than numbers.
     """
     if column is not None:
         rates = read_column(index, "rate_before", column)
@@ -251,10 +240,8 @@ def _provenance(root: Path) -> str:
 def read_index(root: Path) -> Table:
     """Return ``runs.csv``, checked for its column ``file``; no lines where there is no such file.
 
-    Raises
-    ------
-    InputError
-        If the column is missing, or a name in it is empty, repeated or outside the folder.
+    Raises InputError if the column is missing, or a name in it is empty, repeated or outside the
+    folder.
     """
     if not os.path.lexists(root / INDEX_FILE):
         return Table(INDEX_FILE, {"file": []}, [])
@@ -294,10 +281,7 @@ def _is_inside(root: Path, name: str) -> bool:
 def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
     """Return the clock factor of every run; ones if no column is named.
 
-    Raises
-    ------
-    InputError
-        If the column is missing or holds something other than positive numbers.
+    Raises InputError if the column is missing or holds something other than positive numbers.
     """
     if column is None:
         return np.ones(len(index))
@@ -314,10 +298,7 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
 def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs"]:
     """Return the numbers in a column of ``runs.csv`` that a key of the study names.
 
-    Raises
-    ------
-    InputError
-        If the column is missing or holds something other than numbers.
+    Raises InputError if the column is missing or holds something other than numbers.
     """
     if column not in index.columns:
         raise InputError(
@@ -330,10 +311,7 @@ def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs
 def find_sweep(root: Path) -> LinearSweep | None:
     """Return the linear sweep of a folder, or None if it has none.
 
-    Raises
-    ------
-    InputError
-        If the file is wrong, or is a link to outside the folder.
+    Raises InputError if the file is wrong, or is a link to outside the folder.
     """
     if not os.path.lexists(root / SWEEP_FILE):
         return None
@@ -347,10 +325,7 @@ def find_sweep(root: Path) -> LinearSweep | None:
 def read_sweep(path: Path) -> LinearSweep:
     """Return a linear frequency sweep, sorted by frequency; one of very many is thinned.
 
-    Raises
-    ------
-    InputError
-        If the file is wrong, or a frequency or modulus is not positive.
+    Raises InputError if the file is wrong, or a frequency or modulus is not positive.
     """
     table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS

@@ -13,11 +13,7 @@ from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table
 from discover.errors import InputError
-from discover.protocols.control import (
-    imposed_stress,
-    oscillations,
-    steady_rates,
-)
+from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import start_up
 
@@ -34,12 +30,8 @@ def read_material_functions(
 ) -> tuple[dict[str, Run], dict[str, str]]:
     """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
 
-    Parameters
-    ----------
-    runs
-        Files that ``runs.csv`` names: they are runs, whatever they are called.
-    frequency
-        In rad/s, of an amplitude sweep that does not give its own.
+    `runs`: files that ``runs.csv`` names: they are runs, whatever they are called. `frequency` in
+    rad/s, of an amplitude sweep that does not give its own.
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():
@@ -119,15 +111,7 @@ def read_over_time(
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     """Return times in s and the material function of a table over time.
 
-    Parameters
-    ----------
-    kind
-        ``relaxation``, in Pa, or ``creep``, in 1/Pa.
-
-    Raises
-    ------
-    InputError
-        If it is wrong.
+    `kind`: ``relaxation``, in Pa, or ``creep``, in 1/Pa. Raises InputError if it is wrong.
     """
     quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
     table = read_table(path)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.kind_of_test import DeclaredTest, declared_test
-from discover.dataset.records.differentiation import DEFAULT_WINDOW, differentiate
+from discover.dataset.records.rates import DEFAULT_WINDOW, differentiate
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation, wave_of
@@ -49,17 +49,8 @@ def read_run(
 ) -> Run:
     """Return the run on one line of ``runs.csv``.
 
-    Parameters
-    ----------
-    root, index, row
-        The folder, its ``runs.csv``, and the line, counted from 0.
-    clock_factor, rate_is_measured, rate_window, rate_before
-        As in `discover.dataset.load.load_dataset`, for this run.
-
-    Raises
-    ------
-    InputError
-        If its file is missing or wrong.
+    `root`, `index`, `row`: the folder, its ``runs.csv``, and the line, counted from 0. Raises
+    InputError if its file is missing or wrong.
     """
     name = index.columns["file"][row]
     table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
@@ -139,11 +130,7 @@ def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
 
 
 def _rate(
-    table: Table,
-    test: DeclaredTest,
-    time: np.ndarray,
-    strain: np.ndarray | None,
-    window: int,
+    table: Table, test: DeclaredTest, time: np.ndarray, strain: np.ndarray | None, window: int
 ) -> tuple[Float[np.ndarray, " n"], bool]:
     """Return the rate of a run, and whether it is derived from its strain."""
     quantity = units.SHEAR_RATE if test.flow == "shear" else units.HENCKY_RATE

@@ -10,16 +10,36 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.loading import Loading
-from discover.dataset.tables.columns import as_column
+from discover.dataset.tables.table import as_column
 from discover.errors import InputError
 from discover.notebook_view import NotebookView
+from discover.protocols.between_samples import RateStep
 from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
-from discover.protocols.rate_steps import RateStep
 from discover.statistics.projection import rms
+
+LARGEST = 0.1
+"""Relative error of one run above which two do not differ by their loading: fillings and trimmings
+of one sample differ by some per cent, and what differs by more, as a run told in minutes does, may
+not excuse what a law leaves of all others."""
+
+
+@dataclass(frozen=True)
+class Loading:
+    """By how much one loading of a sample may differ from another.
+
+    Filling, trimming and temperature differ by some per cent, as a factor on every stress that is
+    recorded of one loading.
+
+    `deviation`: standard deviation of the factor.
+    `noise`: relative noise of the record, where it is known.
+    """
+
+    deviation: float
+    noise: float | None = None
+
 
 SLOWEST_RATE = 1e-12
 """In 1/s; slower is rest, for any instrument and any experimenter."""

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from jaxtyping import Real
 
-from discover.equations.named_part import NamedPart
-from discover.equations.spelling.latex import SEPARATOR, law_latex
-from discover.equations.spelling.mathml import law_element
-from discover.equations.state_part import StatePart
+from discover.equations.parts import NamedPart, StatePart
+from discover.equations.spelling.markup import SEPARATOR, law_element, law_latex
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import law_of_terms
@@ -235,3 +234,64 @@ def mean_relaxation_time(
 def _span(bounds: Interval) -> str:
     low, high = (f"{value:.3g}" for value in bounds)
     return low if low == high else f"{low} to {high}"
+
+
+def flow_numbers(
+    times: Real[np.ndarray, " n"],
+    shear_rate: Real[np.ndarray, " n"],
+    relaxation_time: float,
+    frequency: float | None = None,
+) -> tuple[float, float]:
+    """Return Wi and De of one flow.
+
+    Wi = λ̄ max|γ̇|. De = λ̄ω in oscillation and λ̄/T in a flow of length T that does not oscillate.
+
+    `times`, `shear_rate` in s and 1/s. `relaxation_time`: λ̄ in s. `frequency`: ω in rad/s where
+    known; otherwise from the time between changes of sign of the rate.
+    """
+    length = float(times[-1]) if times[-1] > 0 else 1.0
+    if frequency is None:
+        flowing = np.abs(shear_rate) > 0
+        turned = np.flatnonzero(np.diff(np.sign(shear_rate[flowing])))
+        at = times[flowing][turned]
+        frequency = 1.0 / length
+        if at.size >= 2:
+            frequency = np.pi * (at.size - 1) / float(at[-1] - at[0])
+    return relaxation_time * float(np.max(np.abs(shear_rate))), relaxation_time * frequency
+
+
+def box_of(numbers: Iterable[tuple[float, float]]) -> Box | None:
+    """Return the smallest box that holds all flows, given by Wi and De; None without flows."""
+    pairs = list(numbers)
+    if not pairs:
+        return None
+    weissenberg, deborah = zip(*pairs, strict=True)
+    return Box((min(weissenberg), max(weissenberg)), (min(deborah), max(deborah)))
+
+
+class HasEquation:
+    """A result with an `equation`, and what follows from it."""
+
+    def equation(self) -> Equation:
+        """Return the law as an equation."""
+        raise NotImplementedError
+
+    def sympy(self) -> "sympy.Expr":
+        """Return the extra term h as a SymPy expression over non-commuting tensors.
+
+        Raises
+        ------
+        InputError
+            If the law is no sum of library terms.
+        """
+        return self.equation().sympy()
+
+    def latex(self) -> str:
+        """Return the dimensionless law as one LaTeX equation.
+
+        Raises
+        ------
+        InputError
+            If the law is no sum of library terms.
+        """
+        return self.equation().latex()

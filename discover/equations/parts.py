@@ -1,18 +1,287 @@
-"""Any law as a law with a name and a sum of terms, where it is one."""
+"""Laws in parts: a law with a name, a sum of terms, states of the whole fluid."""
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from itertools import permutations
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array, Float
 
-from discover.equations.augmented_law import AugmentedLaw
-from discover.equations.from_law import combined, law_terms
-from discover.equations.named_part import NamedPart
+from discover.effects import ConstitutiveEffect, StateEffect, WrittenState, known_effects
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    AbstractExtendedLaw,
+    State,
+    as_state,
+    stress_in,
+)
 from discover.laws.each_mode import LawOfEachMode, law_of_mode
-from discover.laws.registry import LAWS, name_of
+from discover.laws.registry import LAWS, make_law, name_of
+from tensor_library.algebra import Symmetric
+from tensor_library.closed_forms import CLOSED_FORMS
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.law_terms import LawTerm
+
+
+@dataclass(frozen=True)
+class NamedPart:
+    """A law by its name.
+
+    `law`: key of `discover.laws.LAWS`.
+    `constants`: its parameters, dimensionless: once for all modes, or once for each.
+
+    Raises InputError if there is no such law, or a parameter is missing, unknown or outside its
+    range.
+
+    Examples
+    --------
+    >>> NamedPart("saramito", ({"yield_strain": 0.3}, {"yield_strain": 0.1})).differing
+    ('yield_strain',)
+    """
+
+    law: str
+    constants: tuple[Mapping[str, float], ...]
+
+    def __post_init__(self):
+        if not self.constants:
+            raise InputError(f"The law {self.law!r} needs its constants, at least once.")
+        for one in self.constants:
+            make_law(self.law, one)
+
+    def of_mode(self, mode: int) -> Mapping[str, float]:
+        """Return the constants of a mode, counted from 0."""
+        return self.constants[mode if len(self.constants) > 1 else 0]
+
+    def built(self) -> AbstractConstitutiveLaw:
+        """Return the law, ready to simulate.
+
+        Raises InputError if the constants differ from mode to mode.
+        """
+        if self.differing:
+            raise InputError(
+                f"{', '.join(self.differing)} differs from one relaxation mode to the next, so "
+                "there is not one law for all. Take one mode at a time: equation.mode(0).law()."
+            )
+        return make_law(self.law, self.constants[0])
+
+    @property
+    def differing(self) -> tuple[str, ...]:
+        """Names of the constants that differ from mode to mode."""
+        first = self.constants[0]
+        return tuple(n for n in first if any(one[n] != first[n] for one in self.constants))
+
+    @property
+    def is_written(self) -> bool:
+        """Whether somebody said how the law is written."""
+        return LAWS[self.law].written is not None
+
+    @property
+    def function(self) -> IsotropicFunction:
+        """The law written out.
+
+        Raises InputError if nobody said how it is written.
+        """
+        written = LAWS[self.law].written
+        if written is None:
+            raise InputError(
+                f"Nobody said how the law {self.law!r} is written, so it cannot be exported in "
+                "this format. Give register_law its `written`, or use --format json."
+            )
+        return written()
+
+
+@dataclass(frozen=True)
+class StatePart:
+    """An effect with a state by its name.
+
+    The state is one for all modes. It multiplies their stress, or their relaxation times wherever
+    these occur in their equations.
+
+    `effect`: name of the effect, one of `dc.effects()` with a state.
+    `values`: its parameters by name, in their units.
+
+    Raises InputError if there is no such effect, it has no state or nobody said how it is written,
+    or a parameter is missing, unknown or outside its range.
+
+    Examples
+    --------
+    >>> StatePart("thixotropy", {"breakdown": 0.2, "build_up_time": 5.0}).at_rest
+    (1.0,)
+    """
+
+    effect: str
+    values: Mapping[str, float]
+
+    def __post_init__(self):
+        self.written  # noqa: B018  # whatever is wrong is said here
+
+    @property
+    def own(self) -> StateEffect:
+        """The effect."""
+        (known,) = known_effects({self.effect: dict(self.values)}, "the law's states")
+        if not isinstance(known.effect, StateEffect) or any(v is None for v in known.values):
+            raise InputError(f"The effect {self.effect!r} has no state, or a parameter no value.")
+        return known.effect
+
+    @property
+    def written(self) -> WrittenState:
+        """The equation of the state."""
+        written = self.own.written()
+        if written is None:
+            raise InputError(
+                f"Nobody said how the state of the effect {self.effect!r} is written, so the law "
+                "cannot be written out. Give its class the method `written`."
+            )
+        return written
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name of each level of the state."""
+        return self.own.level_names
+
+    @property
+    def at_rest(self) -> tuple[float, ...]:
+        """Each level at rest."""
+        return (self.own.rest,) * self.own.levels
+
+    def spell(
+        self, spelled: Callable[[object, Mapping[str, str]], str], letters: Mapping[str, str]
+    ) -> tuple[list[str], str, str]:
+        """Return the rates of change, and the factors on stress and times, as text.
+
+        `spelled`: writes an expression with given texts for its scalars. `letters`: the texts of
+        the parameters, the levels, ``shear_rate`` and ``shear_stress``.
+        """
+        import sympy
+
+        written = self.written
+        factors = (written.modulus_factor, written.time_factor)
+        modulus, time = (spelled(sympy.sympify(one), letters) for one in factors)
+        return [spelled(rate, letters) for rate in written.rates], modulus, time
+
+
+EXPONENTIAL = f"{CLOSED_FORMS.present['exp'].spelling}*sigma"
+
+
+def law_terms(law: AbstractConstitutiveLaw) -> tuple[LawTerm, ...]:
+    """Return h of a law as a sum of terms."""
+    terms = law.as_terms()
+    if terms is None:
+        raise InputError(
+            f"A law of the kind {type(law).__name__} is no sum of library terms, so it cannot be "
+            "written out. Register it under a name with dc.register_law, or give the class the "
+            "method as_terms if it is such a sum."
+        )
+    return combined(terms)
+
+
+def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[LawTerm, ...]:
+    """Return what a constitutive effect adds to h as a sum of terms.
+
+    `values`: its parameters in their order, shape (p,).
+    """
+    terms = effect.as_terms([float(value) for value in values])
+    if terms is None:
+        raise InputError(
+            f"What the effect {effect.name!r} adds is no sum of library terms, so the law cannot "
+            "be written out. Its equation and parameters are in loop.json and equations.tex."
+        )
+    return terms
+
+
+def combined(terms: tuple[LawTerm, ...]) -> tuple[LawTerm, ...]:
+    """Return the sum with equal terms added up, in the order of their first appearance."""
+    found: dict[tuple, LawTerm] = {}
+    for term in terms:
+        key = (term.term, tuple(sorted(term.inner.items())))
+        if key in found:
+            total = found[key].coefficient + term.coefficient
+            found[key] = LawTerm(term.term, total, term.inner)
+        else:
+            found[key] = term
+    return tuple(found.values())
+
+
+class AugmentedLaw(AbstractExtendedLaw):
+    """A law with the extra terms of constitutive effects.
+
+    `base`: the declared law.
+    `linear_relaxation`: as in the declared law.
+    """
+
+    base: AbstractConstitutiveLaw
+    values: tuple[Float[Array, " _"], ...]
+    effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def trace_relaxation(self, stress: State) -> Float[Array, ""]:
+        """Return that of the declared law: at rest what an effect adds may have no derivative."""
+        return self.base.trace_relaxation(stress)
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h of the declared law plus the terms of the effects."""
+        extra, own = self.base.extra_term(stress, rate), stress_in(stress)
+        for effect, values in zip(self.effects, self.values, strict=True):
+            extra = extra + as_state(effect.extra_term(jnp.asarray(values), own, rate), stress)
+        return extra
+
+    def as_terms(self) -> tuple[LawTerm, ...] | None:
+        """Return the terms of the declared law, then those of the effects.
+
+        None if the declared law is no sum of library terms.
+
+        Raises InputError if what an effect adds is none.
+        """
+        below = self.base.as_terms()
+        return None if below is None else below + self._added_terms()
+
+    def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
+        """Return the declared law, and the terms of the effects.
+
+        Raises InputError if what an effect adds is no sum of library terms.
+        """
+        core, terms = self.base.split()
+        return core, terms + self._added_terms()
+
+    def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
+        """Return the law with an effect made part of the declared one, and that one's constant.
+
+        None where no law with a name has the term of the effect alone, with its amplitude for the
+        only constant, as Giesekus's law has its mobility; or where the declared law has terms.
+        """
+        effects = [effect.name for effect in self.effects]
+        if name not in effects or self.base.as_terms() != ():
+            return None
+        at = effects.index(name)
+        value = self.values[at][0]
+        alone = effect_terms(self.effects[at], np.asarray(self.values[at]))
+        for law in LAWS.values():
+            if len(law.parameters) != 1 or len(self.values[at]) != 1:
+                continue
+            built = law.build(value)
+            if (built.as_terms() or ()) and law_terms(built) == alone:
+                values = self.values[:at] + self.values[at + 1 :]
+                others = self.effects[:at] + self.effects[at + 1 :]
+                whole = AugmentedLaw(
+                    base=built,
+                    values=values,
+                    effects=others,
+                    linear_relaxation=self.linear_relaxation,
+                )
+                return whole, next(iter(law.parameters))
+        return None
+
+    def _added_terms(self) -> tuple[LawTerm, ...]:
+        return tuple(
+            term
+            for effect, values in zip(self.effects, self.values, strict=True)
+            for term in effect_terms(effect, np.asarray(values))
+        )
+
 
 _Named = tuple[str, dict[str, float]]
 
@@ -22,10 +291,7 @@ def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[Law
 
     A law with constants of its own in each mode needs a name.
 
-    Raises
-    ------
-    InputError
-        If it is neither.
+    Raises InputError if it is neither.
     """
     if law.as_terms() is not None:
         return None, law_terms(law)

@@ -10,7 +10,7 @@ from discover.dataset import Run
 from discover.forward import AugmentedModel, Batch
 from discover.inference.evidence import criterion, evidence
 from discover.inference.least_squares import NO_PRIOR, Fit, Prior, best_of, fit_batch
-from discover.protocols.sampling import sampling_interval
+from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation, judged_cost, summarise
 

@@ -10,7 +10,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import DeclaredModel
-from discover.protocols.rate_steps import steps_between_samples
+from discover.protocols.between_samples import steps_between_samples
 
 _MOST = 40
 """Steps whose instants are fitted, at most: each costs a constant."""

@@ -20,13 +20,16 @@ from discover.laws.multimode import Fluid
 from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
 from discover.linear_algebra_threads import in_one_thread
 from discover.programs import compiled
-from discover.protocols.paper import (
+from discover.protocols.protocol import (
     TEST_DURATION,
     TRAINING_DURATION,
+    FlowProtocol,
+    in_flow,
     paper_test_protocols,
     paper_training_protocols,
+    stack_protocols,
+    start_up,
 )
-from discover.protocols.protocol import FlowProtocol, in_flow, stack_protocols, start_up
 from discover.simulate.solve import SimulationError, simulate
 
 _TOLERANCE, _MOST_STEPS = 1e-10, 200

@@ -20,7 +20,7 @@ from discover.learners.results.term_tables import estimates_of
 from discover.learners.runs import as_runs
 from discover.learners.settings import ARITHMETIC, check_settings
 from discover.linear_algebra_threads import in_one_thread
-from discover.protocols.sampling import sampling_interval
+from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
 from discover.summary_view import Estimate, SummaryView
 from tensor_library.law_terms import spell

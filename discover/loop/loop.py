@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discover.dataset import Dataset, Run
-from discover.dataset.records.own_loadings import with_loadings
+from discover.dataset.records.repeats import with_loadings
 from discover.effects import AbstractEffect, ConstitutiveEffect
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel

@@ -21,8 +21,7 @@ from discover.equations import (
     equation_to_json,
     law_parts,
 )
-from discover.equations.box import box_of, flow_numbers
-from discover.equations.equation import mean_relaxation_time
+from discover.equations.equation import box_of, flow_numbers, mean_relaxation_time
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests

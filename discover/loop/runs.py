@@ -7,10 +7,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Dataset, Run
-from discover.dataset.records.copies import require_no_copies
-from discover.dataset.records.repeats import count_flows
-from discover.dataset.records.spikes import without_spikes
-from discover.dataset.records.thinning import thin_run
+from discover.dataset.records.repeats import count_flows, require_no_copies
+from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.step_instants import with_rate_steps

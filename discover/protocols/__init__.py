@@ -14,12 +14,13 @@ from discover.protocols.history import (
     settled,
 )
 from discover.protocols.kinematics import kinematics_of
-from discover.protocols.paper import paper_test_protocols, paper_training_protocols
 from discover.protocols.protocol import (
     FlowProtocol,
     in_flow,
     measured_rate,
     oscillatory_shear,
+    paper_test_protocols,
+    paper_training_protocols,
     recorded_at,
     shear_rates,
     stack_protocols,

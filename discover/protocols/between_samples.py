@@ -7,7 +7,7 @@ so there no spline swings; in noise both predict as badly.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -80,12 +80,8 @@ def knots_between(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return knots whose straight lines lie on the curve, and have its area in each interval.
 
-    Parameters
-    ----------
-    times, rates
-        The samples, shape (n,), at increasing times; of a test at a given stress, the stress.
-    another
-        Whether to take another curve through them: see `another_between_samples`.
+    `times`, `rates`: the samples, shape (n,), at increasing times; of a test at a given stress, the
+    stress. `another`: whether to take another curve through them: see `another_between_samples`.
     """
     stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
@@ -117,12 +113,7 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
     taken, monotonic where straight lines were   [Fritsch & Carlson 1980, SIAM J. Numer. Anal. 17,
     238]. None where the rate was commanded: constant, a wave, or steps.
 
-    Parameters
-    ----------
-    protocol
-        Any.
-    times
-        Of the samples, in s.
+    `times`: of the samples, in s.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -160,12 +151,8 @@ def samples_of(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return the samples of a rate that was read in samples: times in s and rates in 1/s.
 
-    Parameters
-    ----------
-    protocol
-        Whose table holds nothing from before the record.
-    times
-        Of the record; where that was thinned, what its rate was read in before.
+    `protocol`: whose table holds nothing from before the record. `times`: of the record; where that
+    was thinned, what its rate was read in before.
     """
     return _samples(np.asarray(protocol.table_times), np.asarray(protocol.table_rates), times)
 
@@ -239,3 +226,84 @@ def _predicted(places: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.nda
                 weight *= (at - places[:, j]) / (places[:, i] - places[:, j])
         total += weight * values[:, i]
     return total
+
+
+_NEIGHBOURS = 2
+"""Intervals on each side of a step in which the rate stays as it is."""
+
+_STANDS_OUT = 10.0
+"""Change of the rate in a step over that in any of these intervals."""
+
+_SMALLEST = 0.01
+"""Change of the rate, over the largest rate, that is a step."""
+
+
+@dataclass(frozen=True)
+class RateStep:
+    """A step of the rate between two samples.
+
+    `start`, `end`: times of the two samples in s.
+    `change`: of the rate in 1/s, from the one to the other.
+    `share`: of the interval at whose end the rate steps, if that is not fitted.
+    `place`: which of the fitted shares is its own; None if it is not fitted.
+    """
+
+    start: float
+    end: float
+    change: float
+    share: float = 0.5
+    place: int | None = None
+
+    def at(self, share: float) -> float:
+        """Return a time in s from a share of the interval."""
+        return self.start + share * (self.end - self.start)
+
+
+def steps_between_samples(
+    protocol: FlowProtocol, time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
+) -> tuple[RateStep, ...]:
+    """Return the steps of a rate whose instants its samples do not tell.
+
+    The rate changes from one sample to the next, and hardly before and after. A straight line
+    between the two samples stands for a step halfway, which errs by up to half the strain of the
+    interval.
+
+    `protocol`: of the record. A rate that was given as a function of time has no such step. `time`,
+    `rate`: of the samples in s and 1/s.
+    """
+    if protocol.control != "rate" or np.any(np.asarray(protocol.amplitudes)) or len(time) < 4:
+        return ()
+    knots, levels = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
+    change = np.diff(rate)
+    size, smallest = np.abs(change), _SMALLEST * float(np.max(np.abs(rate)))
+    found = []
+    for i in np.flatnonzero(size > smallest):
+        around = np.r_[size[max(i - _NEIGHBOURS, 0) : i], size[i + 1 : i + 1 + _NEIGHBOURS]]
+        first_or_last = i == 0 or i == len(size) - 1
+        if first_or_last or _STANDS_OUT * np.max(around) > size[i]:
+            continue
+        at = int(np.searchsorted(knots, time[i]))
+        straight = (
+            at + 1 < len(knots)
+            and np.array_equal(knots[at : at + 2], time[i : i + 2])
+            and np.allclose(levels[at : at + 2], rate[i : i + 2], rtol=0.0, atol=0.1 * size[i])
+        )
+        if straight:
+            found.append(RateStep(float(time[i]), float(time[i + 1]), float(change[i])))
+    return tuple(found)
+
+
+def sampling_interval(
+    time: Float[np.ndarray, " n"], protocol: FlowProtocol, quantity: str = "sigma12"
+) -> float:
+    """Return the median time between neighbouring samples of a record, in s.
+
+    Not a number of what other means record than those of a shear stress at a given rate, from rest:
+    a strain, a normal stress, an extension, the points of a table of states, cycles that a
+    rheometer has averaged. Their noise need not be correlated as that of the others.
+    """
+    plain = protocol.control == "rate" and float(protocol.begins) == 0.0
+    if not plain or {quantity, protocol.quantity} != {"sigma12"} or len(time) < 2:
+        return float("nan")
+    interval = float(np.median(np.diff(np.asarray(time, dtype=float))))
+    return interval if interval > 0.0 else float("nan")

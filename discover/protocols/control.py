@@ -22,10 +22,7 @@ _AT_ONCE, _JUMP, _LEVEL = 1e-3, 0.05, 0.15
 def steady_rates(rates: Sequence[float] | np.ndarray) -> FlowProtocol:
     """Return rates each held until the flow is steady: a flow curve, one sample for each rate.
 
-    Parameters
-    ----------
-    rates
-        In 1/s.
+    `rates` in 1/s.
     """
     counted = np.arange(1.0, len(rates) + 1.0)
     return replace(measured_rate(counted, rates), control="steady")
@@ -36,10 +33,7 @@ def oscillations(
 ) -> FlowProtocol:
     """Return oscillations each gone on until it is periodic: one sample for each of them.
 
-    Parameters
-    ----------
-    strains, frequencies
-        Amplitude and rad/s of each, shape (n,).
+    `strains`, `frequencies`: amplitude and rad/s of each, shape (n,).
     """
     strains = np.asarray(strains, dtype=float)
     return replace(
@@ -58,17 +52,8 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
     two levels, however small the step between them (creep and recovery, a staircase), right after
     the last sample of the first. A jump takes a thousandth of the time to the next sample.
 
-    Parameters
-    ----------
-    times
-        In s, from 0 on, increasing, shape (n,), two at least.
-    stress
-        The recorded stress in Pa, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two samples, or no stress.
+    `times` in s, from 0 on, increasing, shape (n,), two at least. `stress`: the recorded stress in
+    Pa, shape (n,). Raises InputError if there are fewer than two samples, or no stress.
     """
     times, stress = np.asarray(times, dtype=float), np.asarray(stress, dtype=float)
     size = float(np.max(np.abs(stress), initial=0.0))
@@ -94,11 +79,7 @@ def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n
             piece, parts = np.concatenate([parts[0], piece], axis=1), []
         parts.append(np.stack(knots_between(*piece)))
     knots, levels = np.concatenate(parts, axis=1)
-    return replace(
-        measured_rate(knots, levels),
-        control="stress",
-        begins=jnp.asarray(begins),
-    )
+    return replace(measured_rate(knots, levels), control="stress", begins=jnp.asarray(begins))
 
 
 def _jumps_at_once(stress: Float[np.ndarray, " n"], size: float) -> bool:
@@ -125,12 +106,7 @@ def drawn_against(
     Time where it goes on in time, of a flow curve the rate, of oscillations frequency or amplitude,
     whichever varies.
 
-    Parameters
-    ----------
-    control
-        What is imposed.
-    time, rate, strain
-        Of the samples, shape (n,).
+    `time`, `rate`, `strain`: of the samples, shape (n,).
     """
     if control not in STATES:
         return "time (s)", time

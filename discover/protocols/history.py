@@ -161,17 +161,9 @@ def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
 
     For integrators that wait; what solves for the periodic state needs no more than it has.
 
-    Parameters
-    ----------
-    protocol
-        Of any kind; what is no oscillation that had gone on is returned as it is.
-    relaxation_time
-        The longest, in s.
-
-    Raises
-    ------
-    InputError
-        If more than `MOST_CYCLES` would be needed.
+    `protocol`: of any kind; what is no oscillation that had gone on is returned as it is.
+    `relaxation_time`: the longest, in s. Raises InputError if more than `MOST_CYCLES` would be
+    needed.
     """
     start, end = np.asarray(protocol.cycle)
     period, begins = end - start, float(protocol.begins)
@@ -215,10 +207,7 @@ def _positive(name: str, value: float) -> float:
 
 
 def _begun(
-    protocol: FlowProtocol,
-    knots: np.ndarray,
-    rates: np.ndarray,
-    until: float = 0.0,
+    protocol: FlowProtocol, knots: np.ndarray, rates: np.ndarray, until: float = 0.0
 ) -> FlowProtocol:
     """Return the protocol with a table of rates before it, which holds until a time in s."""
     if np.any(np.asarray(protocol.amplitudes)):

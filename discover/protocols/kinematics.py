@@ -6,7 +6,7 @@ All of them share their principal third axis, so that the stress has four compon
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, get_args
 
 import equinox as eqx
 import jax
@@ -82,19 +82,13 @@ _IN_WORDS = {
 class Kinematics(eqx.Module):
     """A homogeneous flow at unit rate, and the stress that is recorded in it.
 
-    Attributes
-    ----------
-    gradient
-        L11, L22, L33, L12 at unit rate.
-    recorded
-        Weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, or one of its normal
-        stress differences; σ11 − σ22 in extension.
-    intensity
-        √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in uniaxial
-        extension.
-    viscous
-        Recorded stress of a Newtonian fluid of unit viscosity at unit rate: 1 in shear, 3, 4 and 6
-        in uniaxial, planar and biaxial extension   [Trouton 1906, Proc. R. Soc. A 77, 426].
+    `gradient`: L11, L22, L33, L12 at unit rate.
+    `recorded`: weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, or one of its
+        normal stress differences; σ11 − σ22 in extension.
+    `intensity`: √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in
+        uniaxial extension.
+    `viscous`: recorded stress of a Newtonian fluid of unit viscosity at unit rate: 1 in shear, 3, 4
+        and 6 in uniaxial, planar and biaxial extension [Trouton 1906, Proc. R. Soc. A 77, 426].
     """
 
     gradient: Float[Array, "*batch 4"]
@@ -137,12 +131,7 @@ def kind_of(kinematics: Kinematics | None) -> FlowKind:
 def kinematics_of(kind: str, quantity: RecordedQuantity | None = None) -> Kinematics:
     """Return the kinematics of a flow by its name.
 
-    Parameters
-    ----------
-    kind
-        Of `KINDS`.
-    quantity
-        What is recorded; by default σ12 in shear and the tensile stress in extension.
+    `quantity`: what is recorded; by default σ12 in shear and the tensile stress in extension.
     """
     if not isinstance(kind, str) or kind not in _GRADIENT:
         raise InputError(unknown_name("flow", kind, KINDS))
@@ -240,3 +229,19 @@ def in_words(quantities: Iterable[str]) -> str:
     """Return in words what is recorded, of several quantities."""
     found = set(quantities)
     return listed([words for quantity, words in _IN_WORDS.items() if quantity in found])
+
+
+FlowClass = Literal[
+    "laos",
+    "start_up",
+    "cessation",
+    "steps",
+    "superposed",
+    "step_strain",
+    "flow_curve",
+    "creep",
+    "uniaxial",
+    "planar",
+    "biaxial",
+]
+FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)

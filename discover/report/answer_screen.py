@@ -6,8 +6,8 @@ from typing import Any
 from discover.answer import Answer
 from discover.answer.sentences import SYMBOLS, expected, suspects, tolerance
 from discover.equations import Equation
-from discover.equations.spelling.mathml import law_element
-from discover.equations.write import FORMATS
+from discover.equations.files import FORMATS
+from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
 from discover.plain_json import json_text
 from discover.report.mathtext import formula

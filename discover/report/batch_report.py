@@ -4,7 +4,7 @@ import html
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from discover.equations.spelling.mathml import number, term_mathml
+from discover.equations.spelling.markup import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
 from discover.report.wording import FIGURE_SYMBOLS, RULES, effect_title
@@ -20,7 +20,7 @@ def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
     studies
         How each study ended, `discover.batch.status.StudyStatus`.
     rows
-        What each found, `discover.batch.rows.StudyRow`, in the same order.
+        What each found, `discover.batch.status.StudyRow`, in the same order.
     """
     learners = list(dict.fromkeys(name for row in rows for name in row.learners))
     rules = list(dict.fromkeys(rule for row in rows for rule in row.chosen))

@@ -45,7 +45,7 @@ def _law_element(fit: NamedLawFit) -> str:
         equation = fit.equation()
     except InputError:
         return ""
-    from discover.equations.spelling.mathml import law_element
+    from discover.equations.spelling.markup import law_element
 
     return law_element(equation.terms, equation.linear_relaxation, equation.named)
 

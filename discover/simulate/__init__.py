@@ -1,12 +1,7 @@
 """From a fluid and a protocol to stresses, to a tolerance, and to data sets made of them."""
 
 from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
-from discover.simulate.solve import (
-    SimulationError,
-    observe,
-    simulate,
-    simulate_homogeneous_flow,
-)
+from discover.simulate.solve import SimulationError, observe, simulate, simulate_homogeneous_flow
 from discover.simulate.synthetic import synthetic_dataset
 
 __all__ = [

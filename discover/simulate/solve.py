@@ -36,12 +36,8 @@ class SimulationError(RuntimeError):
 class ShearStress:
     """Stresses in simple shear at sampling times.
 
-    Attributes
-    ----------
-    times
-        In s, shape (n,).
-    components
-        σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
+    `times` in s, shape (n,).
+    `components`: σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
 
     times: Float[np.ndarray, " n"]
@@ -97,24 +93,11 @@ def simulate(
     Tsitouras' explicit method, a wide one with an exponential method that is exact for linear
     relaxation.
 
-    Parameters
-    ----------
-    fluid
-        The fluid, in the units of `times`; `Fluid.dimensionless` for a bare law.
-    protocol
-        Shear rate as a function of time.
-    times
-        Sampling times, shape (n,), increasing, from 0 on.
-    rtol, atol
-        Tolerances on the dimensionless stress of each mode. What begins with a periodic state is
-        followed in fixed steps instead, for that state is solved for.
-
-    Raises
-    ------
-    InputError
-        If the flow is not at a given rate.
-    SimulationError
-        If no solution to this tolerance was found within 100,000 steps.
+    `fluid`: the fluid, in the units of `times`; `Fluid.dimensionless` for a bare law. `times`:
+    sampling times, shape (n,), increasing, from 0 on. `rtol`, `atol`: tolerances on the
+    dimensionless stress of each mode. What begins with a periodic state is followed in fixed steps
+    instead, for that state is solved for. Raises InputError if the flow is not at a given rate.
+    Raises SimulationError if no solution to this tolerance was found within 100,000 steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in ("stress", "oscillation"):
@@ -174,11 +157,6 @@ def observe(
     """Return what is recorded of a fluid in one flow of any control, and N1 and N2 in Pa.
 
     At a given rate to a tolerance, as `simulate` does.
-
-    Parameters
-    ----------
-    fluid, protocol, times
-        As in `simulate`.
     """
     if protocol.control in FOLLOWED:
         stress = simulate(fluid, protocol, times)
@@ -237,20 +215,10 @@ def simulate_homogeneous_flow(
 ) -> Float[np.ndarray, "n 3 3"]:
     """Return the full dimensionless stress of a law in any homogeneous flow from rest.
 
-    Parameters
-    ----------
-    velocity_gradient
-        Function of time that returns L, shape (3, 3). Flows that differ in the arrays of a
-        `jax.tree_util.Partial` alone share a program.
-    times
-        Dimensionless sampling times, shape (n,), increasing, from 0 on.
-    rtol, atol
-        Tolerances.
-
-    Raises
-    ------
-    SimulationError
-        If the stress runs away, as it does in UCM beyond a critical extension rate.
+    `velocity_gradient`: function of time that returns L, shape (3, 3). Flows that differ in the
+    arrays of a `jax.tree_util.Partial` alone share a program. `times`: dimensionless sampling
+    times, shape (n,), increasing, from 0 on. Raises SimulationError if the stress runs away, as it
+    does in UCM beyond a critical extension rate.
     """
     found, successful = _solve_in_any_flow(
         law, velocity_gradient, jnp.asarray(times, dtype=float), rtol, atol

@@ -14,8 +14,14 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law
 from discover.plain_numbers import as_number, as_whole_number, short
 from discover.programs import compiled
-from discover.protocols.paper import TRAINING_DURATION, paper_training_protocols
-from discover.protocols.protocol import FlowProtocol, recorded_at, require_flow, shear_rates
+from discover.protocols.protocol import (
+    TRAINING_DURATION,
+    FlowProtocol,
+    paper_training_protocols,
+    recorded_at,
+    require_flow,
+    shear_rates,
+)
 from discover.simulate.solve import ShearStress, simulate
 from discover.statistics.projection import rms
 
@@ -24,14 +30,9 @@ from discover.statistics.projection import rms
 class SyntheticDataset(Dataset):
     """A data set whose law is known.
 
-    Attributes
-    ----------
-    truth
-        The fluid that made it.
-    exact
-        Noise-free stresses of each run, normal stresses included.
-    noise
-        Standard deviation of the noise over the root-mean-square stress of each run.
+    `truth`: the fluid that made it.
+    `exact`: noise-free stresses of each run, normal stresses included.
+    `noise`: standard deviation of the noise over the root-mean-square stress of each run.
     """
 
     truth: Fluid | None = None

@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from discover.dataset.loading import LARGEST
+from discover.dataset.run import LARGEST
 from discover.learners.settings import DEFAULT_DEGREE
-from discover.protocols.classes import FLOW_CLASSES, FlowClass
+from discover.protocols.kinematics import FLOW_CLASSES, FlowClass
 from discover.study.key_values import ClosedFormName, LearnerName, Positive, Seed, SyntheticLaw
 from discover.validation import Section
 

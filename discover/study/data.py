@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from discover.dataset import Dataset
 from discover.dataset.load import load_dataset
 from discover.dataset.material_functions import TABLES
-from discover.dataset.records.copies import require_no_copies
+from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -20,12 +20,8 @@ from discover.words import unknown_name
 class StudyData:
     """The data of a study, split.
 
-    Attributes
-    ----------
-    fit, held_out
-        Runs that fits may see, and runs that only judge.
-    each
-        Whether every fitted run is also to be held out in turn.
+    `fit`, `held_out`: runs that fits may see, and runs that only judge.
+    `each`: whether every fitted run is also to be held out in turn.
     """
 
     dataset: Dataset
@@ -42,16 +38,8 @@ class StudyData:
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     """Return the data of a study, split into runs to fit and runs held out.
 
-    Parameters
-    ----------
-    seed
-        Overrides the seed of synthetic noise.
-
-    Raises
-    ------
-    InputError
-        If a file is wrong, a named run does not exist, a run held out is a copy of one to fit, or
-        those to fit hold no signal.
+    Raises InputError if a file is wrong, a named run does not exist, a run held out is a copy of
+    one to fit, or those to fit hold no signal.
     """
     data = study.data
     if data.synthetic is not None:
@@ -137,10 +125,7 @@ def _with_tables(
 
 
 def _observed(
-    dataset: Dataset,
-    observe: Sequence[str],
-    held_out: Sequence[str],
-    fit: Sequence[str] | None,
+    dataset: Dataset, observe: Sequence[str], held_out: Sequence[str], fit: Sequence[str] | None
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
     """Return the data with every quantity as a record, those held out, and those fitted.
 

@@ -35,30 +35,17 @@ MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 class DeclaredModel:
     """The declared law with starting values for what is to be fitted.
 
-    Attributes
-    ----------
-    law
-        The dimensionless law.
-    law_name, parameters
-        As declared, with numbers for those to be fitted.
-    modulus, relaxation_time
-        Of each mode, shape (k,), in Pa and s.
-    free
-        Names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
-    spectrum
-        Where the modes come from, if from a linear sweep.
-    solvent_viscosity
-        In Pa s.
-    effects
-        Effects known beside the law, with values or to be fitted.
-    source
-        What was taken from an earlier result, in words; empty where nothing was.
-    by_mode
-        Parameters of the law, and effects, that may differ from mode to mode.
-    choice
-        Named laws to choose the law from; none where it is declared.
-    solid
-        What is to be known of an elastic constant among the modes; empty where there is none.
+    `law`: the dimensionless law.
+    `law_name`, `parameters`: as declared, with numbers for those to be fitted.
+    `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
+    `free`: names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
+    `spectrum`: where the modes come from, if from a linear sweep.
+    `solvent_viscosity` in Pa s.
+    `effects`: effects known beside the law, with values or to be fitted.
+    `source`: what was taken from an earlier result, in words; empty where nothing was.
+    `by_mode`: parameters of the law, and effects, that may differ from mode to mode.
+    `choice`: named laws to choose the law from; none where it is declared.
+    `solid`: what is to be known of an elastic constant among the modes; empty where there is none.
     """
 
     law: AbstractConstitutiveLaw
@@ -122,10 +109,7 @@ class DeclaredModel:
 def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
     """Return the declared law of a study, with its modes.
 
-    Raises
-    ------
-    InputError
-        If a parameter is wrong, or modes are asked of data without a linear sweep.
+    Raises InputError if a parameter is wrong, or modes are asked of data without a linear sweep.
     """
     model = study.model
     effects = known_effects(model.effects, "[model] effects")
@@ -281,15 +265,7 @@ def _from_earlier(
 def _law_of_each_mode(
     equation: Equation, added: Sequence[Sequence[KnownEffect]]
 ) -> AbstractConstitutiveLaw:
-    """Return the law of every mode, with constants of its own.
-
-    Parameters
-    ----------
-    equation
-        What all have, and constants of a law with a name.
-    added
-        Effects that add a term, with their values in every mode.
-    """
+    """Return the law of every mode, with constants of its own."""
     laws = []
     for number in range(len(equation.modulus)):
         base = equation.mode(number).law()

@@ -11,8 +11,8 @@ import numpy as np
 
 from discover.effects import KnownEffect, ModeEffect, known_effects, make_effect
 from discover.equations import Equation
+from discover.equations.files import COMPARISON, LOOP, read_json
 from discover.equations.formats.json_format import equation_from_json
-from discover.equations.read import COMPARISON, LOOP, read_json
 from discover.errors import InputError
 from discover.laws.registry import LAWS
 from discover.study.run_folder import STATE_FILE, STATE_FOLDER
@@ -26,23 +26,15 @@ _AGAIN = "Run the command that made it again with --overwrite."
 class EarlierResult:
     """What a study takes over from an earlier result.
 
-    Attributes
-    ----------
-    file
-        Where it was read.
-    equation
-        The law with its modes.
-    effects
-        Effects beside the law, with their values.
-    of_modes
-        Terms that effects add to the law of each mode, with constants of its own: for every such
-        effect its values in the order of the modes.
-    text
-        What was taken, in words.
-    intervals
-        95 % intervals that its constants had, by effect, or "" of a term of the law, and name.
-    doubt
-        That it did not explain its own data, in words, or empty.
+    `file`: where it was read.
+    `equation`: the law with its modes.
+    `effects`: effects beside the law, with their values.
+    `of_modes`: terms that effects add to the law of each mode, with constants of its own: for every
+        such effect its values in the order of the modes.
+    `text`: what was taken, in words.
+    `intervals`: 95 % intervals that its constants had, by effect, or "" of a term of the law, and
+        name.
+    `doubt`: that it did not explain its own data, in words, or empty.
     """
 
     file: Path
@@ -56,10 +48,7 @@ class EarlierResult:
     def told(self, replaced: Collection[str]) -> str:
         """Return in words what was taken, and what is not known of it.
 
-        Parameters
-        ----------
-        replaced
-            Effects that are not taken, for a study has its own.
+        `replaced`: effects that are not taken, for a study has its own.
         """
         had = ", ".join(
             f"{name}{f' of {effect}' * bool(effect)} {low:.3g} to {high:.3g}"
@@ -74,17 +63,9 @@ class EarlierResult:
 def result_file(written: str, study_file: Path | None) -> Path:
     """Return the file of an earlier result, ``loop.json`` or ``comparison.json``.
 
-    Parameters
-    ----------
-    written
-        The folder, relative to the study file or, where it is not there, to the working directory.
-    study_file
-        The study file, if there is one.
-
-    Raises
-    ------
-    InputError
-        If there is no such folder, or it holds no finished result.
+    `written`: the folder, relative to the study file or, where it is not there, to the working
+    directory. `study_file`: the study file, if there is one. Raises InputError if there is no such
+    folder, or it holds no finished result.
     """
     folders = [Path(written)]
     if study_file is not None:
@@ -115,10 +96,8 @@ def result_file(written: str, study_file: Path | None) -> Path:
 def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
     """Return what an earlier result found, to be declared.
 
-    Raises
-    ------
-    InputError
-        If there is no finished result, it is damaged, or it found nothing that could be taken.
+    Raises InputError if there is no finished result, it is damaged, or it found nothing that could
+    be taken.
     """
     file = result_file(written, study_file)
     content = read_json(file)

@@ -8,7 +8,7 @@ import numpy as np
 
 from discover.dataset import Dataset, Run
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
-from discover.dataset.records.copies import require_no_copies
+from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
 from discover.errors import InputError
@@ -30,19 +30,11 @@ _OF_EACH_MODE = "a law with constants of its own in each mode"
 def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     """Return data divided into runs to fit and runs held out.
 
-    Parameters
-    ----------
-    data
-        The runs to fit, and the held-out ones too where they are given by name. Of a data set
-        without runs its tables are fitted, or its linear sweep where there is no other.
-    held_out
-        A data set of runs that only judge, names of runs of `data`, or ``"each"``.
-
-    Raises
-    ------
-    InputError
-        If no data set is given, a run is both fitted and held out, by name or by its samples, none
-        is left to fit, or those to fit hold no signal.
+    `data`: the runs to fit, and the held-out ones too where they are given by name. Of a data set
+    without runs its tables are fitted, or its linear sweep where there is no other. `held_out`: A
+    data set of runs that only judge, names of runs of `data`, or ``"each"``. Raises InputError if
+    no data set is given, a run is both fitted and held out, by name or by its samples, none is left
+    to fit, or those to fit hold no signal.
     """
     if not isinstance(data, Dataset):
         raise InputError(
@@ -77,10 +69,7 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
 def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
     """Return a data set with further runs, which must have names of their own.
 
-    Raises
-    ------
-    InputError
-        If a run of the same name is there already.
+    Raises InputError if a run of the same name is there already.
     """
     both = set(data.names) & {run.name for run in more}
     if both:
@@ -99,17 +88,9 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     """Return a fluid as the declared model of a study.
 
-    Parameters
-    ----------
-    base
-        A `Fluid`; None for upper convected Maxwell with G = 1 Pa and λ = 1 s.
-    data
-        The data; where the modes are those of its linear sweep, the error of the sweep is known.
-
-    Raises
-    ------
-    InputError
-        If `base` is no fluid.
+    `base`: A `Fluid`; None for upper convected Maxwell with G = 1 Pa and λ = 1 s. `data`: the data;
+    where the modes are those of its linear sweep, the error of the sweep is known. Raises
+    InputError if `base` is no fluid.
     """
     if base is None:
         from discover.laws.textbook.maxwell import UpperConvectedMaxwell
@@ -144,21 +125,9 @@ def with_known(
 ) -> DeclaredModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
-    Parameters
-    ----------
-    declared
-        From `declared_fluid`.
-    effects
-        As ``[model] effects`` in a study; None for none.
-    free
-        Names of its constants.
-    by_mode
-        Which of them, and which effects, may differ from mode to mode.
-
-    Raises
-    ------
-    InputError
-        If an effect, a value or a constant is not as it should be.
+    `effects`: as ``[model] effects`` in a study; None for none. `by_mode`: which of them, and which
+    effects, may differ from mode to mode. Raises InputError if an effect, a value or a constant is
+    not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):

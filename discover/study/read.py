@@ -16,10 +16,8 @@ from discover.validation import validated
 def read_study(path: str | Path) -> Study:
     """Return the study in a TOML file.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is not TOML, or holds an unknown key or a wrong value.
+    Raises InputError if the file cannot be read, is not TOML, or holds an unknown key or a wrong
+    value.
     """
     path = Path(path)
     content, text = read_toml(path, "study file", "Write it like those in studies/.")
@@ -31,10 +29,7 @@ def read_study(path: str | Path) -> Study:
 def parse_study(content: dict, where: str = "the study") -> Study:
     """Return a study from nested dictionaries, as TOML gives them.
 
-    Raises
-    ------
-    InputError
-        If a key is unknown or a value is wrong; names the key.
+    Raises InputError if a key is unknown or a value is wrong; names the key.
     """
     return validated(Study, content, where)
 
@@ -45,10 +40,7 @@ def folder_elsewhere(study: Study) -> Path | None:
     These are the folder of the study file, the one that DISCOVER_DATA names, and the working
     directory. A link that leads out of them counts as outside.
 
-    Raises
-    ------
-    InputError
-        If there is no such folder.
+    Raises InputError if there is no such folder.
     """
     if study.data.folder is None:
         return None
@@ -64,10 +56,7 @@ def fingerprint(study: Study, *extra: object) -> str:
     Used to tell whether a result folder belongs to this study: the study, the measured files it
     names, the version of this software, and what the caller adds (task, seed).
 
-    Raises
-    ------
-    InputError
-        If the data folder or a file in it cannot be read.
+    Raises InputError if the data folder or a file in it cannot be read.
     """
     # a page without overlays is what it was before there were any
     left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}

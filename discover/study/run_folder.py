@@ -12,8 +12,7 @@ from typing import Any
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.plain_json import parse_json
-from discover.study.atomic import PART_SUFFIX, make_folder, require_ours, write_text
-from discover.study.lock import lock_folder
+from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_ours, write_text
 
 STATE_FOLDER = "state"
 STATE_FILE = "study.json"
@@ -28,20 +27,9 @@ class RunFolder:
     where it was. A part carries the fingerprint and a hash: one that was damaged, edited or left by
     another study is computed again. While the object lives, no other process can open the folder.
 
-    Parameters
-    ----------
-    path
-        The folder; made if it does not exist.
-    fingerprint
-        From `discover.study.fingerprint`.
-    overwrite
-        Forget what is there.
-
-    Raises
-    ------
-    InputError
-        If the folder holds another study's results and `overwrite` is not set, cannot be written
-        to, or is in use by another process.
+    `path`: the folder; made if it does not exist. `fingerprint`: from `discover.study.fingerprint`.
+    `overwrite`: forget what is there. Raises InputError if the folder holds another study's results
+    and `overwrite` is not set, cannot be written to, or is in use by another process.
     """
 
     def __init__(self, path: str | Path, fingerprint: str, overwrite: bool = False):

@@ -7,7 +7,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from discover.answer import TOLERANCE
 from discover.dataset.linear_viscoelasticity import MOST_MODES
-from discover.dataset.loading import LARGEST
+from discover.dataset.run import LARGEST
 from discover.effects.known import known_effects
 from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS

@@ -6,8 +6,7 @@ import time
 
 import pytest
 
-from discover.batch.rows import LearnerRow, StudyRow, read_row
-from discover.batch.status import BatchResult, StudyStatus
+from discover.batch.status import BatchResult, LearnerRow, StudyRow, StudyStatus, read_row
 from discover.batch.summary import Summary
 from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page

@@ -25,7 +25,7 @@ import pytest
 from discover.batch import cluster, workers
 from discover.batch import run as batch
 from discover.errors import InputError
-from discover.study.lock import LOCK_FILE
+from discover.study.atomic import LOCK_FILE
 
 STAND_IN = """
 import json, os, time

@@ -5,8 +5,7 @@ import errno
 import pytest
 
 from discover.batch import run
-from discover.batch.progress import BatchProgress, now_and_then
-from discover.batch.status import StudyStatus
+from discover.batch.status import BatchProgress, StudyStatus, now_and_then
 
 
 def ended(status):

@@ -20,8 +20,8 @@ from discover.equations import (
     equation_to_json,
 )
 from discover.equations import Tested as Where
-from discover.equations.formats.rheotool_reader import read_rheotool
-from discover.equations.read import read_result_laws
+from discover.equations.files import read_result_laws
+from discover.equations.formats.rheotool import read_rheotool
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter

@@ -82,10 +82,7 @@ def assert_clear(message: str, names):
 
 
 cells = st.one_of(
-    st.floats().map(str),
-    st.integers().map(str),
-    st.text(max_size=8),
-    st.sampled_from(TOKENS),
+    st.floats().map(str), st.integers().map(str), st.text(max_size=8), st.sampled_from(TOKENS)
 )
 
 

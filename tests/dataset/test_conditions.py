@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import Run
-from discover.dataset.conditions import material_and_temperature
+from discover.dataset.run_table import material_and_temperature
 from discover.protocols import start_up
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import Run
-from discover.dataset.records.copies import is_copy, require_no_copies
+from discover.dataset.records.repeats import is_copy, require_no_copies
 from discover.errors import InputError
 from discover.protocols import start_up
 

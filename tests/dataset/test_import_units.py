@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from discover.dataset.importing import import_files
-from discover.dataset.importing.clock_times import is_clock, seconds
 from discover.dataset.importing.mapping import Mapping
-from discover.dataset.importing.text_rows import with_points
-from discover.dataset.tables.unit_text import name_and_unit, read_unit
+from discover.dataset.importing.text_rows import is_clock, seconds, with_points
+from discover.dataset.tables.units import name_and_unit, read_unit
 from discover.errors import InputError
 
 TIME = np.array([0.1, 0.2, 0.4, 0.8, 1.6, 3.2])

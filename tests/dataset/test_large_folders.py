@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.checking.among_runs import doubts_among_runs
+from discover.dataset.checking.runs import doubts_among_runs
 from discover.dataset.run import Run
 from discover.protocols.protocol import start_up
 
@@ -51,7 +51,7 @@ def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):
         looks += 1
         return float(np.max(np.abs(run.stress)))
 
-    monkeypatch.setattr("discover.dataset.checking.among_runs._largest", largest)
+    monkeypatch.setattr("discover.dataset.checking.runs._largest", largest)
     time = np.linspace(0.1, 5.0, 12)
     runs = [
         Run(f"r{i}.csv", time, start_up(0.1), np.full(12, 0.1), 10 * -np.expm1(-time))

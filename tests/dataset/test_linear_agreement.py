@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.dataset.linear.linear_agreement import linear_agreements
 from discover.dataset.linear.linear_spectra import (
     creep_compliance,
+    linear_agreements,
     modes_of_retardation,
     spectrum_of,
 )

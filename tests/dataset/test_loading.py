@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.records.differentiation import differentiate
+from discover.dataset.records.rates import differentiate
 from discover.errors import InputError
 
 GOOD = {

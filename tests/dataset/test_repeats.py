@@ -38,12 +38,7 @@ def test_noise_alone_comes_out_with_its_size_also_at_other_times():
 
 @pytest.mark.parametrize(
     "other",
-    [
-        {"rate": 2.1},
-        {"temperature_C": 170.0},
-        {"times": TIMES[:5]},
-        {"gap_mm": 1.0},
-    ],
+    [{"rate": 2.1}, {"temperature_C": 170.0}, {"times": TIMES[:5]}, {"gap_mm": 1.0}],
     ids=["rate", "temperature", "few samples", "a condition of one alone"],
 )
 def test_another_test_is_no_repeat(other):

@@ -18,7 +18,7 @@ from made_exports import (
 )
 
 from discover.dataset import load_dataset
-from discover.dataset.importing.header_constants import temperature_in
+from discover.dataset.importing.text_rows import temperature_in
 
 
 def start_up(rate):

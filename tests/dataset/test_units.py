@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 from discover.cli import app
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.tables.unit_text import read_heading, read_unit
+from discover.dataset.tables.units import read_heading, read_unit
 from discover.errors import InputError
 
 # factor to SI, by hand: 1 dyn = 1e-5 N, 1 psi = 0.45359237 kg · 9.80665 m/s² / (0.0254 m)²

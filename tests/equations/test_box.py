@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from discover.equations.box import box_of, flow_numbers
+from discover.equations.equation import box_of, flow_numbers
 
 
 @pytest.mark.parametrize("frequency", [0.25, 1.0, 3.0])

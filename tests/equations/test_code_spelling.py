@@ -6,15 +6,7 @@ import json
 import numpy as np
 import pytest
 import sympy
-from spelled_laws import (
-    BOTH_SIGNS,
-    LIBRARY,
-    LIBRARY_LAWS,
-    NAMED_LAWS,
-    STATES,
-    agree,
-    sum_of,
-)
+from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
 
 from discover.equations import Equation, equation_from_json, write_equation
 from discover.errors import InputError
@@ -189,11 +181,7 @@ _EXPONENTIAL = LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3}
         (_SLIP, LawTerm("tr(sigma)*sigma", 0.3)),
         (_SLIP, _EXPONENTIAL),
         (_SLIP, _EXPONENTIAL, LawTerm("gammadot", 0.3)),
-        (
-            LawTerm("sigma", 0.5),
-            LawTerm("sigma.sigma", 0.3),
-            LawTerm("gammadot", 0.3),
-        ),
+        (LawTerm("sigma", 0.5), LawTerm("sigma.sigma", 0.3), LawTerm("gammadot", 0.3)),
         (LawTerm("sigma", 0.5), LawTerm("tr(sigma)*sigma", 0.3), _SLIP),
     ],
     ids=lambda terms: " and ".join(t.term for t in terms),

@@ -294,11 +294,7 @@ def test_several_modes_go_through_rheotool_and_back():
 
 def test_terms_that_only_rescale_become_another_modulus_and_time():
     """dσ/dt = (1 − c)γ̇ + ... − (1 + b)σ − α σ·σ is a Giesekus law in other units."""
-    terms = (
-        LawTerm("gammadot", 0.2),
-        LawTerm("sigma", 0.5),
-        LawTerm("sigma.sigma", 0.3),
-    )
+    terms = (LawTerm("gammadot", 0.2), LawTerm("sigma", 0.5), LawTerm("sigma.sigma", 0.3))
     equation = Equation(terms, (10.0,), (2.0,))
     found = rheotool_shear(write_equation(equation, "rheotool"), TIMES)
     assert agree(found[0], by_stress_rate(equation.fluid())[0], 1e-5)
@@ -312,10 +308,7 @@ def test_terms_that_only_rescale_become_another_modulus_and_time():
     ("terms", "word"),
     [
         ((LawTerm("tr(sigma)*gammadot", 0.3),), r"tr\(sigma\)\*gammadot: no law of rheoTool"),
-        (
-            (LawTerm("sigma.sigma", 0.3), LawTerm("tr(sigma)*sigma", 0.1)),
-            "these together",
-        ),
+        ((LawTerm("sigma.sigma", 0.3), LawTerm("tr(sigma)*sigma", 0.1)), "these together"),
         ((LawTerm("sigma.sigma", -0.1),), "mobility alpha would be -0.1"),
         ((LawTerm(EXPONENTIAL, 0.9, {"epsilon": 0.2}),), "0.9, and rheoTool's"),
         ((LawTerm("sigma", -1.5),), "relax to rest"),

@@ -43,10 +43,7 @@ CASES = {
         BY_STRESS,
         Structured(50.0, (2.0,), 1.5, by_stress=True, in_modulus=True, **SCALE),
     ),
-    "thixotropic_relaxation": (
-        CRITICAL | {"exponent": 1.3},
-        Structured(2.0, (2.0,), 1.3, **SCALE),
-    ),
+    "thixotropic_relaxation": (CRITICAL | {"exponent": 1.3}, Structured(2.0, (2.0,), 1.3, **SCALE)),
     "thixotropic_relaxation_by_stress": (
         BY_STRESS,
         Structured(50.0, (2.0,), 1.5, by_stress=True, **SCALE),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from spelled_laws import BOTH_SIGNS, LIBRARY_LAWS, STATES, agree, sum_of
 
-from discover.equations.spelling.mathml import _TENSORS, law_element, term_element, term_mathml
+from discover.equations.spelling.markup import _TENSORS, law_element, term_element, term_mathml
 
 _FUNCTIONS = {"tr": np.trace, "exp": np.exp}
 _SUMS = ("+", "−")

@@ -27,7 +27,7 @@ from discover.equations import (
     read_rheotool,
     write_equation,
 )
-from discover.equations.spelling.mathml import law_element
+from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
 from discover.laws import LAWS, make_law
 from discover.laws.registry import starting_values

@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 import discover as dc
 from discover.dataset import Run
-from discover.dataset.loading import Loading
+from discover.dataset.run import Loading
 from discover.forward import make_records
 from discover.forward.batches import Loadings
 from discover.learners.tbnn_ude.problem import make_problem as network_problem

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import discover as dc
-from discover.dataset.loading import Loading
+from discover.dataset.run import Loading
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.learners.tbnn_ude.problem import make_problem as network_problem

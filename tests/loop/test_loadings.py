@@ -8,7 +8,7 @@ from independent import Giesekus, oscillation, start_up
 
 import discover as dc
 from discover.dataset import Dataset, Run
-from discover.dataset.loading import Loading
+from discover.dataset.run import Loading
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch, names_of_loadings
 from discover.protocols import imposed_stress, oscillatory_shear

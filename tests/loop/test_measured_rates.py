@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from discover.dataset import Dataset, Run
-from discover.dataset.records.sequence import in_sequence
+from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_run
 from discover.effects import Record, make_effect
 from discover.errors import InputError

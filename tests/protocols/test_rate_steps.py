@@ -5,7 +5,7 @@ import pytest
 
 import discover as dc
 from discover.protocols import measured_rate, sampled_rate
-from discover.protocols.rate_steps import steps_between_samples
+from discover.protocols.between_samples import steps_between_samples
 
 TIMES = np.linspace(0.0, 8.0, 81)
 STEP = np.where(TIMES < 3.95, 1.0, 3.0)

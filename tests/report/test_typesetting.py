@@ -6,7 +6,7 @@ import pytest
 
 from discover.effects import library_effects, named_effects
 from discover.effects.library_term import library_term
-from discover.equations.spelling.mathml import law_element, term_element
+from discover.equations.spelling.markup import law_element, term_element
 from discover.learners import RecoveredTerm
 from discover.report.mathtext import formula, plain
 from discover.report.wording import readable

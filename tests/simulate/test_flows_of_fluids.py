@@ -10,11 +10,7 @@ from independent import multimode_giesekus
 from independent.sweeps import modulus_of, strain_at
 
 from discover.errors import InputError
-from discover.forward.fluids import (
-    dynamics_of_fluid,
-    observed_on_grid,
-    solved_on_grid,
-)
+from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
 from discover.forward.grids import lay_out
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.giesekus import Giesekus
@@ -116,10 +112,7 @@ def test_steady_states_are_solved_for_once_each_however_many_samples_stand_besid
 
 @pytest.mark.parametrize(
     ("protocol", "times"),
-    [
-        (imposed_stress(TIMES, STRESS), TIMES),
-        pytest.param(SWEEP, COUNTED, marks=pytest.mark.slow),
-    ],
+    [(imposed_stress(TIMES, STRESS), TIMES), pytest.param(SWEEP, COUNTED, marks=pytest.mark.slow)],
 )
 def test_derivatives_forward_and_in_reverse_are_differences(protocol, times):
     flows = lay_out([protocol], [times])

@@ -13,13 +13,7 @@ from discover.forward.fluids import solve_batch
 from discover.forward.grids import lay_out, make_grid
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
-from discover.protocols import (
-    measured_rate,
-    oscillatory_shear,
-    shear_rates,
-    start_up,
-    step_rates,
-)
+from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up, step_rates
 from tensor_library.law_terms import LawTerms
 
 TIME = 0.4

@@ -48,10 +48,7 @@ def test_johnson_segalman_has_a_twin_with_the_same_stress_and_n1_but_no_n2(slip,
 def test_a_term_that_touches_33_only_is_invisible_to_shear_stress():
     # tr(γ̇²) I − 2 γ̇² has a single non-zero entry in shear, the 33
     library = tl.TermLibrary(
-        (
-            tl.parse_term("tr(gammadot.gammadot)*I"),
-            tl.parse_term("gammadot.gammadot"),
-        )
+        (tl.parse_term("tr(gammadot.gammadot)*I"), tl.parse_term("gammadot.gammadot"))
     )
     invisible = LibraryExpansion(jnp.array([0.1, -0.2]), jnp.zeros(0), library)
     times = np.linspace(0, 6, 13)

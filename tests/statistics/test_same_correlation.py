@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from discover.protocols import start_up, steady_rates
-from discover.protocols.sampling import sampling_interval
+from discover.protocols.between_samples import sampling_interval
 from discover.statistics import lack_of_fit
 from discover.statistics.noise.same_correlation import same_correlation_probability
 from discover.statistics.noise.whiteness import SIGNIFICANCE

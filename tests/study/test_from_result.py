@@ -45,10 +45,7 @@ MOBILITY_BY_MODE = {
     "kind": "constitutive",
     "parameters": {"alpha": {**_ALPHA, "modes": _MODES}},
 }
-_OF_THREE = {
-    **MOBILITY_BY_MODE,
-    "parameters": {"alpha": {**_ALPHA, "modes": [*_MODES, _MODES[0]]}},
-}
+_OF_THREE = {**MOBILITY_BY_MODE, "parameters": {"alpha": {**_ALPHA, "modes": [*_MODES, _MODES[0]]}}}
 LOOP = {
     "verdict": "effects_added",
     "declared": {"law": LAW, "effects": [GAIN]},

@@ -7,7 +7,7 @@ import pytest
 
 from discover.errors import InputError
 from discover.study import RunFolder
-from discover.study.lock import LOCK_FILE
+from discover.study.atomic import LOCK_FILE
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder", "socket"])

@@ -18,9 +18,7 @@ import discover
 from discover.cli.guard import guarded
 from discover.errors import InputError
 from discover.study import RunFolder, atomic
-from discover.study import lock as lock_module
-from discover.study.atomic import PART_SUFFIX, write_text
-from discover.study.lock import LOCK_FILE, lock_folder
+from discover.study.atomic import LOCK_FILE, PART_SUFFIX, lock_folder, write_text
 
 HOLDER = """
 import sys, time
@@ -92,7 +90,7 @@ def test_where_the_file_system_knows_no_locks_the_process_decides(
         def flock(*_):
             raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(lock_module, "fcntl", NoLocks)
+    monkeypatch.setattr(atomic, "fcntl", NoLocks)
     (tmp_path / LOCK_FILE).write_text(json.dumps(owner))
     if free:
         lock_folder(tmp_path).release()
@@ -218,7 +216,7 @@ def test_a_read_only_folder_is_refused_at_the_start(tmp_path, monkeypatch):
         with pytest.raises(InputError, match=r"cannot be written to.*--out"):
             RunFolder(tmp_path / "a", "one")
     with monkeypatch.context() as patch:
-        patch.setattr("discover.study.lock.os.open", forbidden)
+        patch.setattr("discover.study.atomic.os.open", forbidden)
         with pytest.raises(InputError, match=r"Permission denied.*--out"):
             RunFolder(tmp_path / "b", "one")
     with monkeypatch.context() as patch:

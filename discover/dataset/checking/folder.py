@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset.checking.among_runs import doubts_among_runs, doubts_of_temperature
-from discover.dataset.checking.amplitude_sweep import doubts_of_amplitude_sweep
 from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
 from discover.dataset.checking.normal_stress import doubts_of_normal_stress
-from discover.dataset.checking.one_run import doubts_of_run
+from discover.dataset.checking.runs import doubts_among_runs, doubts_of_run, doubts_of_temperature
 from discover.dataset.checking.start import doubts_of_start, doubts_of_unseen_start
+from discover.dataset.checking.sweeps import doubts_of_amplitude_sweep
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
@@ -195,14 +194,12 @@ def _shift_columns(index: Table) -> list[str]:
 def _clock(index: Table, column: str | None) -> Iterator[Finding]:
     if column is None:
         for name in _shift_columns(index):
-            yield Finding(
-                "note",
-                "clock",
-                INDEX_FILE,
+            text = (
                 f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
                 f'temperature, write clock_factor = "{name}" in the study, so that effects of '
-                "the instrument are looked for on the instrument's clock.",
+                "the instrument are looked for on the instrument's clock."
             )
+            yield Finding("note", "clock", INDEX_FILE, text)
         return
     try:
         factors = read_clock_factors(index, column)
@@ -224,14 +221,12 @@ def _before(index: Table) -> Iterator[Finding]:
                 yield Finding("warning", "start", INDEX_FILE, str(error))
                 continue
             unit = "1/s" if factor == 1.0 else f"1/s after multiplying by {factor:.6g}"
-            yield Finding(
-                "note",
-                "start",
-                INDEX_FILE,
+            text = (
                 f"{INDEX_FILE} has a column {name}. If each run starts from a steady flow at that "
                 f'rate, write rate_before = "{name}" in the study, which reads it in {unit}; '
-                "without it every run starts from rest.",
+                "without it every run starts from rest."
             )
+            yield Finding("note", "start", INDEX_FILE, text)
 
 
 def _files(names: list[str]) -> str:
@@ -257,21 +252,17 @@ def _columns(
         meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
         slips = [q for q in missing if column.startswith(f"{q.stem}_")]
         if meant and column.lower() != "strain":
-            yield Finding(
-                "warning",
-                "columns",
-                name,
+            text = (
                 f"The column {column} in {name} is not read. If it holds {meant[0].stem}, rename "
-                f"it to {meant[0].column}.",
+                f"it to {meant[0].column}."
             )
+            yield Finding("warning", "columns", name, text)
         elif slips:
-            yield Finding(
-                "warning",
-                "columns",
-                name,
+            text = (
                 f"The column {shown(column)} in {name} is not read: it ends in no unit of "
-                f"{slips[0].stem}. If it holds that, rename it to {slips[0].column}.",
+                f"{slips[0].stem}. If it holds that, rename it to {slips[0].column}."
             )
+            yield Finding("warning", "columns", name, text)
         else:
             unused.setdefault(column, []).append(name)
 
@@ -345,13 +336,11 @@ def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
     for run in runs:
         first = seen.setdefault(_digest(run), run.name)
         if first != run.name:
-            yield Finding(
-                "warning",
-                "runs",
-                run.name,
+            text = (
                 f"{run.name} holds the same samples as {first}. Held out, a copy of a fitted "
-                "run proves nothing: remove one.",
+                "run proves nothing: remove one."
             )
+            yield Finding("warning", "runs", run.name, text)
     try:
         require_signal(runs)
     except InputError as error:

@@ -6,14 +6,12 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.one_run import stress_noise
-from discover.dataset.checking.sweep_inertia import sweep_inertia
+from discover.dataset.checking.runs import is_start_up, stress_noise
+from discover.dataset.checking.sweeps import sweep_inertia
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
-from discover.dataset.loading import LARGEST
-from discover.dataset.run import Run
+from discover.dataset.run import LARGEST, Run
 from discover.statistics import HALF_BAND
 from discover.statistics.projection import rms
 from discover.words import percent_of
@@ -56,15 +54,13 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
     together is the practical form of the Kramers–Kronig relations.
     """
     if spectrum.best_error > _SWEEP_TOLERANCE:
-        yield Finding(
-            "warning",
-            "sweep",
-            SWEEP_FILE,
+        text = (
             f"No sum of Maxwell modes, a solvent and an elastic constant fits {SWEEP_FILE} better "
             f"than {100 * spectrum.best_error:.0f} %: G' and G'' contradict each other. Inertia of "
             "the instrument at high frequency, a shift of one column, or too large an amplitude do "
-            "that.",
+            "that."
         )
+        yield Finding("warning", "sweep", SWEEP_FILE, text)
     if sweep.thinned:
         yield Finding("note", "samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
     yield from _inertia(sweep)
@@ -94,18 +90,16 @@ def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
         if usable.size
         else "Correct the inertia."
     )
-    yield Finding(
-        "warning",
-        "sweep",
-        SWEEP_FILE,
+    text = (
         f"G' in {SWEEP_FILE} holds {-found.inertia:.3g} Pa s2 "
         f"(± {HALF_BAND * found.deviation:.2g}) "
         "times frequency squared, which no fluid has: a tool's inertia, or a correction for it "
         f"that is off. It makes {100 * np.max(share):.0f} % of the modulus at the highest "
         f"frequency; modes, solvent and elastic constant alone miss by "
         f"{percent_of(found.error_before)}, with it by "
-        f"{percent_of(found.error_after)}. {remedy}",
+        f"{percent_of(found.error_after)}. {remedy}"
     )
+    yield Finding("warning", "sweep", SWEEP_FILE, text)
 
 
 def against_linear_theory(
@@ -120,14 +114,12 @@ def against_linear_theory(
     # weighted by what each mode adds to the viscosity
     mean_time = spectrum.mean_relaxation_time
     if runs and not spectrum.elastic_modulus and fastest * mean_time < 0.1:
-        yield Finding(
-            "warning",
-            "rate",
-            "",
+        text = (
             f"The largest shear rate times the mean relaxation time ({mean_time:.3g} s) is "
             f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
-            "learned. Add faster runs.",
+            "learned. Add faster runs."
         )
+        yield Finding("warning", "rate", "", text)
     linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
     yield from _shared_gain(runs, linear, sweep, spectrum)
     for run in start_ups:
@@ -140,14 +132,12 @@ def _duration(run: Run, mean_time: float) -> Iterator[Finding]:
     strain = abs(run.rate[0]) * run.time[-1]
     # strongly sheared melts are steady after some strain, however slow they relax
     if run.time[-1] < mean_time and strain < 5.0:
-        yield Finding(
-            "warning",
-            "duration",
-            run.name,
+        text = (
             f"{run.name} lasts {run.time[-1]:.3g} s and strains by {strain:.2g}; the mean "
             f"relaxation time is {mean_time:.3g} s. It does not reach its steady state, and slow "
-            "modes hardly show. Run longer, or do not expect it to tell.",
+            "modes hardly show. Run longer, or do not expect it to tell."
         )
+        yield Finding("warning", "duration", run.name, text)
 
 
 def _linear_stress(
@@ -245,14 +235,12 @@ def _shared_gain(
         if warned
         else "no more than gap and filling leave open where nothing is wrong"
     )
-    yield Finding(
-        "warning" if warned else "note",
-        "gain",
-        "",
+    text = (
         f"In {which} it, the stress at small strain is {np.exp(shared):.3g} times what "
         f"{SWEEP_FILE} foretells: {why}. Correct it, or let the study fit it: [model] modes = "
-        '"lve" with modulus_Pa = "fit".',
+        '"lve" with modulus_Pa = "fit".'
     )
+    yield Finding("warning" if warned else "note", "gain", "", text)
 
 
 def _unlike_gains(
@@ -268,15 +256,13 @@ def _unlike_gains(
     if chi2.sf(float(off @ off), len(gains) - 1) > _UNLIKELY or spread > LARGEST:
         return
     low, high = np.exp(np.min(gains)), np.exp(np.max(gains))
-    yield Finding(
-        "note",
-        "loading",
-        "",
+    text = (
         f"At small strain the runs stand at {low:.3g} to {high:.3g} times what {SWEEP_FILE} "
         f"foretells, so they differ among themselves by {percent_of(spread)}, standard deviation, "
         "as fillings of one sample do. If each run is a loading of its own, say so in the study: "
-        f"loading = {spread:.1g} in [loop] and in [compare].",
+        f"loading = {spread:.1g} in [loop] and in [compare]."
     )
+    yield Finding("note", "loading", "", text)
 
 
 def _small_strain(
@@ -286,14 +272,12 @@ def _small_strain(
         return
     ratio = float(np.median(stress / linear))
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
-        yield Finding(
-            "warning",
-            "linear",
-            run.name,
+        text = (
             f"At strains below {_LINEAR_STRAIN:g} the stress in {run.name} is {ratio:.2g} times "
             f"what {SWEEP_FILE} foretells. Units, temperature, sample loading, a slow start or a "
-            "soft instrument do that; the closed loop can tell some of them apart.",
+            "soft instrument do that; the closed loop can tell some of them apart."
         )
+        yield Finding("warning", "linear", run.name, text)
 
 
 def _cox_merz(run: Run, sweep: LinearSweep, mean_time: float) -> Iterator[Finding]:
@@ -310,11 +294,9 @@ def _cox_merz(run: Run, sweep: LinearSweep, mean_time: float) -> Iterator[Findin
     expected = np.exp(np.interp(np.log(rate), np.log(frequency), np.log(complex_viscosity)))
     ratio = abs(level) / rate / float(expected)
     if not 1 / _COX_MERZ_FACTOR < ratio < _COX_MERZ_FACTOR:
-        yield Finding(
-            "warning",
-            "Cox-Merz",
-            run.name,
+        text = (
             f"The steady viscosity in {run.name} is {ratio:.2g} times the complex viscosity of "
             f"{SWEEP_FILE} at the same rate (Cox–Merz rule). Slip, edge fracture, units or "
-            "another sample do that; so do structured fluids.",
+            "another sample do that; so do structured fluids."
         )
+        yield Finding("warning", "Cox-Merz", run.name, text)

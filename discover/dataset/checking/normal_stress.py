@@ -7,9 +7,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
-from discover.dataset.checking.among_runs import is_start_up
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.one_run import local_noise
+from discover.dataset.checking.runs import is_start_up, local_noise
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
@@ -42,12 +41,8 @@ def doubts_of_normal_stress(
 ) -> Iterator[Finding]:
     """Yield why the N1 of a start-up of shear cannot be right.
 
-    Parameters
-    ----------
-    run
-        Any run; nothing is said of one that is no start-up of shear with its N1.
-    sweep, spectrum
-        The linear sweep and its modes, without which a run is held against itself alone.
+    `run`: any run; nothing is said of one that is no start-up of shear with its N1. `sweep`,
+    `spectrum`: the linear sweep and its modes, without which a run is held against itself alone.
     """
     normal = run.first_normal_stress_difference
     if normal is None:
@@ -60,12 +55,8 @@ def doubts_of_normal_stress(
 class _Fault:
     """Why an N1 cannot be right.
 
-    Attributes
-    ----------
-    why
-        The rest of a sentence that begins with the record, and what to do.
-    until
-        Time in s from which on the record may be right; infinite if that is never.
+    `why`: the rest of a sentence that begins with the record, and what to do.
+    `until`: time in s from which on the record may be right; infinite if that is never.
     """
 
     why: str
@@ -77,16 +68,8 @@ def sound_normal_stress(
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Return from when on the N1 of runs may be right, and why of those of which it never is.
 
-    Parameters
-    ----------
-    runs
-        Any; those without N1, or of which nothing can be said, are in neither.
-    sweep
-        The linear sweep, if there is one.
-
-    Returns
-    -------
     Times in s by name of the run, the samples up to which cannot be right; and reasons by name.
+    Runs without N1, or of which nothing can be said, are in neither.
     """
     there = [(run, n1) for run in runs if (n1 := run.first_normal_stress_difference) is not None]
     spectrum = _spectrum(sweep) if there and sweep is not None else None

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.one_run import stress_noise
+from discover.dataset.checking.runs import stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
@@ -53,15 +53,13 @@ def doubts_of_start(
         why = "the strain recorded there is not what its rate had made by then"
     else:
         return
-    yield Finding(
-        "warning",
-        "start",
-        run.name,
+    text = (
         f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
         f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look like "
         "a missing effect. Give the record from rest on, or say in runs.csv what came before "
-        "(start, step_strain, rate_before); otherwise leave the run out.",
+        "(start, step_strain, rate_before); otherwise leave the run out."
     )
+    yield Finding("warning", "start", run.name, text)
 
 
 def doubts_of_unseen_start(run: Run) -> Iterator[Finding]:
@@ -75,16 +73,14 @@ def doubts_of_unseen_start(run: Run) -> Iterator[Finding]:
     told = run.time[0] == 0.0 and oscillation(run) is not None
     if not _is_loaded_at_first(run) or first < _RISE_OVER * size or told or _without_memory(run):
         return
-    yield Finding(
-        "warning",
-        "start",
-        run.name,
+    text = (
         f"{run.name} is taken as starting from rest, but does not show it: its first stress, at "
         f"{run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing before it "
         "was recorded. Sample the start, or say in runs.csv what came before (start, rate_before), "
         "which would look like a missing effect. A solvent's viscosity makes "
-        "stress at once: where it is most of the fluid's, nothing is wrong.",
+        "stress at once: where it is most of the fluid's, nothing is wrong."
     )
+    yield Finding("warning", "start", run.name, text)
 
 
 def _largest_and_first(run: Run) -> tuple[float, float]:

@@ -8,34 +8,69 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset.importing.file_blocks import blocks_of_file
-from discover.dataset.importing.folder_files import NamedRecord, files_of
+from discover.dataset.importing.files import blocks_of_importer
+from discover.dataset.importing.folder_files import (
+    NamedRecord,
+    files_of,
+    left_out,
+    nothing,
+    numbered,
+    unread_columns,
+)
 from discover.dataset.importing.intervals import joined_intervals
-from discover.dataset.importing.left_out import left_out, nothing, numbered, unread_columns
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
+from discover.dataset.importing.oscillations import waves_of, without_names
+from discover.dataset.importing.quantities import UnsaidUnits
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
-from discover.dataset.importing.unsaid_units import UnsaidUnits
-from discover.dataset.importing.waveforms import waves_of
+from discover.dataset.importing.stacked import tests_in_rows, tests_side_by_side
+from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
+from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.tables.table import read_bytes, shown
 from discover.errors import InputError
+
+
+def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
+    """Return the tables of a file with their numbers, from 1; those that the user chose.
+
+    Raises InputError if it cannot be read, holds no table, or none of those chosen.
+    """
+    layout = mapping.layout
+    found = blocks_of_importer(path, layout.format)
+    if found is None:
+        rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
+        found = blocks_of_rows(rows, layout.header_row)
+        if not any(Readings.of(block, mapping, path.name).columns for block in found):
+            wave = without_names(rows)
+            found = found if wave is None else [wave]
+        require_blocks(found, path.name)
+    parts = [
+        part
+        for block in found
+        for one in tests_side_by_side(block)
+        for part in tests_in_rows(one, mapping, path.name)
+    ]
+    blocks = list(enumerate(parts, start=1))
+    if mapping.blocks is None:
+        return blocks
+    chosen = [pair for pair in blocks if pair[0] in mapping.blocks]
+    if not chosen:
+        raise InputError(
+            f"{path.name} has {len(blocks)} blocks of numbers; none of those asked for "
+            f"({', '.join(map(str, mapping.blocks))}). Correct --block."
+        )
+    return chosen
 
 
 @dataclass
 class ImportedFolder:
     """A data folder, not yet written.
 
-    Attributes
-    ----------
-    files
-        Text of every file by name.
-    mapping
-        Everything that was used, guesses included, so that the import can be repeated.
-    said
-        What was understood and done, a line each.
-    unread
-        Files and tables that could not be read, and why, a line each.
+    `files`: text of every file by name.
+    `mapping`: everything that was used, guesses included, so that the import can be repeated.
+    `said`: what was understood and done, a line each.
+    `unread`: files and tables that could not be read, and why, a line each.
     """
 
     files: dict[str, str] = field(default_factory=dict)
@@ -94,17 +129,9 @@ def import_files(
     are dropped, and counted in `said`. A file that cannot be understood does not keep the others
     from being read; it is named in `unread`.
 
-    Parameters
-    ----------
-    mapping
-        What is known about them; what it leaves open is found from names, units and numbers.
-    sweep
-        File of which the first frequency sweep becomes ``lve.csv``, if any.
-
-    Raises
-    ------
-    InputError
-        If no file can be understood; says which columns it has.
+    `mapping`: what is known about them; what it leaves open is found from names, units and numbers.
+    `sweep`: file of which the first frequency sweep becomes ``lve.csv``, if any. Raises InputError
+    if no file can be understood; says which columns it has.
     """
     state = _Import(mapping)
     sources = []
@@ -347,11 +374,7 @@ _WORDS = {
 
 
 def _summary(
-    where: str,
-    readings: Readings,
-    one: Recognised,
-    made: Record,
-    said: list[str] | None = None,
+    where: str, readings: Readings, one: Recognised, made: Record, said: list[str] | None = None
 ) -> str:
     """Say what a block was taken for and its columns, unless the columns have been said before."""
     understood = ", ".join(

@@ -14,7 +14,7 @@ from scipy.interpolate import PchipInterpolator
 
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, purer
-from discover.dataset.importing.said_test import Said
+from discover.dataset.importing.text_export import Said
 
 CONSTANT = 0.03
 """Spread, of the middle nine tenths of the samples, up to which an imposed quantity is constant."""
@@ -43,10 +43,7 @@ Values = Float[np.ndarray, " n"]
 class Course:
     """What was recorded over time; at least one of rate and strain is known.
 
-    Attributes
-    ----------
-    time, stress, rate, strain
-        In s, Pa and 1/s, each of shape (n,).
+    `time`, `stress`, `rate`, `strain` in s, Pa and 1/s, each of shape (n,).
     """
 
     time: Values
@@ -65,13 +62,7 @@ class Course:
 
 
 def kind_of_course(course: Course, said: Said | None) -> tuple[TestName, str]:
-    """Return which test a record is, and what says so.
-
-    Parameters
-    ----------
-    said
-        What its words say.
-    """
+    """Return which test a record is, and what says so."""
     strain, stress = course.strain, course.stress
     swings = alternates(strain if strain is not None else course.moved) or alternates(stress)
     if swings and not held(stress):  # creep and recovery have a rate of both signs
@@ -209,12 +200,8 @@ def _steps_alike(course: Course) -> bool:
 class UpAndDown:
     """Stresses on the way down over those at the same rates on the way up, as logarithms.
 
-    Attributes
-    ----------
-    logarithms
-        Shape (m,).
-    scatter
-        Standard deviation of the logarithm of a stress.
+    `logarithms`: shape (m,).
+    `scatter`: standard deviation of the logarithm of a stress.
     """
 
     logarithms: Float[np.ndarray, " m"]
@@ -236,10 +223,8 @@ class UpAndDown:
 def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
     """Return by how much stresses differ on the way up and down; None if rates go one way only.
 
-    Parameters
-    ----------
-    rate, stress
-        In 1/s and Pa, in the order in which they were measured. Rows of one sign are compared.
+    `rate`, `stress` in 1/s and Pa, in the order in which they were measured. Rows of one sign are
+    compared.
     """
     use = (rate * np.sign(np.median(rate)) > 0.0) & (stress * np.sign(np.median(stress)) > 0.0)
     if np.sum(use) < 2 * _FEWEST_OF_BRANCH or np.mean(use) < 0.7:
@@ -324,12 +309,8 @@ def every_row_differs(rate: Values) -> bool:
 def strain_of(time: Values, rate: Values) -> Values:
     """Return the strain that a rate has made since t = 0, shape (n,).
 
-    Parameters
-    ----------
-    time
-        In s, from the start of the test, increasing.
-    rate
-        In 1/s; before the first sample it is taken as there.
+    `time` in s, from the start of the test, increasing. `rate` in 1/s; before the first sample it
+    is taken as there.
     """
     before = max(float(time[0]), 0.0) * float(rate[0])
     if len(time) < 2:

@@ -14,8 +14,7 @@ from jaxtyping import Float
 from discover.dataset.importing.in_time import CONSTANT, every_row_differs, spread, up_and_down
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.said_test import said_of
-from discover.dataset.importing.text_export import Block
+from discover.dataset.importing.text_export import Block, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.errors import InputError
 
@@ -46,14 +45,8 @@ def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) ->
     Words say that they are, or three rates of which the last is the first again, or rates that go
     up and then down with stresses that differ.
 
-    Parameters
-    ----------
-    blocks
-        Each with its number.
-    mapping
-        What the user says of them; a block that the user names a test for is left as it is.
-    file
-        Name of the file.
+    `blocks`: each with its number. `mapping`: what the user says of them; a block that the user
+    names a test for is left as it is.
     """
     left, found = list(blocks), []
     while left:

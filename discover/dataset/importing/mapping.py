@@ -15,44 +15,13 @@ from discover.validation import Section, validated
 MAPPING_FILE = "import.toml"
 
 QuantityName = Literal[
-    "time",
-    "shear_rate",
-    "stress",
-    "strain",
-    "N1",
-    "N2",
-    "torque",
-    "angular_velocity",
-    "angle",
-    "normal_force",
-    "omega",
-    "Gp",
-    "Gpp",
-    "hencky_rate",
-    "tensile_stress",
-    "hencky_strain",
-    "relaxation_modulus",
-    "compliance",
-    "viscosity",
-    "strain_amplitude",
-    "stress_amplitude",
-    "complex_modulus",
-    "complex_viscosity",
-    "phase_angle",
-    "loss_factor",
-    "temperature",
-    "psi1",
-    "psi2",
-    "extensional_viscosity",
-    "radius",
-    "diameter",
-    "gap",
-    "cone_angle",
-    "strain_wave",
-    "stress_wave",
-    "wave_time",
-    "point",
-]
+    "time", "shear_rate", "stress", "strain", "N1", "N2", "torque", "angular_velocity", "angle",
+    "normal_force", "omega", "Gp", "Gpp", "hencky_rate", "tensile_stress", "hencky_strain",
+    "relaxation_modulus", "compliance", "viscosity", "strain_amplitude", "stress_amplitude",
+    "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor", "temperature", "psi1",
+    "psi2", "extensional_viscosity", "radius", "diameter", "gap", "cone_angle", "strain_wave",
+    "stress_wave", "wave_time", "point",
+]  # fmt: skip
 
 TestName = Literal[
     "frequency_sweep", "amplitude_sweep", "flow_curve", "relaxation", "creep", "run", "none"
@@ -202,10 +171,7 @@ def key_of(file: str) -> str:
 def make_mapping(content: dict, where: str) -> Mapping:
     """Return a mapping from nested dictionaries.
 
-    Raises
-    ------
-    InputError
-        If a key is unknown or a value is wrong; names it.
+    Raises InputError if a key is unknown or a value is wrong; names it.
     """
     return validated(Mapping, content, where)
 
@@ -213,10 +179,7 @@ def make_mapping(content: dict, where: str) -> Mapping:
 def read_mapping(path: Path) -> Mapping:
     """Return the mapping in a TOML file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read or is wrong.
+    Raises InputError if it cannot be read or is wrong.
     """
     content, _ = read_toml(path, "mapping file", f"Write it like the {MAPPING_FILE} of an import.")
     return make_mapping(content, path.name)
@@ -226,9 +189,8 @@ def write_mapping(mapping: Mapping) -> str:
     """Return a mapping as TOML."""
     lines = [
         "# How this folder was imported. Repeat it with",
-        "#   discover data import --mapping ",
+        f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER",
     ]
-    lines[1] += "import.toml --out FOLDER"
     if mapping.start_time_s:
         lines.append(f"start_time_s = {mapping.start_time_s!r}")
     if mapping.temperature_C is not None:

@@ -84,10 +84,7 @@ def plain(name: str) -> str:
 class NameTable:
     """Names of quantities, those of the project and a user's own.
 
-    Parameters
-    ----------
-    own
-        A user's names by quantity; they go first.
+    `own`: A user's names by quantity; they go first.
     """
 
     def __init__(self, own: Mapping[str, Sequence[str]]):
@@ -174,10 +171,8 @@ def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
 def read_names(path: Path) -> dict[str, tuple[str, ...]]:
     """Return a user's names by quantity, from a file of the form of ``names.toml``.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, names no quantity that is known, or holds something else than names.
+    Raises InputError if it cannot be read, names no quantity that is known, or holds something else
+    than names.
     """
     example = 'Write lines such as stress = ["Sigma corr."].'
     content, _ = read_toml(path, "file of names", example)
@@ -200,17 +195,8 @@ def read_names(path: Path) -> dict[str, tuple[str, ...]]:
 def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
     """Check a user's names.
 
-    Parameters
-    ----------
-    names
-        By quantity.
-    where
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        If there is no such quantity, or a name is no text with a letter in it.
+    `names`: by quantity. Raises InputError if there is no such quantity, or a name is no text with
+    a letter in it.
     """
     for key, listed in names.items():
         if key not in shipped_names():

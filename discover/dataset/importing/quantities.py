@@ -1,59 +1,48 @@
 """Which column is what, and how its unit becomes SI."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
 
-from discover.dataset.importing.clock_times import is_clock
+import numpy as np
+from jaxtyping import Float
+
 from discover.dataset.importing.names import NameTable, plain
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
+from discover.dataset.importing.text_rows import is_clock, is_number
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.tables import units
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.unit_text import read_heading, read_unit, tidy_unit
-from discover.dataset.tables.units import Quantity
+from discover.dataset.tables.units import Quantity, read_heading, read_unit, tidy_unit
 from discover.errors import InputError
+from discover.words import listed
+
+_QUANTITIES: dict[str, Quantity | str] = {
+    "time": units.TIME, "shear_rate": units.SHEAR_RATE, "stress": units.SHEAR_STRESS,
+    "strain": units.STRAIN, "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
+    "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE, "psi1": "Pa*s^2", "psi2": "Pa*s^2",
+    "torque": "N*m", "angular_velocity": "rad/s", "angle": "rad", "normal_force": "N",
+    "omega": units.ANGULAR_FREQUENCY, "Gp": units.STORAGE_MODULUS, "Gpp": units.LOSS_MODULUS,
+    "hencky_rate": units.HENCKY_RATE, "tensile_stress": units.TENSILE_STRESS,
+    "hencky_strain": units.HENCKY_STRAIN, "extensional_viscosity": "Pa*s",
+    "relaxation_modulus": RELAXATION_MODULUS, "compliance": COMPLIANCE, "viscosity": "Pa*s",
+    "strain_amplitude": "", "stress_amplitude": "Pa", "complex_modulus": "Pa",
+    "complex_viscosity": "Pa*s", "phase_angle": "rad", "loss_factor": "",
+    "temperature": Quantity("temperature", "temperature_C", ""),
+    "radius": "m", "diameter": "m", "gap": "m", "cone_angle": "rad", "strain_wave": "",
+    "stress_wave": "Pa", "wave_time": "s", "point": "",
+}  # fmt: skip
+"""What a column may hold: a quantity of data folders, or the SI unit of one of exports alone."""
+
+
+def _quantity(key: str, unit: str) -> Quantity:
+    suffix = re.sub(r"[*/]", "_", unit).replace("^", "")
+    return Quantity(key, "_".join(filter(None, (key, suffix))), unit)
+
 
 QUANTITIES: dict[str, Quantity] = {
-    "time": units.TIME,
-    "shear_rate": units.SHEAR_RATE,
-    "stress": units.SHEAR_STRESS,
-    "strain": units.STRAIN,
-    "N1": units.FIRST_NORMAL_STRESS_DIFFERENCE,
-    "N2": units.SECOND_NORMAL_STRESS_DIFFERENCE,
-    "psi1": Quantity("psi1", "psi1_Pa_s2", "Pa*s^2"),
-    "psi2": Quantity("psi2", "psi2_Pa_s2", "Pa*s^2"),
-    "torque": Quantity("torque", "torque_N_m", "N*m"),
-    "angular_velocity": Quantity("angular_velocity", "angular_velocity_rad_s", "rad/s"),
-    "angle": Quantity("angle", "angle_rad", "rad"),
-    "normal_force": Quantity("normal_force", "normal_force_N", "N"),
-    "omega": units.ANGULAR_FREQUENCY,
-    "Gp": units.STORAGE_MODULUS,
-    "Gpp": units.LOSS_MODULUS,
-    "hencky_rate": units.HENCKY_RATE,
-    "tensile_stress": units.TENSILE_STRESS,
-    "hencky_strain": units.HENCKY_STRAIN,
-    "extensional_viscosity": Quantity(
-        "extensional_viscosity", "extensional_viscosity_Pa_s", "Pa*s"
-    ),
-    "relaxation_modulus": RELAXATION_MODULUS,
-    "compliance": COMPLIANCE,
-    "viscosity": Quantity("viscosity", "viscosity_Pa_s", "Pa*s"),
-    "strain_amplitude": Quantity("strain_amplitude", "strain_amplitude", ""),
-    "stress_amplitude": Quantity("stress_amplitude", "stress_amplitude_Pa", "Pa"),
-    "complex_modulus": Quantity("complex_modulus", "complex_modulus_Pa", "Pa"),
-    "complex_viscosity": Quantity("complex_viscosity", "complex_viscosity_Pa_s", "Pa*s"),
-    "phase_angle": Quantity("phase_angle", "phase_angle_rad", "rad"),
-    "loss_factor": Quantity("loss_factor", "loss_factor", ""),
-    "temperature": Quantity("temperature", "temperature_C", ""),
-    "radius": Quantity("radius", "radius_m", "m"),
-    "diameter": Quantity("diameter", "diameter_m", "m"),
-    "gap": Quantity("gap", "gap_m", "m"),
-    "cone_angle": Quantity("cone_angle", "cone_angle_rad", "rad"),
-    "strain_wave": Quantity("strain_wave", "strain_wave", ""),
-    "stress_wave": Quantity("stress_wave", "stress_wave_Pa", "Pa"),
-    "wave_time": Quantity("wave_time", "wave_time_s", "s"),
-    "point": Quantity("point", "point", ""),
+    key: _quantity(key, one) if isinstance(one, str) else one for key, one in _QUANTITIES.items()
 }
 
 
@@ -62,17 +51,8 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
 
     Columns without a single number are passed over; a clock is a time only if no number is.
 
-    Parameters
-    ----------
-    given
-        Names of columns that the user gave; they win over guesses.
-    table
-        What quantities are called.
-
-    Raises
-    ------
-    InputError
-        If a name that was given stands above two columns.
+    `given`: names of columns that the user gave; they win over guesses. Raises InputError if a name
+    that was given stands above two columns.
     """
     count = range(len(block.columns))
     numbers = [any(is_number(row[i]) for row in block.cells) for i in count]
@@ -142,12 +122,8 @@ def _is_unit_of(key: str, unit: str) -> bool:
 def fits(key: str, name: str, unit: str) -> bool:
     """Return whether a short name, which may mean several things, has a unit of the quantity.
 
-    Parameters
-    ----------
-    key
-        From `QUANTITIES`.
-    name, unit
-        Of the column; a longer name fits whatever its unit is, so that a wrong one is said.
+    `name`, `unit`: of the column; a longer name fits whatever its unit is, so that a wrong one is
+    said.
     """
     if name.strip() == "T" and not unit:
         return key == "temperature"
@@ -186,19 +162,8 @@ def to_celsius(value: float, unit: str) -> float | None:
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     """Return the factor from a column's unit to SI.
 
-    Parameters
-    ----------
-    key
-        What they are, from `QUANTITIES`.
-    unit
-        Their unit as the export or the user writes it.
-    column, name
-        Column and file, for messages.
-
-    Raises
-    ------
-    InputError
-        If the unit is unknown or a unit of something else.
+    `unit`: their unit as the export or the user writes it. Raises InputError if the unit is unknown
+    or a unit of something else.
     """
     quantity = QUANTITIES[key]
     if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
@@ -218,3 +183,162 @@ def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
             f"another column for {key}, or correct the unit with --unit {key}=…."
         )
     return factor
+
+
+# They are told by its numbers, taken as SI where nothing else is usual, or asked for, all at once.
+
+Values = Float[np.ndarray, " n"]
+Get = Callable[[str], Values | None]
+
+_CHOICES = {
+    "strain": ("%", "1"),
+    "strain_amplitude": ("%", "1"),
+    "strain_wave": ("%", "1"),
+    "omega": ("Hz", "rad/s"),
+    "phase_angle": ("deg", "rad"),
+    "viscosity": ("mPa*s", "Pa*s"),
+    "complex_viscosity": ("mPa*s", "Pa*s"),
+    "torque": ("mN*m", "N*m"),
+    "angular_velocity": ("1/min", "rad/s"),
+    "angle": ("deg", "rad"),
+    "radius": ("mm", "m"),
+    "diameter": ("mm", "m"),
+    "gap": ("mm", "m"),
+    "cone_angle": ("deg", "rad"),
+}
+"""Units of which either is usual; the last is that of SI."""
+
+_SHARE = 0.05
+"""Error of a ratio of columns up to which it is that of two units: they differ by 6 at least."""
+
+
+@dataclass(frozen=True)
+class UnsaidUnit:
+    """A unit in which a column is read although the file does not give it.
+
+    `how`: told by the numbers, assumed, or to be asked for: until then `unit` stands in for it.
+    `why`: what tells it.
+    """
+
+    column: str
+    unit: str
+    how: Literal["told", "assumed", "asked"]
+    why: str = ""
+
+
+def unsaid_unit(key: str, column: str, raw: Values, get: Get, table: NameTable) -> UnsaidUnit:
+    """Return the unit of a column without one.
+
+    `get`: gives other columns of the block in SI units, None where it has no such column. `table`:
+    what quantities are called: an angular frequency is one in rad/s, a frequency may count.
+    """
+    choices = _CHOICES.get(key)
+    if key == "omega" and "frequency" not in table.find(column):
+        choices = None
+    if choices is None:
+        return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
+    told = _told(key, raw, get)
+    if told is not None:
+        return UnsaidUnit(column, told[0], "told", told[1])
+    return UnsaidUnit(column, choices[-1], "asked")
+
+
+def _told(key: str, raw: Values, get: Get) -> tuple[str, str] | None:
+    """Return the unit that other columns leave as the only one, and how they do."""
+    if key == "phase_angle":
+        # between 0 and a right angle, with some noise beyond
+        far = bool(np.nanmax(np.abs(raw)) > 1.05 * np.pi / 2.0) if np.isfinite(raw).any() else False
+        return ("deg", "no angle of loss is that many radians") if far else None
+    size = _modulus(get)
+    if key == "omega":
+        viscosity = get("complex_viscosity")
+        if size is None or viscosity is None:
+            return None
+        factors = {"rad/s": 1.0, "Hz": 2.0 * np.pi}
+        return _of_ratio(size / viscosity, raw, factors, "|G*| is |η*| times it")
+    if not key.startswith("strain"):
+        return None
+    factors = {"1": 1.0, "%": 0.01}
+    stress = next((get(k) for k in ("stress_amplitude", "stress") if get(k) is not None), None)
+    time, rate = get("time"), get("shear_rate")
+    ways = []
+    if stress is not None and size is not None:
+        ways.append((stress / size, "the stress is |G*| times it"))
+    if stress is not None and (modulus := get("relaxation_modulus")) is not None:
+        ways.append((stress / modulus, "the stress is G(t) times it"))
+    if stress is not None and (compliance := get("compliance")) is not None:
+        ways.append((stress * compliance, "it is J(t) times the stress"))
+    for made, why in ways:
+        told = _of_ratio(made, raw, factors, why)
+        if told is not None:
+            return told
+    if time is not None and rate is not None and len(time) > 2:
+        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
+        return _of_ratio(steps, np.diff(raw), factors, "it grows as the rate says")
+    return None
+
+
+def _modulus(get: Get) -> Values | None:
+    size, storage, loss = get("complex_modulus"), get("Gp"), get("Gpp")
+    if size is None and storage is not None and loss is not None:
+        size = np.hypot(storage, loss)
+    return size
+
+
+def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
+    """Return the unit whose factor turns a column into what others make of it, in most rows."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = made / raw
+    ratio = ratio[np.isfinite(ratio)]
+    if len(ratio) < 3:
+        return None
+    # the middle alone is taken: a start, a rest and noise leave single rows far off
+    middle = np.percentile(ratio, [30.0, 50.0, 70.0])
+    for unit, factor in factors.items():
+        if np.all(np.abs(middle / factor - 1.0) < _SHARE):
+            return unit, why
+    return None
+
+
+@dataclass
+class UnsaidUnits:
+    """Units of all files of an import that none of them gives."""
+
+    found: dict[tuple[str, str], tuple[str, UnsaidUnit]] = field(default_factory=dict)
+
+    def add(self, file: str, units: Iterable[tuple[str, UnsaidUnit]]) -> None:
+        """Add the units of a test that is imported, by quantity."""
+        for key, unit in units:
+            self.found.setdefault((key, unit.column), (file, unit))
+
+    def require(self) -> None:
+        """Raise InputError if there are units that only the user knows; asks for all of them."""
+        asked = {key: one for (key, _), (_, one) in self.found.items() if one.how == "asked"}
+        if not asked:
+            return
+        files = dict.fromkeys(file for file, one in self.found.values() if one.how == "asked")
+        options = "; ".join(
+            f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
+            for key, one in asked.items()
+        )
+        what = "a unit" if len(asked) == 1 else "the units"
+        names = listed([shown(one.column) for one in asked.values()])
+        raise InputError(
+            f"{listed(list(files))} does not give {what} of {names}, and the numbers do not tell. "
+            f"Say which: {options}."
+        )
+
+    def warning(self) -> list[str]:
+        """Return the sentence on what is taken as SI, if anything is."""
+        assumed = [(key, one) for (key, _), (_, one) in self.found.items() if one.how == "assumed"]
+        assumed = [(key, one) for key, one in assumed if QUANTITIES[key].unit]
+        if not assumed:
+            return []
+        files = dict.fromkeys(file for file, one in self.found.values() if one.how == "assumed")
+        read = listed([f"{shown(one.column)} in {one.unit}" for _, one in assumed])
+        key, one = assumed[-1]
+        other = {"s": "min", "1/s": "1/min", "rad/s": "Hz"}.get(one.unit, f"m{one.unit}")
+        return [
+            f"warning: {listed(list(files))} gives no units here, so SI is taken: {read}. If one "
+            f"is another, say so, as in --unit {key}={other}."
+        ]

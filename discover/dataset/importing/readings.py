@@ -7,21 +7,26 @@ from pathlib import PurePath
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.importing.clock_times import is_clock, seconds
-from discover.dataset.importing.header_constants import Constant, temperature_in
 from discover.dataset.importing.mapping import Geometry, Mapping, key_of
 from discover.dataset.importing.names import NameTable, name_table
 from discover.dataset.importing.quantities import (
     QUANTITIES,
+    UnsaidUnit,
     factor_to_si,
     guess_columns,
     name_rank,
     to_celsius,
     unit_in_name,
+    unsaid_unit,
 )
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
-from discover.dataset.importing.unsaid_units import UnsaidUnit, unsaid_unit
+from discover.dataset.importing.text_rows import (
+    Constant,
+    is_clock,
+    is_number,
+    seconds,
+    temperature_in,
+)
 from discover.dataset.tables.table import shown
 from discover.errors import InputError
 
@@ -46,24 +51,15 @@ Values = Float[np.ndarray, " n"]
 class Readings:
     """What a block says of each quantity.
 
-    Attributes
-    ----------
-    columns
-        Place of each quantity among its columns.
-    mapping
-        What the user says of units and tool.
-    name
-        Of the file, for messages.
-    geometry
-        Of the tool, from the mapping or the header; None where neither has it.
-    begins
-        Reading of a clock of the whole measurement, in s, when the block before ended; else 0.
-    used
-        In words, where each quantity that was asked for comes from.
-    unsaid
-        Units of those quantities that the file does not give.
-    notes
-        In words, what it says that cannot be.
+    `columns`: place of each quantity among its columns.
+    `mapping`: what the user says of units and tool.
+    `name`: of the file, for messages.
+    `geometry`: of the tool, from the mapping or the header; None where neither has it.
+    `begins`: reading of a clock of the whole measurement, in s, when the block before ended; else
+        0.
+    `used` in words, where each quantity that was asked for comes from.
+    `unsaid`: units of those quantities that the file does not give.
+    `notes` in words, what it says that cannot be.
     """
 
     block: Block
@@ -80,10 +76,7 @@ class Readings:
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return the readings of a block.
 
-        Raises
-        ------
-        InputError
-            If a name that the user gave stands above two columns.
+        Raises InputError if a name that the user gave stands above two columns.
         """
         given = {str(key): column for key, column in mapping.columns.items()}
         table = name_table(mapping.names)
@@ -98,10 +91,7 @@ class Readings:
     def get(self, key: str) -> Values | None:
         """Return a quantity in SI units (temperature in °C), nan where the block has no number.
 
-        Raises
-        ------
-        InputError
-            If a unit is missing, unknown or one of something else.
+        Raises InputError if a unit is missing, unknown or one of something else.
         """
         if key == "temperature":
             return self._temperature()

@@ -11,11 +11,10 @@ from discover.dataset.importing.in_time import APART, Course, kind_of_course, up
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.said_test import Said, said_of
+from discover.dataset.importing.text_export import Said, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.tables.table import shown
-from discover.dataset.tables.unit_text import read_unit
-from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to
+from discover.dataset.tables.units import SHEAR_RATE, TIME, Quantity, factor_to, read_unit
 from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02
@@ -30,14 +29,9 @@ Rows = Bool[np.ndarray, " n"]
 class Recognised:
     """What some rows of a block are taken for.
 
-    Attributes
-    ----------
-    kind
-        The test.
-    rows
-        Which rows of the block it has.
-    why
-        What in the block says so.
+    `kind`: the test.
+    `rows`: which rows of the block it has.
+    `why`: what in the block says so.
     """
 
     kind: TestName
@@ -48,10 +42,7 @@ class Recognised:
 def recognise(readings: Readings) -> list[Recognised]:
     """Return which tests a block holds; the tests of one table are apart already.
 
-    Raises
-    ------
-    InputError
-        If a unit is missing or wrong.
+    Raises InputError if a unit is missing or wrong.
     """
     said = said_of(readings.block, readings.name)
     _find_time(readings)

@@ -23,18 +23,11 @@ _REACHED = 0.95
 class Record:
     """One test, as the folder will hold it.
 
-    Attributes
-    ----------
-    table
-        Columns in SI units by quantity, in the order of the file.
-    conditions
-        Cells of ``runs.csv``.
-    temperature
-        Mean, in °C; None where nobody says it.
-    dropped
-        Rows left out, for want of a number or because they cannot be.
-    notes
-        What else was done or is to be known, in words.
+    `table`: columns in SI units by quantity, in the order of the file.
+    `conditions`: cells of ``runs.csv``.
+    `temperature`: mean, in °C; None where nobody says it.
+    `dropped`: rows left out, for want of a number or because they cannot be.
+    `notes`: what else was done or is to be known, in words.
     """
 
     kind: TestName
@@ -58,10 +51,7 @@ class Record:
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
     """Return the test that some rows of a block hold.
 
-    Raises
-    ------
-    InputError
-        If it lacks what such a test needs; names it.
+    Raises InputError if it lacks what such a test needs; names it.
     """
     made = {
         "frequency_sweep": _frequency_sweep,
@@ -338,13 +328,7 @@ def joined(creep: Record, recovery: Readings) -> Record | None:
 
 
 def _followed(creep: Record, after: dict[str, Values]) -> Record:
-    """Return a test at given stress with what follows it, whose clock and strain may start again.
-
-    Parameters
-    ----------
-    after
-        Time in s, stress in Pa and strain of what follows.
-    """
+    """Return a test at given stress with what follows; clock and strain may start again."""
     time, strain = after["time"], after["strain"]
     end, last = float(creep.table["time"][-1]), float(creep.table["strain"][-1])
     if abs(strain[0]) < 0.2 * abs(last):  # counted from the start of the recovery

@@ -1,17 +1,96 @@
-"""Rows of cells in a text file: its encoding, its delimiter and its decimal sign."""
+"""Cells of text: encoding, delimiter, decimal sign, clocks, and what lines above a block say."""
 
 import codecs
 import csv
 import io
 import re
 import unicodedata
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Literal
 
-from discover.dataset.importing.clock_times import is_clock
+import numpy as np
+from jaxtyping import Float
+
 from discover.dataset.importing.names import code_page_of
 from discover.dataset.tables.table import read_bytes
+from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
+
+_DATE = (
+    r"(?:(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
+    r"|(?P<first>\d{1,2})(?P<mark>[-/.])(?P<second>\d{1,2})(?P=mark)(?P<last>\d{4}|\d{2}))[T ,]+"
+)
+_CLOCK = re.compile(
+    rf"(?:{_DATE}|(?P<days>\d{{1,5}})(?:\.| ?d(?:ays?)?,? +))?"
+    r"(?:(?P<hours>\d{1,4}):)?(?P<minutes>\d{1,4}):(?P<seconds>\d{1,2}(?:[.,]\d*)?)"
+    r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?\s*(?:Z|[+-]\d{2}:?\d{2})?"
+)
+_DAY = 86400.0
+
+
+def is_clock(cell: str) -> bool:
+    """Return whether a cell is a clock's reading, a duration with colons or a time stamp."""
+    return ":" in cell and _CLOCK.fullmatch(cell) is not None
+
+
+def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
+    """Return readings of a clock in s, nan where a cell is none.
+
+    Durations are as they stand. Clocks of the day and time stamps count from the first, since they
+    are later than the whole record is long; past midnight they go on.
+
+    `unit`: as the export writes it; ``hh:mm`` says that the first of two numbers is hours.
+    """
+    matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
+    # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
+    # is the first of May
+    found = [m for m in matches if m]
+    months = [int(m["second"]) for m in found if m["second"]]
+    days = [int(m["first"]) for m in found if m["first"]]
+    american = any(m["half"] and m["mark"] == "/" for m in found) and max(days, default=0) <= 12
+    american = american or max(months, default=0) > 12
+    in_hours = re.fullmatch(r"h+\W?m+(?:in)?", unit.strip().lower()) is not None
+    values = np.array([_reading(m, american, in_hours) for m in matches])
+    known = np.flatnonzero(np.isfinite(values))
+    if not len(known):
+        return values
+    clock = values[known]
+    # a day goes by where a clock without a date falls back by more than half of one
+    clock = clock + _DAY * np.cumsum(np.diff(clock, prepend=clock[0]) < -0.5 * _DAY)
+    if any(m["year"] or m["last"] for m in found) or clock[0] > max(np.ptp(clock), 60.0):
+        clock = clock - clock[0]
+    values[known] = clock
+    return values
+
+
+def _reading(match: re.Match | None, american: bool, in_hours: bool) -> float:
+    if match is None:
+        return np.nan
+    numbers = [float((match[key] or "0").replace(",", ".")) for key in _UNITS]
+    if in_hours and match["hours"] is None:
+        numbers = [numbers[1], numbers[2], 0.0]
+    if match["half"]:
+        numbers[0] = numbers[0] % 12 + 12.0 * (match["half"][0] in "Pp")
+    time = 3600.0 * numbers[0] + 60.0 * numbers[1] + numbers[2] + _DAY * int(match["days"] or 0)
+    if match["year"]:
+        date = int(match["year"]), int(match["month"]), int(match["day"])
+    elif match["last"]:
+        day, month = int(match["first"]), int(match["second"])
+        year = int(match["last"])
+        date = (year if year > 99 else 2000 + year, *((day, month) if american else (month, day)))
+    else:
+        return time
+    try:
+        return datetime(*date, tzinfo=UTC).timestamp() + time
+    except ValueError:  # no such day
+        return np.nan
+
+
+_UNITS = ("hours", "minutes", "seconds")
+
 
 Decimal = Literal[".", ","]
 
@@ -44,19 +123,9 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    Parameters
-    ----------
-    delimiter
-        Name from `DELIMITERS`; found from the file if None.
-    decimal
-        Decimal sign; found from the file if None.
-    encoding
-        Of the text; found from the file if None.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or its decimal sign cannot be told from its thousands separator.
+    `delimiter`: name from `DELIMITERS`; found from the file if None. `decimal`: decimal sign; found
+    from the file if None. `encoding`: of the text; found from the file if None. Raises InputError
+    if the file cannot be read, or its decimal sign cannot be told from its thousands separator.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()
@@ -87,19 +156,8 @@ def with_points(
 ) -> list[list[str]]:
     """Return rows of cells without spaces around them, numbers with decimal points.
 
-    Parameters
-    ----------
-    rows
-        The cells of each line.
-    name
-        Of the file, for messages.
-    decimal
-        Decimal sign; found from the cells if None.
-
-    Raises
-    ------
-    InputError
-        If the decimal sign cannot be told from the thousands separator.
+    `decimal`: decimal sign; found from the cells if None. Raises InputError if the decimal sign
+    cannot be told from the thousands separator.
     """
     rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
     sign = decimal or _decimal(rows, name)
@@ -193,3 +251,93 @@ def _decimal(rows: list[list[str]], name: str) -> Decimal:
             "--decimal , or --decimal . to decide."
         )
     return ","
+
+
+_VALUE = r"([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?)\s*((?:1/|[^\s0-9:]).{0,19})?"
+_ALONE = re.compile(_VALUE)
+_UNIT = re.compile(
+    r"[#%\s]*([^:=#%]{1,40}?)[\s_]+(?:units?|einheit|unité)\s*[:=]\s*(\S.{0,19})", re.I
+)
+_WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
+_DEGREES = re.compile(
+    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
+    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])"
+)
+_KELVIN_FROM = 200.0
+"""Below which a melt or a solution is frozen, in K."""
+
+_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number that holds for a whole block.
+
+    `name`: as the file writes it.
+    `value`: with a decimal point; empty where the line gives a unit alone, as "Rate Unit: 1/s".
+    `unit`: empty where the file gives none.
+    """
+
+    name: str
+    value: str
+    unit: str
+
+
+def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
+    """Return what lines say as a name, a number and a unit; the last of a name counts."""
+    found: dict[tuple[str, bool], Constant] = {}
+    for row in rows:
+        for constant in _constants([cell for cell in row if cell]):
+            if constant.name[:1].isalpha():
+                found[constant.name.lower(), bool(constant.value)] = constant
+    return tuple(found.values())
+
+
+def _constants(cells: Sequence[str]) -> Iterator[Constant]:
+    if not 1 <= len(cells) <= 8:
+        return
+    value = _ALONE.fullmatch(" ".join(cells[1:3]))
+    if value and len(cells) <= 3:
+        yield _constant(cells[0], *value.groups())
+        return
+    for part in " ".join(cells).split(";"):
+        if unit := _UNIT.fullmatch(part.strip()):
+            yield Constant(unit[1], "", unit[2])
+            continue
+        match = _WITH_KEY.fullmatch(part.strip())
+        if match:
+            yield _constant(*match.groups())
+
+
+def _constant(name: str, number: str, unit: str | None) -> Constant:
+    name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
+    return Constant(name, number.replace(",", "."), unit)
+
+
+_AS_SYMBOL = re.compile(
+    r"(?<![^\W_])T(?:emp(?:erature)?)?\s*=\s*(-?[0-9]+(?:[.,][0-9]+)?)(?![\w.,%°])"
+)
+
+
+def temperature_in(text: str) -> Constant | None:
+    """Return the temperature that a title or a file's name says; None if it says none, or several.
+
+    In kelvin only where a melt or solution can be, since 95K may be a molar mass.
+    """
+    found = {}
+    text = text.replace("_", " ")
+    for match in _DEGREES.finditer(text):
+        value = match[1].replace(",", ".")
+        unit = match[2][0].upper()
+        if _TO.search(text[: match.start()]):
+            return None  # a ramp
+        if unit == "C" or _KELVIN_FROM <= float(value) <= 700.0:
+            sign = "-" if match[0].startswith("-") else ""
+            found[sign + value, unit] = Constant(
+                "temperature", sign + value, "°C" if unit == "C" else "K"
+            )
+    if not found and (match := _AS_SYMBOL.search(text)):
+        value = match[1].replace(",", ".")
+        if abs(float(value)) < _KELVIN_FROM:  # from there on it may be in kelvin
+            return Constant("temperature", value, "°C")
+    return next(iter(found.values())) if len(found) == 1 else None

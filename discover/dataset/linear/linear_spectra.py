@@ -1,6 +1,7 @@
-"""A spectrum of relaxation modes from any linear test, and what it says of the others."""
+"""A spectrum from any linear test, and whether it predicts the others."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -8,13 +9,15 @@ from jaxtyping import Float
 from scipy.optimize import nnls
 from scipy.special import exprel
 
-from discover.dataset.linear.linear_tests import RELAXATION, SWEEP, LinearTest
+from discover.dataset.linear.linear_tests import RELAXATION, SWEEP, LinearTest, Tests
 from discover.dataset.linear_viscoelasticity import (
     FLOOR,
     MOST_MODES,
     RelaxationSpectrum,
     relaxation_spectrum,
 )
+from discover.errors import InputError
+from discover.statistics.projection import rms
 
 _STIFFEST = 1e3
 """Times the largest modulus that a compliance shows at once, of a compliance that fits without one:
@@ -43,16 +46,7 @@ def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
 def _fewest_modes(
     fit: Callable[[int, float], tuple[np.ndarray, np.ndarray, float]], most: int
 ) -> RelaxationSpectrum:
-    """Return the spectrum with the fewest modes of those that fit nearly as well as any.
-
-    Parameters
-    ----------
-    fit
-        Moduli in Pa, relaxation times in s and relative error, of a number of modes and of how far
-        their times go beyond the data, in decades.
-    most
-        Largest number of modes.
-    """
+    """Return the spectrum with the fewest modes of those that fit nearly as well as any."""
     trials = [fit(n, margin) for n in range(1, most + 1) for margin in _MARGINS[: 2 * n]]
     best = min(error for _, _, error in trials)
     errors: dict[int, float] = {}
@@ -66,14 +60,8 @@ def _fewest_modes(
 def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.ndarray:
     """Return what a spectrum says of a kind of test, shape as the values of one.
 
-    Parameters
-    ----------
-    spectrum
-        The modes.
-    kind
-        ``lve``, ``relaxation`` or ``creep``.
-    argument
-        Frequencies in rad/s or times in s.
+    `spectrum`: the modes. `kind`: ``lve``, ``relaxation`` or ``creep``. `argument`: frequencies in
+    rad/s or times in s.
     """
     if kind == SWEEP:
         return np.stack(spectrum.moduli(argument))
@@ -112,14 +100,8 @@ def modes_of_retardation(
     and 1/η the matrix is symmetric, and its modes are those of relaxation   [Ferry 1980,
     Viscoelastic Properties of Polymers, ch. 3; the inverse of `creep_compliance`].
 
-    Parameters
-    ----------
-    instant
-        J_g in 1/Pa, positive.
-    fluidity
-        1/η in 1/(Pa s).
-    compliance, retardation_time
-        J_k in 1/Pa and τ_k in s.
+    `instant`: J_g in 1/Pa, positive. `fluidity`: 1/η in 1/(Pa s). `compliance`, `retardation_time`:
+    J_k in 1/Pa and τ_k in s.
     """
     there = compliance > 0.0
     rates = 1.0 / retardation_time[there]
@@ -162,3 +144,88 @@ def _from_creep(test: LinearTest, n: int, margin: float):
     modulus, time = modes_of_retardation(instant, found[1], found[2:], times)
     # of a solid some of the modulus never relaxes, and stays over all times measured
     return modulus, np.minimum(time, 1e6 * test.argument[-1]), error
+
+
+AGREES = 0.1
+"""Root-mean-square relative error up to which two linear tests agree: two loadings and two kinds of
+test rarely differ by less than some per cent."""
+
+_FEWEST = 4
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the modes of one linear test predict another.
+
+    `source`: the test that the modes come from: ``lve``, ``relaxation`` or ``creep``.
+    `test`: the one predicted.
+    `celsius`: temperature of both.
+    `error`: root-mean-square relative error of the prediction over the times that the source
+        reaches.
+    `bias`: mean relative error over them: a gain of one of the two shows here.
+    `times`: first and last of those times in s, 1/ω for a sweep.
+    """
+
+    source: str
+    test: str
+    celsius: float
+    error: float
+    bias: float
+    times: tuple[float, float]
+
+    @property
+    def left(self) -> float:
+        """What would be left of the error, were the prediction divided by one factor."""
+        return float(np.sqrt(max(self.error**2 - self.bias**2, 0.0)) / (1.0 + self.bias))
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the error is up to `AGREES`."""
+        return self.error <= AGREES
+
+
+def linear_agreements(tests: Tests) -> list[Agreement]:
+    """Return how well each test predicts each other one at its temperature.
+
+    Times that both reach are compared, 1/ω of a frequency: the modes of a test say nothing of
+    others.
+
+    `tests`: by kind and temperature in °C, as measured or as moved to one.
+    """
+    spectra = {}
+    found = []
+    for source, test in ((a, b) for a in tests for b in tests if a != b):
+        for celsius in sorted(set(tests[source]) & set(tests[test])):
+            one, other = tests[source][celsius], tests[test][celsius]
+            inside = _shared(one, other)
+            if np.sum(inside) < _FEWEST:
+                continue
+            if (source, celsius) not in spectra:
+                spectra[source, celsius] = _modes(one)
+            spectrum = spectra[source, celsius]
+            if spectrum is None:
+                continue
+            argument = other.argument[inside]
+            error = predicted(spectrum, test, argument) / other.values[:, inside] - 1.0
+            size, bias = rms(error), float(np.mean(error))
+            seen = _times(other)[inside]
+            ends = float(seen.min()), float(seen.max())
+            found.append(Agreement(source, test, celsius, size, bias, ends))
+    return found
+
+
+def _modes(test: LinearTest):
+    try:
+        return spectrum_of(test)
+    except InputError:  # too few samples, or moduli that no modes have
+        return None
+
+
+def _times(test: LinearTest) -> np.ndarray:
+    return 1.0 / test.argument if test.kind == SWEEP else test.argument
+
+
+def _shared(one: LinearTest, other: LinearTest) -> np.ndarray:
+    reached, times = _times(one), _times(other)
+    slack = 1.0 + 1e-9  # of 1/ω
+    return (times >= reached.min() / slack) & (times <= reached.max() * slack)

@@ -38,16 +38,10 @@ _COLUMNS = {
 class LinearTest:
     """A material function at one temperature.
 
-    Attributes
-    ----------
-    kind
-        ``lve``, ``relaxation`` or ``creep``.
-    argument
-        Frequencies in rad/s or times in s, shape (n,), increasing.
-    values
-        G′ and G″ in Pa, shape (2, n); G(t) in Pa or J(t) in 1/Pa, shape (1, n).
-    spread
-        Relative standard error of averages, shape (n,); zero where nothing was averaged.
+    `kind`: ``lve``, ``relaxation`` or ``creep``.
+    `argument`: frequencies in rad/s or times in s, shape (n,), increasing.
+    `values`: G′ and G″ in Pa, shape (2, n); G(t) in Pa or J(t) in 1/Pa, shape (1, n).
+    `spread`: relative standard error of averages, shape (n,); zero where nothing was averaged.
     """
 
     kind: str
@@ -75,10 +69,7 @@ class LinearTest:
     def moved(self, log_shift: float, log_vertical: float) -> "LinearTest":
         """Return the test as at the reference: ω a_T, t/a_T, G/b_T, J b_T.
 
-        Parameters
-        ----------
-        log_shift, log_vertical
-            log10 of a_T and b_T.
+        `log_shift`, `log_vertical`: log10 of a_T and b_T.
         """
         along, up = directions(self.kind)
         return replace(
@@ -120,14 +111,8 @@ def over_time(
     log J or log G is averaged over log time, about the straight line through the samples of an
     interval; what they scatter about it by is the error of the average.
 
-    Parameters
-    ----------
-    kind
-        ``relaxation`` or ``creep``.
-    time
-        In s, positive and increasing.
-    values
-        In Pa or 1/Pa, positive.
+    `kind`: ``relaxation`` or ``creep``. `time` in s, positive and increasing. `values` in Pa or
+    1/Pa, positive.
     """
     x, y = np.log10(time), np.log10(values)
     interval = np.floor(PER_DECADE * (x - x[0])).astype(int)
@@ -146,10 +131,7 @@ def over_time(
 def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
     """Yield kind, temperature in °C and file of each linear test that ``tests.csv`` lists.
 
-    Raises
-    ------
-    InputError
-        If the list is missing or wrong.
+    Raises InputError if the list is missing or wrong.
     """
     table = read_table(
         root / TESTS_FILE, TESTS_FILE, "Tests at several temperatures are listed there; write one "
@@ -182,10 +164,7 @@ def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
 def read_linear_tests(root: Path) -> dict[str, dict[float, LinearTest]]:
     """Return the linear tests of a folder by kind and temperature, as ``tests.csv`` lists them.
 
-    Raises
-    ------
-    InputError
-        If the list or a file is wrong, or no kind of test has two temperatures.
+    Raises InputError if the list or a file is wrong, or no kind of test has two temperatures.
     """
     found: dict[str, dict[float, LinearTest]] = {}
     for kind, celsius, path in listed_tests(root):

@@ -26,18 +26,12 @@ _LONGEST = 1e12
 class ModeFit:
     """Least-squares fit of modes, a solvent and an elastic constant to a sweep.
 
-    Attributes
-    ----------
-    relaxation_time
-        In s, shape (k,), increasing.
-    modulus
-        In Pa, shape (k,).
-    solvent_viscosity, elastic_modulus
-        In Pa s and Pa; None where it is not among what was fitted.
-    squared
-        Sum of the squared relative misfits of G′ and G″.
-    criterion
-        Twice the negative log evidence; the smallest is the best.
+    `relaxation_time` in s, shape (k,), increasing.
+    `modulus` in Pa, shape (k,).
+    `solvent_viscosity`, `elastic_modulus` in Pa s and Pa; None where it is not among what was
+        fitted.
+    `squared`: sum of the squared relative misfits of G′ and G″.
+    `criterion`: twice the negative log evidence; the smallest is the best.
     """
 
     relaxation_time: Float[np.ndarray, " k"]
@@ -91,14 +85,10 @@ class ModeSearch:
     [Lawson & Hanson 1974]. Their times are then fitted along, and modes merged or left out one by
     one, the least missed first, down to one. Solvent and elastic constant are with and without.
 
-    Attributes
-    ----------
-    frequency
-        In rad/s, shape (n,).
-    measured
-        G′ and G″ in Pa, shape (2, n).
-    solvent_viscosity, elastic_modulus
-        Values known beforehand; ``"fit"`` is always fitted, None only where evidence asks for it.
+    `frequency` in rad/s, shape (n,).
+    `measured`: G′ and G″ in Pa, shape (2, n).
+    `solvent_viscosity`, `elastic_modulus`: values known beforehand; ``"fit"`` is always fitted,
+        None only where evidence asks for it.
     """
 
     frequency: Float[np.ndarray, " n"]
@@ -125,10 +115,7 @@ class ModeSearch:
     def fits(self, fewest: int = 0) -> Iterator[ModeFit]:
         """Yield fits of every number of modes, with and without solvent and elastic constant.
 
-        Parameters
-        ----------
-        fewest
-            Number of modes that there has to be a fit of, though fewer may do.
+        `fewest`: number of modes that there has to be a fit of, though fewer may do.
         """
         choices = [
             (True,) if value == "fit" else (False, True) if value is None else (False,)
@@ -224,13 +211,7 @@ class ModeSearch:
         return replace(fit, criterion=self._criterion(fit))
 
     def _fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
-        """Return the fit with the relaxation times fitted along, in logarithms.
-
-        Parameters
-        ----------
-        limits
-            Relative change at which it ends, and most evaluations.
-        """
+        """Return the fit with the relaxation times fitted along, in logarithms."""
         tolerance, evaluations = limits
         k, extra = len(fit.modulus), _linear(fit)
         if not k:

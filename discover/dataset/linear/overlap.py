@@ -46,12 +46,8 @@ _DECADE = np.log(10.0)
 class Overlap:
     """The shift of one test over another.
 
-    Attributes
-    ----------
-    shift
-        log10 of a_T and b_T of the warmer over the colder.
-    covariance
-        Of both, shape (2, 2); what neighbouring samples share counts once.
+    `shift`: log10 of a_T and b_T of the warmer over the colder.
+    `covariance`: of both, shape (2, 2); what neighbouring samples share counts once.
     """
 
     shift: Float[np.ndarray, " 2"]
@@ -99,19 +95,9 @@ def lay_over(
 ) -> Overlap:
     """Return the one shift that lays tests over those of the same kinds at a lower temperature.
 
-    Parameters
-    ----------
-    cold, warm
-        By kind; kinds that both have are laid over each other.
-    vertical
-        Whether values too may be moved.
-    where
-        The two temperatures, in words.
-
-    Raises
-    ------
-    InputError
-        If nothing overlaps, or only curves of other shapes.
+    `cold`, `warm`: by kind; kinds that both have are laid over each other. `vertical`: whether
+    values too may be moved. `where`: the two temperatures, in words. Raises InputError if nothing
+    overlaps, or only curves of other shapes.
     """
     pairs = [_pair(cold[kind], warm[kind], where) for kind in cold if kind in warm]
     # power laws slide along themselves if they may move up too: first without that

@@ -13,13 +13,93 @@ from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Float
+from scipy.constants import R
+from scipy.optimize import curve_fit
 from scipy.stats import norm
+from scipy.stats import t as student
 
+from discover.dataset.linear.linear_spectra import Agreement, linear_agreements
 from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests, of_sweep
 from discover.dataset.linear.overlap import lay_over, overlap_misfit
-from discover.dataset.linear.shift_laws import ShiftLaw, fit_shift_laws
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.errors import InputError
+from discover.statistics.projection import rms
+
+
+@dataclass(frozen=True)
+class ShiftLaw:
+    """Shift factors as a function of temperature.
+
+    `name`: ``WLF`` or ``Arrhenius``.
+    `values`: C1 and C2 in K, or the activation energy in J/mol, by name.
+    `intervals`: 95 % interval of each; None where these shifts do not determine it.
+    `error`: root-mean-square misfit of log10 a_T.
+    """
+
+    name: str
+    values: dict[str, float]
+    intervals: dict[str, tuple[float, float] | None]
+    error: float
+
+    def log_shift(
+        self, celsius: Float[np.ndarray, " n"], reference: float
+    ) -> Float[np.ndarray, " n"]:
+        """Return log10 a_T at temperatures in °C."""
+        return _LAWS[self.name][0](celsius, reference, *self.values.values())
+
+
+def fit_shift_laws(
+    celsius: Float[np.ndarray, " n"], log_shift: Float[np.ndarray, " n"], at: int
+) -> tuple[ShiftLaw, ...]:
+    """Return WLF and Arrhenius, fitted; fewer where there are too few temperatures.
+
+    `celsius` in °C. `log_shift`: log10 a_T. `at`: which of them is the reference.
+    """
+    fitted = (_fit_law(name, celsius, log_shift, at) for name in _LAWS)
+    return tuple(law for law in fitted if law is not None)
+
+
+def _wlf(celsius, reference, c1, c2):
+    return -c1 * (celsius - reference) / (c2 + celsius - reference)
+
+
+def _arrhenius(celsius, reference, energy):
+    return energy / R / np.log(10.0) * (1.0 / (celsius + 273.15) - 1.0 / (reference + 273.15))
+
+
+_LAWS = {
+    "WLF": (_wlf, {"C1": 10.0, "C2_K": 100.0}),
+    "Arrhenius": (_arrhenius, {"activation_energy_J_mol": 5e4}),
+}
+
+
+def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
+    """Return a law of the shifts; None with too few temperatures. The reference has no shift."""
+    law, start = _LAWS[name]
+    others = np.arange(len(celsius)) != at
+    if np.sum(others) <= len(start):
+        return None
+    reference = float(celsius[at])
+    coldest = reference - float(celsius[0])
+
+    def of(temperatures, *free):
+        return law(temperatures, reference, *free)
+
+    first = list(start.values())
+    first[-1] = max(first[-1], 1.5 * coldest) if name == "WLF" else first[-1]
+    try:
+        values, covariance = curve_fit(of, celsius[others], log_shift[others], p0=first)
+    except RuntimeError:  # no such law near these shifts
+        return None
+    left = log_shift[others] - of(celsius[others], *values)
+    wide = student.ppf(0.975, np.sum(others) - len(start)) * np.sqrt(np.diag(covariance))
+    intervals = {
+        key: (float(value - half), float(value + half)) if half < abs(value) else None
+        for key, value, half in zip(start, values, wide, strict=True)
+    }
+    known = {key: float(value) for key, value in zip(start, values, strict=True)}
+    return ShiftLaw(name, known, intervals, rms(left))
+
 
 SUPERPOSED, FAILED = 0.05, 0.1
 """Root-mean-square relative misfit in an overlap up to which tests superpose, about what two
@@ -32,24 +112,14 @@ _TWO_SIDED = float(norm.ppf(0.975))
 class Superposition:
     """Tests at several temperatures, moved to one.
 
-    Attributes
-    ----------
-    reference
-        In °C.
-    celsius
-        Temperatures, increasing, shape (n,).
-    tests
-        As measured, by kind and temperature.
-    leading
-        The kinds that the shifts were found from.
-    log_shift, log_vertical
-        log10 of a_T and b_T, shape (n,).
-    error
-        Standard errors of both, shape (n, 2).
-    laws
-        WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
-    apart
-        Temperatures in °C whose tests share no kind with the others', and are not moved.
+    `reference` in °C.
+    `celsius`: temperatures, increasing, shape (n,).
+    `tests`: as measured, by kind and temperature.
+    `leading`: the kinds that the shifts were found from.
+    `log_shift`, `log_vertical`: log10 of a_T and b_T, shape (n,).
+    `error`: standard errors of both, shape (n, 2).
+    `laws`: WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
+    `apart`: temperatures in °C whose tests share no kind with the others', and are not moved.
     """
 
     reference: float
@@ -131,19 +201,9 @@ def superpose(
 ) -> Superposition:
     """Return tests at several temperatures moved to one of them.
 
-    Parameters
-    ----------
-    tests
-        By kind and by temperature in °C; or sweeps by temperature.
-    reference
-        One of them; the middle one if None.
-    vertical
-        Whether moduli and compliances too may be moved.
-
-    Raises
-    ------
-    InputError
-        If the reference is none of the temperatures, or neighbours share too few values.
+    `tests`: by kind and by temperature in °C; or sweeps by temperature. `reference`: one of them;
+    the middle one if None. `vertical`: whether moduli and compliances too may be moved. Raises
+    InputError if the reference is none of the temperatures, or neighbours share too few values.
     """
     known = _by_kind(tests)
     several = {kind: at for kind, at in known.items() if len(at) > 1}
@@ -212,3 +272,50 @@ def shift_table(found: Superposition) -> str:
         numbers = [repr(value) for factor in found.factors(i) for value in factor]
         rows.append([f"{degrees:g}", *numbers, *off])
     return "\n".join(",".join(row) for row in rows) + "\n"
+
+
+@dataclass(frozen=True)
+class MovedTests:
+    """What a folder of linear tests at several temperatures becomes.
+
+    `found`: tests and shifts.
+    `own`: what tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
+    `agreements`: how well tests predict one another at each temperature.
+    `files`: moved tests as one, by name of the file; None where they do not become one.
+    """
+
+    found: Superposition
+    own: Mapping[str, Superposition]
+    agreements: list[Agreement]
+    files: Mapping[str, LinearTest | None]
+
+
+def move_tests(
+    tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
+) -> MovedTests:
+    """Return tests moved to one temperature, with what can be said of them.
+
+    `tests`: by kind and temperature in °C. `reference`: one of the temperatures; the middle one if
+    None. `vertical`: whether moduli and compliances too may be moved. `between`: only temperatures
+    from one to the other. Raises InputError if too few temperatures are left, or neighbours share
+    too few values.
+    """
+    if between is not None:
+        low, high = min(between), max(between)
+        tests = {
+            kind: chosen
+            for kind, at in tests.items()
+            if (chosen := {t: one for t, one in at.items() if low <= t <= high})
+        }
+    found = superpose(tests, reference, vertical)
+    own = {}
+    for kind, at in tests.items():
+        there = {t: at[t] for t in at if t in found.celsius}
+        if kind == SWEEP or kind in found.leading or found.reference not in there:
+            continue
+        try:
+            own[kind] = superpose({kind: there}, found.reference, vertical)
+        except InputError:  # too few, or apart: the sweeps' shifts are all there is
+            continue
+    files = {f"{kind}.csv": found.master(kind) for kind in tests}
+    return MovedTests(found, own, linear_agreements(tests), files)

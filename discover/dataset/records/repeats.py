@@ -1,17 +1,19 @@
-"""What repeated tests say of their error: loading, trimming and noise together."""
+"""Records of one material held against one another: repeats, copies, loadings, sequences."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from discover.dataset.loading import LARGEST
-from discover.dataset.run import Run
+from discover.dataset.run import LARGEST, Loading, Run
+from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
 from discover.statistics.projection import rms
+from discover.statistics.residual import fast_part
 
 _SAME = 0.02
 """Relative difference of rates, and of what runs.csv says of two runs, that is none."""
@@ -30,13 +32,9 @@ _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_se
 class Repeats:
     """Runs that repeat one another, and by how much they differ.
 
-    Attributes
-    ----------
-    groups
-        Names of the runs of each test that was repeated, of those whose difference counts.
-    error
-        Relative error of one run: root-mean-square of the difference of two, over √2 and over that
-        of the record; of several tests the root-mean-square.
+    `groups`: names of the runs of each test that was repeated, of those whose difference counts.
+    `error`: relative error of one run: root-mean-square of the difference of two, over √2 and over
+        that of the record; of several tests the root-mean-square.
     """
 
     groups: tuple[tuple[str, ...], ...]
@@ -48,11 +46,6 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
 
     Of runs of one test (`repeated_tests`) those tell their error that cover half of each other, and
     differ by no more than loadings do.
-
-    Parameters
-    ----------
-    runs
-        As in `repeated_tests`.
     """
     named = {run.name: run for run in runs}
     groups, squares = [], []
@@ -74,10 +67,7 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
     their conditions. The rates have to agree over all of the longer run, where the shorter would go
     on as it was told, or over the time that both cover if that is half of it.
 
-    Parameters
-    ----------
-    runs
-        Runs; those of steady or periodic states and those at a given stress are passed over.
+    `runs`: runs; those of steady or periodic states and those at a given stress are passed over.
     """
     timed = [
         run
@@ -99,10 +89,7 @@ def count_flows(runs: Sequence[Run]) -> int:
 
     A test that was repeated is one flow. Each steady or periodic state of a table is one.
 
-    Parameters
-    ----------
-    runs
-        Runs; one that is there several times, with other quantities, counts once.
+    `runs`: runs; one that is there several times, with other quantities, counts once.
     """
     named = [*{run.name: run for run in runs}.values()]
     again = sum(len(group) - 1 for group in repeated_tests(named))
@@ -157,3 +144,100 @@ def _difference(one: Run, other: Run) -> float:
     records = [PchipInterpolator(run.time, run.recorded)(times) for run in (one, other)]
     size = rms(records) or 1.0
     return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size
+
+
+_FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
+
+_ROUNDED = 0.1
+"""Of what changes from sample to sample: two records of one test differ by √2 of it, one record
+written with other digits by far less."""
+
+
+def is_copy(one: Run, other: Run) -> bool:
+    """Return whether two runs are one record, but for its name, its digits and samples left out.
+
+    `one`, `other`: runs, whatever is told of their rates.
+    """
+    if one.quantity != other.quantity or one.flow != other.flow:
+        return False
+    fewer, more = sorted((one, other), key=len)
+    if len(fewer) < _FEWEST:
+        return len(one) == len(other) and _equal(one, other)
+    at = np.clip(np.searchsorted(more.time, fewer.time), 0, len(more) - 1)
+    at = np.where(
+        np.abs(more.time[at - 1] - fewer.time) < np.abs(more.time[at] - fewer.time), at - 1, at
+    )
+    close = np.abs(more.time[at] - fewer.time) <= 1e-6 * max(float(fewer.time[-1]), 1e-300)
+    if np.mean(close) < 0.9 or np.count_nonzero(close) < _FEWEST:
+        return False
+    known, found = fewer.recorded[close], more.recorded[at[close]]
+    if not np.any(known):
+        return False
+    off = rms(known - found)
+    return off <= _ROUNDED * fast_part(known)
+
+
+def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
+    """Refuse to judge by a record that is fitted under another name.
+
+    Among fitted runs a copy makes intervals a little too narrow, of which a check of the folder
+    warns.
+
+    Raises InputError that names both.
+    """
+    for run in held_out:
+        copied = next((other.name for other in fitted if is_copy(run, other)), None)
+        if copied is not None:
+            raise InputError(
+                f"The held-out run {run.name!r} holds the same samples as the fitted run "
+                f"{copied!r}, so it proves nothing. Hold out another, or none."
+            )
+
+
+def _equal(one: Run, other: Run) -> bool:
+    return np.array_equal(one.time, other.time) and np.array_equal(one.recorded, other.recorded)
+
+
+def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
+    """Return runs each of which is a loading of its own; as they are where nothing is said of it.
+
+    `deviation`: relative standard deviation by which loadings differ. Raises InputError if they
+    cannot differ so, or a stress was imposed, which a factor changes otherwise.
+    """
+    if deviation is None:
+        return list(runs)
+    if not 0.0 < deviation <= LARGEST:
+        raise InputError(
+            f"loading must be above 0 and at most {LARGEST:g}; got {deviation:g}. It is "
+            "the relative standard deviation by which loadings of a sample differ, such as 0.03."
+        )
+    creep = [run.name for run in runs if run.protocol.control == "stress"]
+    if creep:
+        raise InputError(
+            f"loading is a factor on a recorded stress, and the stress of the run {creep[0]!r} was "
+            "imposed. Take such runs out, or leave loading out."
+        )
+    return [replace(run, loading=Loading(deviation, noise)) for run in runs]
+
+
+def total_strain(run: Run) -> float:
+    """Return the strain of a run, added up without regard to its sign."""
+    size = np.abs(run.rate)
+    # before its first sample a run flows at the rate of that sample
+    early = float(size[0] * run.time[0])
+    return early + float(np.trapezoid(size, run.time))
+
+
+def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
+    """Return the runs with the strain that their sample had seen in earlier ones.
+
+    Only strains are added up: what a held-out run did to the sample is known without its stress.
+
+    `order`: start times, or any numbers in the order of the runs; runs of equal number are
+    parallel.
+    """
+    totals = np.array([total_strain(run) for run in runs])
+    return tuple(
+        replace(run, strain_before=float(np.sum(totals[order < at])))
+        for run, at in zip(runs, order, strict=True)
+    )

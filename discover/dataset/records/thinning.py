@@ -1,4 +1,4 @@
-"""Fewer samples of a very long record, chosen so that what a law is judged on stays."""
+"""Fewer samples: of very long records, and without those that a knock or a spark made."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
+from discover.statistics.noise.outliers import isolated
 from discover.words import percent_of
 
 MOST_SAMPLES = 20_000
@@ -37,14 +38,7 @@ def thin(
     cycle; and the largest and smallest stress and rate. Values are the recorded ones, and all but
     those four are chosen by their time alone, so that noise keeps its size and distribution.
 
-    Parameters
-    ----------
-    time
-        Sampling times in s, increasing.
-    shear_rate
-        In 1/s.
-    shear_stress
-        In Pa.
+    `time`: sampling times in s, increasing. `shear_rate` in 1/s. `shear_stress` in Pa.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
@@ -71,18 +65,13 @@ def thin(
     return keep, note
 
 
-def thin_sweep(
-    angular_frequency: Float[np.ndarray, " n"],
-) -> tuple[Bool[np.ndarray, " n"], str]:
+def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
 
     Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
     were recorded.
 
-    Parameters
-    ----------
-    angular_frequency
-        In rad/s, positive and increasing; some may be repeated.
+    `angular_frequency` in rad/s, positive and increasing; some may be repeated.
     """
     n = len(angular_frequency)
     if n <= MOST_FREQUENCIES:
@@ -100,12 +89,7 @@ def thin_sweep(
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
     """Return which of n samples to keep so that at most so many stay, evenly in their order.
 
-    Parameters
-    ----------
-    n
-        How many there are.
-    most
-        How many may stay, 2 or more.
+    `most`: how many may stay, 2 or more.
     """
     keep = np.zeros(n, dtype=bool)
     keep[np.unique(np.round(np.linspace(0, n - 1, min(n, most))).astype(int))] = True
@@ -119,10 +103,7 @@ def thin_run(run: Run, most: int) -> Run:
     and more where it varies faster than these: see `followed_rate`. What was kept is said under
     ``thinned`` of its metadata.
 
-    Parameters
-    ----------
-    most
-        How many samples may stay, 2 or more.
+    `most`: how many samples may stay, 2 or more.
     """
     n = len(run)
     if n <= most:
@@ -146,9 +127,7 @@ def thin_run(run: Run, most: int) -> Run:
 
 
 def followed_rate(
-    time: Float[np.ndarray, " n"],
-    shear_rate: Float[np.ndarray, " n"],
-    keep: Bool[np.ndarray, " n"],
+    time: Float[np.ndarray, " n"], shear_rate: Float[np.ndarray, " n"], keep: Bool[np.ndarray, " n"]
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
 
@@ -156,12 +135,8 @@ def followed_rate(
     at some of them does. Its knots are the samples kept; intervals are halved until the strain is
     right to 0.1 % of its range everywhere, and the rate to 5 % of its largest.
 
-    Parameters
-    ----------
-    time, shear_rate
-        Of all samples, in s and 1/s.
-    keep
-        The samples that are knots in any case, the first and the last among them.
+    `time`, `shear_rate`: of all samples, in s and 1/s. `keep`: the samples that are knots in any
+    case, the first and the last among them.
     """
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)
@@ -198,3 +173,35 @@ def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float
     whole = cumulative_trapezoid(rate, time, initial=0.0)
     part = cumulative_trapezoid(rate[keep], time[keep], initial=0.0)
     return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
+
+
+_CORNER = 0.01  # share of the largest rate, or stress, that was imposed
+_ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
+
+
+def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
+    """Return which samples are next to a step or a corner of what was imposed: rate or stress.
+
+    What is answered there may stand alone without a knock, as where the next interval of a
+    thixotropy test begins, or the way down of a loop.
+    """
+    imposed = run.stress if run.protocol.control == "stress" else run.rate
+    beside = np.zeros(len(imposed), dtype=bool)
+    if len(imposed) < 3:
+        return beside
+    bends = np.abs(np.diff(imposed, 2))
+    sharp = bends > _CORNER * np.max(np.abs(imposed)) + _ABOVE_BENDS * np.median(bends)
+    for shift in range(3):
+        beside[shift : shift + len(sharp)] |= sharp
+    return beside
+
+
+def without_spikes(run: Run) -> tuple[Run, list[float]]:
+    """Return a run without the samples that stand alone in it, and their times in s.
+
+    By the record alone (`isolated`): no law is asked, so whatever is fitted then has no part in it.
+    """
+    off = isolated(run.recorded) & ~beside_a_step(run)
+    if not np.any(off):
+        return run, []
+    return run.window(~off), [float(t) for t in run.time[off]]

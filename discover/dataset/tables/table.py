@@ -42,12 +42,8 @@ _IMPORT = "discover data import"
 class Table:
     """A CSV file as text.
 
-    Attributes
-    ----------
-    name
-        Name of the file, for messages.
-    lines
-        Line of the file on which each row stands; blank lines count but are no rows.
+    `name`: name of the file, for messages.
+    `lines`: line of the file on which each row stands; blank lines count but are no rows.
     """
 
     name: str
@@ -72,10 +68,7 @@ class Table:
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
         """Return a column as finite numbers, those next to nothing as 0.
 
-        Raises
-        ------
-        InputError
-            If a cell is not a finite number, or is larger than any measurement.
+        Raises InputError if a cell is not a finite number, or is larger than any measurement.
         """
         text = self.columns[column]
         # as Python reads them: pandas before 3 drops the last of many digits
@@ -105,10 +98,7 @@ class Table:
     def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
         """Return a known quantity in SI units, or None if no column holds it.
 
-        Raises
-        ------
-        InputError
-            If its unit or a cell is wrong.
+        Raises InputError if its unit or a cell is wrong.
         """
         try:
             found = find_column(tuple(self.columns), quantity)
@@ -130,10 +120,7 @@ class Table:
     def required(self, quantity: Quantity) -> Float[np.ndarray, " n"]:
         """Return a known quantity in SI units.
 
-        Raises
-        ------
-        InputError
-            If no column holds it, or its unit or a cell is wrong.
+        Raises InputError if no column holds it, or its unit or a cell is wrong.
         """
         values = self.quantity(quantity)
         if values is None:
@@ -163,22 +150,10 @@ def read_bytes(
 ) -> bytes:
     """Return the content of a regular file of reasonable size.
 
-    Parameters
-    ----------
-    name
-        Its name in messages.
-    if_missing
-        Remedy where there is no such file.
-    largest, too_large
-        Bytes that it may have, and the remedy where it has more.
-    is_input
-        Whether a command that reads it must not write over it; see `discover.inputs_kept`.
-
-    Raises
-    ------
-    InputError
-        If it is missing, cannot be read, is no regular file (a pipe would never end), or is larger
-        than it may be.
+    `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
+    whether a command that reads it must not write over it; see `discover.inputs_kept`. Raises
+    InputError if it is missing, cannot be read, is no regular file (a pipe would never end), or is
+    larger than it may be.
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
@@ -248,17 +223,8 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
     commas and other encodings are recognised and refused, since guessing at numbers is no help.
 
-    Parameters
-    ----------
-    name
-        Its name in messages; the file's own by default.
-    if_missing
-        Remedy where there is no such file.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, empty or not a table.
+    `name`: its name in messages; the file's own by default. Raises InputError if the file is
+    missing, empty or not a table.
     """
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
@@ -291,9 +257,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     if not rows:
         raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
     return Table(
-        name,
-        {column: [row[i].strip() for row in rows] for i, column in enumerate(header)},
-        lines,
+        name, {column: [row[i].strip() for row in rows] for i, column in enumerate(header)}, lines
     )
 
 
@@ -399,3 +363,38 @@ def shown(cell: str) -> str:
     """Return a cell as it can be printed: short and without control characters."""
     plain = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in cell.strip())
     return (plain[:40] + "…" if len(plain) > 40 else plain) or "nothing"
+
+
+def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
+    """Return finite numbers as an array of shape (n,).
+
+    `values`: A list, an array or a pandas series. Raises InputError if they have a unit of their
+    own, are not numbers, not finite, or of another shape.
+    """
+    if hasattr(values, "magnitude"):
+        raise InputError(
+            f"{label} carries a unit; got a {type(values).__name__}. Give plain "
+            "numbers in SI units."
+        )
+    try:
+        given = np.asarray(values)
+        # pandas marks what is missing in columns of objects
+        numbers = given.astype(float) if given.dtype.kind in "iufO" else None
+    except (TypeError, ValueError, OverflowError):
+        numbers = None
+    if numbers is None or numbers.ndim != 1:
+        raise InputError(f"{label} must be a list or an array of numbers; got {_shown(values)}.")
+    if not np.all(np.isfinite(numbers)):
+        row = int(np.argmin(np.isfinite(numbers)))
+        raise InputError(
+            f"{label} must be finite; sample {row} holds {numbers[row]}. Remove that sample."
+        )
+    return numbers
+
+
+def _shown(values: object) -> str:
+    shape = getattr(values, "shape", None)
+    if shape:
+        return f"an array of shape {shape} of {getattr(values, 'dtype', 'unknown type')}"
+    text = repr(values)
+    return text if len(text) <= 60 else f"{text[:60]}…"

@@ -32,17 +32,9 @@ LARGEST_FILE = 1_000_000
 def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]:
     """Return the content of a TOML file, and its text.
 
-    Parameters
-    ----------
-    kind
-        What it should be, for messages, such as "study file".
-    example
-        What to do instead of giving a file of another kind, as a sentence.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, is no text or no TOML; says on which line.
+    `kind`: what it should be, for messages, such as "study file". `example`: what to do instead of
+    giving a file of another kind, as a sentence. Raises InputError if it cannot be read, is no text
+    or no TOML; says on which line.
     """
     raw = read_bytes(
         path, str(path), f"Check the path of the {kind}.", largest=LARGEST_FILE, too_large=example

@@ -1,25 +1,235 @@
-"""Units in column names: ``stress_kPa`` is read as stress and converted to Pa."""
+"""Units: in column names such as ``stress_kPa``, and as instruments and users write them."""
 
 import math
+import re
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
-from discover.dataset.tables.unit_text import Unit, read_heading, read_unit
 from discover.errors import InputError
+
+# Text from a file is never calculated: a unit is a product of words with small exponents, and the
+# only number in it that is no exponent is the 1 of ``1/s``. So ``10Pa`` and ``Pa_2`` are no units,
+# and ``9**9**9`` is not worked out. What a single word means is asked of pint.
+
+_LONGEST = 40  # characters
+
+_SPELLINGS = {
+    "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
+    "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
+    "pa": "Pa", "PA": "Pa", "kpa": "kPa",
+    "KPa": "kPa", "Mpa": "MPa", "cp": "cP", "CP": "cP", "hz": "Hz", "HZ": "Hz",
+    "Sekunden": "s", "Minuten": "min", "Stunden": "hour", "Prozent": "percent",
+    "secondes": "s", "heures": "hour", "segundos": "s", "minutos": "min", "secondi": "s",
+    "seconden": "s", "sekundy": "s", "секунды": "s", "минуты": "min", "проценты": "percent",
+    "Sek": "s", "sek": "s", "seg": "s", "Std": "hour", "Dyn": "dyn",
+    "Па": "Pa", "мПа": "mPa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "П": "P", "сП": "cP",
+    "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "hour", "рад": "rad", "мрад": "mrad",
+    "Гц": "Hz", "град": "degree", "Н": "N", "мН": "mN", "мкН": "uN", "м": "m", "мм": "mm",
+    "мкм": "um", "см": "cm", "дин": "dyn", "об": "turn",
+    "秒": "s", "毫秒": "ms", "分": "min", "分钟": "min", "分鐘": "min", "小时": "hour",
+    "小時": "hour", "時間": "hour", "帕": "Pa", "千帕": "kPa", "毫帕": "mPa", "兆帕": "MPa",
+    "赫兹": "Hz", "赫茲": "Hz", "弧度": "rad", "ラジアン": "rad", "ヘルツ": "Hz", "パスカル": "Pa",
+    "度": "degree", "转": "turn", "轉": "turn", "毫米": "mm", "초": "s", "분": "min",
+    "시간": "hour", "도": "degree", "라디안": "rad", "파스칼": "Pa", "헤르츠": "Hz",
+}  # fmt: skip
+"""What pint does not know under this name."""
+
+_JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
+"""Products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms."""
+
+_NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
+
+_DIMENSIONS = ("[mass]", "[length]", "[time]")
+
+_NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
+"""Units without a dimension; pint counts constants such as pi among them."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit as its factor to SI and its dimension.
+
+    `factor`: of the SI unit.
+    `dimension`: exponents of kg, m and s. Angles and numbers have none.
+    `cycles`: whether it counts cycles, as Hz does; 1 Hz is 2π rad/s where an angle is meant.
+    """
+
+    factor: float = 1.0
+    dimension: tuple[int, int, int] = (0, 0, 0)
+    cycles: bool = False
+
+    def times(self, other: "Unit", exponent: int = 1) -> "Unit":
+        """Return this unit times a power of another."""
+        kg, m, s = (a + exponent * b for a, b in zip(self.dimension, other.dimension, strict=True))
+        factor = self.factor * other.factor**exponent
+        return Unit(factor, (kg, m, s), self.cycles or other.cycles)
+
+
+def read_heading(suffix: str) -> Unit | None:
+    """Return the unit at the end of a column's name, or None if it is none.
+
+    The first word stands above the fraction line, the others below it: ``1_min``, ``rad_s``,
+    ``dyn_cm2``.
+    """
+    first, *below = suffix.split("_")
+    if len(suffix) > _LONGEST or (first == "1" and not below):
+        return None
+    found = Unit() if first == "1" else _power(first)
+    for word in below:
+        unit = _power(word)
+        if found is None or unit is None:
+            return None
+        found = found.times(unit, -1)
+    return found
+
+
+def read_unit(text: str) -> Unit | None:
+    """Return a unit as exports write it, or None if it is none.
+
+    Products are written with ``.``, ``*``, ``·`` or a space, exponents as ``cm2``, ``s-1``,
+    ``s^-1``, ``s**-1`` or ``s⁻¹``. Empty, ``-`` and ``1`` mean a pure number.
+    """
+    text = tidy_unit(text)
+    if text in ("", "-", "--", "1"):
+        return Unit()
+    if len(text) > _LONGEST:
+        return None
+    text = _JOINED.sub(r"\1*\2", _NUMBERS_PER_MINUTE.sub("turn/min", text))
+    tokens = re.findall(r"(?:[^\W\d_]|[°%])++(?:\^?-?[0-9]++)?|[0-9]++|[()/*.]|\S", text)
+    found, rest = _product(tokens)
+    return None if rest else found
+
+
+def tidy_unit(text: str) -> str:
+    """Return a unit in plain signs, whatever its width, raised digits, minus signs and dots."""
+    text = unicodedata.normalize("NFKC", text[: 4 * _LONGEST]).translate(_SIGNS).strip("$ ")
+    text = re.sub(r"\^[({](-?[0-9])[)}]", r"^\1", text.replace("**", "^").replace("\\", ""))
+    # Pa-s is a product, and s-1 a power
+    return re.sub(r"(?<=[^\W\d_])-(?=[^\W\d_])", "*", text)
+
+
+_SIGNS = str.maketrans({**dict.fromkeys("·⋅•∙・×", "*"), **dict.fromkeys("−–—‐‑", "-"), "μ": "µ"})
+_OPENING = {")": "(", "]": "[", "}": "{", ">": "<"}
+_BRACKETS = str.maketrans("（）［］｛｝＜＞【】〔〕〈〉", "()[]{}<>[][]<>")
+_IN = re.compile(r"(.*\S)\s+(?:in|en|em)\s+(\S.*)")
+_WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
+"""What stands in brackets and is no unit: Time (action), G(t), tan(delta)."""
+
+
+def name_and_unit(name: str, unit: str) -> tuple[str, str]:
+    """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
+
+    `unit`: as it stands beside or below the name; empty if it does not.
+    """
+    name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
+    if unit and _OPENING.get(unit[-1]) == unit[0]:
+        unit = unit[1:-1].strip()
+    if unit:
+        return name, unit
+    head, inside = _last_bracket(name)
+    if head and (_is_unit(inside) or not _WORDS.fullmatch(inside)):
+        return head, inside
+    words = _IN.fullmatch(name)
+    if words and _is_unit(words[2]):
+        return words[1], words[2]
+    return name, ""
+
+
+def _last_bracket(name: str) -> tuple[str, str]:
+    """Return what stands before the bracket in which a name ends, and in it; both may be empty."""
+    name = name.rstrip()
+    closing = name[-1:]
+    if closing not in _OPENING:
+        return "", ""
+    depth = 0
+    for at in range(len(name) - 1, -1, -1):
+        depth += (name[at] == closing) - (name[at] == _OPENING[closing])
+        if not depth:
+            head, inside = name[:at], name[at + 1 : -1].strip()
+            # G(t) is a function, and Time (t) in tons
+            return ("", "") if inside == "t" else (head.rstrip(" /,"), inside)
+    return "", ""
+
+
+def _is_unit(text: str) -> bool:
+    return read_unit(text) is not None or tidy_unit(text).lstrip("°") in ("C", "K", "F")
+
+
+def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
+    """Return the unit that the tokens begin with, and the tokens after it."""
+    found, sign = Unit(), 1
+    expected = True  # a word, not an operator
+    if len(tokens) > 1 and tokens[0] == "/":  # the 1 of 1/s is left out
+        sign, tokens = -1, tokens[1:]
+    while tokens and tokens[0] != ")":
+        token, tokens = tokens[0], tokens[1:]
+        if token in "/*." and not expected:
+            sign, expected = (-1 if token == "/" else 1), True
+            continue
+        if token == "(":
+            inner, tokens = _product(tokens)
+            if inner is None or not tokens:
+                return None, tokens
+            tokens = tokens[1:]
+        else:
+            inner = Unit() if token == "1" else _power(token)
+        if inner is None:
+            return None, tokens
+        found = found.times(inner, sign)
+        sign, expected = 1, False
+    return (None if expected else found), tokens
+
+
+def _power(text: str) -> Unit | None:
+    """Return a word with its exponent, such as cm2 or s^-1."""
+    match = re.fullmatch(r"((?:[^\W\d_]|[°%])+)\^?(-?[1-9])?", text)
+    if match is None:
+        return None
+    word = _word(match.group(1))
+    return None if word is None else Unit().times(word, int(match.group(2) or 1))
+
+
+@cache
+def _word(text: str) -> Unit | None:
+    """Return a single word, such as kPa or seconds, from pint."""
+    word = _SPELLINGS.get(text, text)
+    # whole words may begin with a capital; of short symbols the case has a meaning
+    for name in (word, word.lower()) if len(word) > 2 else (word,):
+        parsed = _registry().parse_unit_name(name)
+        if not parsed or _is_short_plural(name):
+            continue
+        unit = _registry().Unit(parsed[0][0] + parsed[0][1])
+        size = _registry().Quantity(1.0, unit).to_base_units()
+        found = dict(size.dimensionality)
+        if set(found) <= set(_DIMENSIONS) and (found or str(unit).endswith(_NUMBERS)):
+            kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
+            return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
+    return None
+
+
+def _is_short_plural(name: str) -> bool:
+    """Return whether a name is a symbol with an s, as Pas, which is no plural of Pa."""
+    parse, symbol = _registry().parse_unit_name, name.removesuffix("s")
+    return len(name) <= 4 and symbol != name and parse(name)[:1] == parse(symbol)[:1]
+
+
+@cache
+def _registry():
+    # pint takes a noticeable time to load; files in SI units never need it
+    import pint
+
+    return pint.UnitRegistry()
 
 
 @dataclass(frozen=True)
 class Quantity:
     """A column that the software knows.
 
-    Attributes
-    ----------
-    stem
-        Beginning of the column's name, before the unit.
-    column
-        Name of the column in SI units.
-    unit
-        That unit; empty for a pure number.
+    `stem`: beginning of the column's name, before the unit.
+    `column`: name of the column in SI units.
+    `unit`: that unit; empty for a pure number.
     """
 
     stem: str
@@ -44,18 +254,8 @@ LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "Pa")
 def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
     """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
 
-    Parameters
-    ----------
-    suffix
-        What follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
-        ``dyn_cm2`` or ``percent``.
-    quantity
-        What the column holds.
-
-    Raises
-    ------
-    InputError
-        If the suffix is a unit of something else.
+    `suffix`: what follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
+    ``dyn_cm2`` or ``percent``. Raises InputError if the suffix is a unit of something else.
     """
     unit = read_heading(suffix)
     if unit is None:
@@ -82,17 +282,8 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
 def heading_factor(column: str, quantity: Quantity) -> float:
     """Return the factor to SI of a column whose name is the user's; one where it names no unit.
 
-    Parameters
-    ----------
-    column
-        Its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
-    quantity
-        What it holds.
-
-    Raises
-    ------
-    InputError
-        If the name ends in a unit of something else.
+    `column`: its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
+    Raises InputError if the name ends in a unit of something else.
     """
     words = column.split("_")
     endings = ["_".join(words[i:]) for i in range(1, len(words))]
@@ -129,10 +320,7 @@ def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
     """Return the column that holds a quantity and its factor to SI, or None if there is none.
 
-    Raises
-    ------
-    InputError
-        If two columns hold it, or its unit is wrong.
+    Raises InputError if two columns hold it, or its unit is wrong.
     """
     found = []
     for name in names:

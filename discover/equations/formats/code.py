@@ -233,10 +233,7 @@ variables_rate = [{rates}]
 def numpy_code(equation: Equation) -> str:
     """Return a module with the law as a function of numpy arrays.
 
-    Raises
-    ------
-    InputError
-        If the equation has a named law of which nobody said how it is written.
+    Raises InputError if the equation has a named law of which nobody said how it is written.
     """
     return filled(
         _NUMPY_TEMPLATE,
@@ -251,10 +248,7 @@ def numpy_code(equation: Equation) -> str:
 def sympy_code(equation: Equation) -> str:
     """Return a module with the law as SymPy expressions in components.
 
-    Raises
-    ------
-    InputError
-        As for `numpy_code`.
+    Raises InputError as for `numpy_code`.
     """
     named = equation.named
     constants = ""
@@ -296,22 +290,9 @@ def filled(
 ) -> str:
     """Return a module: a template with the law in a notation.
 
-    Parameters
-    ----------
-    template
-        With the fields below.
-    equation, notation
-        What to write, and how.
-    nothing
-        h where there is none.
-    constants
-        What holds the constants of a named law; by default a list of one table for each mode.
-    indent
-        Of the lines before h.
-    rates
-        A template of what says how structure variables change, for a law that has some.
-    structure
-        Fields of the states of the whole fluid, from `structure_fields`.
+    `constants`: what holds the constants of a named law; by default a list of one table for each
+    mode. `rates`: A template of what says how structure variables change, for a law that has some.
+    `structure`: fields of the states of the whole fluid, from `structure_fields`.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)

@@ -5,8 +5,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from discover.equations.equation import Box, Equation, Tested
-from discover.equations.named_part import NamedPart
-from discover.equations.state_part import StatePart
+from discover.equations.parts import NamedPart, StatePart
 from discover.errors import InputError
 from discover.validation import Section, validated
 from tensor_library.law_terms import LawTerm
@@ -98,17 +97,8 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
 def equation_from_json(content: object, where: str = "the law") -> Equation:
     """Return the equation that JSON holds.
 
-    Parameters
-    ----------
-    content
-        What `equation_to_json` returned, after a way through a file.
-    where
-        Its place, for messages.
-
-    Raises
-    ------
-    InputError
-        If something in it is missing, unknown or no number; names the key.
+    `content`: what `equation_to_json` returned, after a way through a file. Raises InputError if
+    something in it is missing, unknown or no number; names the key.
     """
     again = "Write the results again with --overwrite."
     try:

@@ -1,8 +1,8 @@
 """An equation as a piece of a LaTeX document, and the plain lines that every file begins with."""
 
 from discover.equations.equation import Equation
-from discover.equations.spelling.latex import PREAMBLE, SEPARATOR, latex_letters, law_latex
-from discover.equations.state_part import StatePart
+from discover.equations.parts import StatePart
+from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
 from tensor_library.latex import LatexNotation, latex_number
 
 

@@ -81,15 +81,7 @@ NOTHING = {
 
 
 def structure_fields(equation: Equation, notation: Any, language: str) -> dict[str, str]:
-    """Return the fields of a template that say what states do.
-
-    Parameters
-    ----------
-    notation
-        How a text in Python writes scalars.
-    language
-        ``numpy``, ``ufl`` or ``sympy``.
-    """
+    """Return the fields of a template that say what states do."""
     if not equation.states:
         return NOTHING
     constants, names, rest, rates, moduli, times = {}, [], [], [], [], []
@@ -129,13 +121,7 @@ def structure_fields(equation: Equation, notation: Any, language: str) -> dict[s
 
 
 def stepped(equation: Equation, variables: int) -> dict[str, str]:
-    """Return the fields of the integrator in the text of numpy.
-
-    Parameters
-    ----------
-    variables
-        How many structure variables each mode has.
-    """
+    """Return the fields of the integrator in the text of numpy."""
     levels = sum(len(part.names) for part in equation.states)
     last, viscous = (
         9 + variables,

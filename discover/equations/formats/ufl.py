@@ -97,10 +97,7 @@ class _UflNotation(CodeNotation):
 def ufl_code(equation: Equation) -> str:
     """Return a module with the law as UFL expressions.
 
-    Raises
-    ------
-    InputError
-        If the equation has a named law of which nobody said how it is written.
+    Raises InputError if the equation has a named law of which nobody said how it is written.
     """
     nothing = "ufl.as_tensor([[0.0] * 3] * 3)"
     notation = _UflNotation()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import sympy
 
-from discover.equations.named_part import NamedPart
+from discover.equations.parts import NamedPart
 from tensor_library.law_terms import LawTerm
 from tensor_library.symbolic import SympyNotation
 from tensor_library.terms import parse_term

@@ -21,7 +21,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from discover.dataset import Run
-from discover.dataset.loading import Loading
+from discover.dataset.run import Loading
 from discover.statistics.residual import FEWEST_FAST, fast_part
 
 _LEAST = 1e-3

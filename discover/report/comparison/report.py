@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from discover.comparison.comparison import Comparison
-from discover.equations.spelling.latex import PREAMBLE, law_latex
+from discover.equations.spelling.markup import PREAMBLE, law_latex
 from discover.learners.registry import learner_title
 from discover.plain_json import json_text
 from discover.report.answer_screen import answer_screen

@@ -10,7 +10,7 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import Rival
 from discover.equations import Equation
-from discover.equations.spelling.mathml import law_element, term_element, term_mathml
+from discover.equations.spelling.markup import law_element, term_element, term_mathml
 from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title

@@ -6,12 +6,11 @@ from typing import Any
 import numpy as np
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.conditions import material_and_temperature
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
-from discover.dataset.run_table import run_line
+from discover.dataset.run_table import material_and_temperature, run_line
 from discover.dataset.tables.toml_file import toml_string
 from discover.errors import InputError
 from discover.report.page import render

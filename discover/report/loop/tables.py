@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from discover.effects import make_effect
-from discover.equations.spelling.mathml import law_element
+from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode
 from discover.loop.loop_result import LoopResult

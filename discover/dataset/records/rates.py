@@ -1,4 +1,4 @@
-"""Shear rate from recorded strain."""
+"""Rates derived from strain."""
 
 import numpy as np
 from jaxtyping import Float
@@ -14,28 +14,16 @@ _CHUNK = 50_000
 
 
 def differentiate(
-    times: Float[np.ndarray, " n"],
-    values: Float[np.ndarray, " n"],
-    window: int = DEFAULT_WINDOW,
+    times: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"], window: int = DEFAULT_WINDOW
 ) -> Float[np.ndarray, " n"]:
     """Return the time derivative of a noisy record, from a moving cubic fit.
 
     A cubic is fitted by least squares to the `window` samples nearest in order to each sample, and
     its slope taken there   [Savitzky & Golay 1964, Anal. Chem. 36, 1627, for any spacing].
 
-    Parameters
-    ----------
-    times
-        Sampling times in s, increasing.
-    values
-        The record at those times.
-    window
-        Number of samples in the window, 5 or more; fewer if the record is shorter.
-
-    Raises
-    ------
-    InputError
-        If the window is too short, or the record has fewer than 5 samples.
+    `times`: sampling times in s, increasing. `window`: number of samples in the window, 5 or more;
+    fewer if the record is shorter. Raises InputError if the window is too short, or the record has
+    fewer than 5 samples.
     """
     if window < _DEGREE + 2:
         raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")

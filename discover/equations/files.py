@@ -1,14 +1,22 @@
-"""The laws that a folder of results holds."""
+"""Laws to and from files: every format, and what a folder of results holds."""
 
 import os
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from discover.dataset.tables.table import read_bytes
 from discover.equations.equation import Equation
-from discover.equations.formats.json_format import equation_from_json
+from discover.equations.formats.code import numpy_code, sympy_code
+from discover.equations.formats.in_a_solver import in_a_solver
+from discover.equations.formats.json_format import equation_from_json, equation_to_json
+from discover.equations.formats.latex_file import equation_latex
+from discover.equations.formats.rheotool import rheotool_text
+from discover.equations.formats.ufl import ufl_code
 from discover.errors import InputError
-from discover.plain_json import parse_json
+from discover.plain_json import json_text, parse_json
+from discover.words import unknown_name
 
 COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"
 AUGMENTED = "augmented"
@@ -18,15 +26,8 @@ AUGMENTED = "augmented"
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     """Return the laws in a folder of results by name: those of the learners, or the augmented one.
 
-    Parameters
-    ----------
-    folder
-        What ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
-
-    Raises
-    ------
-    InputError
-        If there is no result, it is damaged, or its law cannot be written out.
+    `folder`: what ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
+    Raises InputError if there is no result, it is damaged, or its law cannot be written out.
     """
     path = Path(folder)
     if path.suffix == ".json":
@@ -84,3 +85,40 @@ def read_json(path: Path) -> Any:
         raise InputError(
             f"{path.name} is not valid JSON of a result ({error}). Run again with --overwrite."
         ) from None
+
+
+FORMATS: Mapping[str, Callable[[Equation], str]] = {
+    "python": numpy_code,
+    "sympy": sympy_code,
+    "latex": equation_latex,
+    "json": lambda equation: json_text(equation_to_json(equation)),
+    "rheotool": rheotool_text,
+    "ufl": ufl_code,
+}
+"""Functions that write an equation, by the name of the format."""
+
+
+def write_equation(
+    equation: Equation,
+    form: str,
+    density_kg_m3: float | None = None,
+    tolerance: float | None = None,
+) -> str:
+    """Return an equation as text.
+
+    Raises InputError if there is no such format, an option does not belong to it, or it has not
+    this law.
+    """
+    if form not in FORMATS:
+        raise InputError(unknown_name("format", form, FORMATS))
+    if form != "json":  # which holds what was found, and no more
+        said = in_a_solver(equation)
+        notes = () if said is None else (said if isinstance(said, str) else said.text,)
+        equation = replace(equation, notes=(*equation.notes, *notes))
+    options = {"density_kg_m3": density_kg_m3, "tolerance": tolerance}
+    given = {name: value for name, value in options.items() if value is not None}
+    if form == "rheotool":
+        return rheotool_text(equation, **given)
+    if given:
+        raise InputError(f"Density and tolerance are for --format rheotool; got --format {form}.")
+    return FORMATS[form](equation)

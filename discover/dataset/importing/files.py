@@ -1,0 +1,294 @@
+"""Readers of files that are no plain table: spreadsheets, RepTate's, a user's own."""
+
+import io
+import re
+import zipfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
+from discover.dataset.importing.text_rows import (
+    LARGEST_EXPORT,
+    MOST_CELLS,
+    Constant,
+    constants_of,
+    is_number,
+    name_and_unit,
+    with_points,
+)
+from discover.dataset.tables.table import read_bytes
+from discover.errors import InputError
+from discover.new_names import require_new_name
+from discover.words import unknown_name
+from tensor_library.registry import Registry
+
+_LARGEST_PART = 10_000_000
+"""Bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects."""
+
+_MOST_COLUMNS = 2000
+_MOST_ROWS = 1_048_576  # as Excel
+_LONGEST_CELL = 1000  # characters
+
+
+def read_spreadsheet(path: Path) -> list[Block]:
+    """Return the blocks of numbers in all sheets of a spreadsheet; a sheet names what has no name.
+
+    Raises InputError if it is no spreadsheet, is larger than a measurement, or holds no numbers
+    under names.
+    """
+    from openpyxl import load_workbook
+
+    content = io.BytesIO(read_bytes(path, path.name, largest=LARGEST_EXPORT))
+    try:
+        _require_size(content, path.name)
+        book = load_workbook(content, read_only=True, data_only=True, keep_links=False)
+    except zipfile.BadZipFile:
+        raise InputError(
+            f"{path.name} is no .xlsx workbook, or one with a password. Save it as .xlsx without a "
+            "password, or each sheet as CSV."
+        ) from None
+    blocks = []
+    left = MOST_CELLS
+    try:
+        for sheet in book.worksheets:
+            sheet.reset_dimensions()  # a file may claim any size
+            rows = []
+            for row in _rows(sheet, path.name):
+                left -= len(row)
+                if left < 0:
+                    raise InputError(
+                        f"{path.name} has more than {MOST_CELLS} cells. Keep the sheets with the "
+                        "measurement."
+                    )
+                rows.append([_text(cell) for cell in row])
+            for block in blocks_of_rows(with_points(rows, path.name)):
+                names = filter(None, (str(sheet.title), block.name))
+                blocks.append(replace(block, name=", ".join(dict.fromkeys(names))))
+    finally:
+        book.close()
+    return require_blocks(blocks, path.name)
+
+
+def _require_size(content: io.BytesIO, name: str) -> None:
+    """Refuse a workbook that would unpack to more than a measurement."""
+    with zipfile.ZipFile(content) as archive:
+        parts = archive.infolist()
+    # what a part says of its size is what is read of it at most
+    whole = sum(part.file_size for part in parts)
+    if whole > LARGEST_EXPORT:
+        raise InputError(
+            f"{name} unpacks to {whole / 1e6:.0f} MB; the limit is {LARGEST_EXPORT / 1e6:.0f} "
+            "MB. Save the sheets with the measurement in a workbook of their own, or as CSV."
+        )
+    for part in parts:
+        is_table = "worksheets/" in part.filename or "sharedStrings" in part.filename
+        if part.file_size > _LARGEST_PART and not is_table and part.filename.endswith("ml"):
+            raise InputError(
+                f"{name} has {part.file_size / 1e6:.0f} MB in {part.filename}, which holds no "
+                "measurement. Copy the numbers to a new workbook, or save each sheet as CSV."
+            )
+
+
+def _rows(sheet, name: str) -> Iterator[tuple]:
+    """Yield the rows of a sheet as wide as they are filled, a gap of many rows as one."""
+    empty = 0
+    for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
+        if number > _MOST_ROWS:
+            raise InputError(
+                f"{name}, sheet {sheet.title}, has a cell below row {_MOST_ROWS}. Delete what "
+                "stands far below the measurement."
+            )
+        if len(row) > _MOST_COLUMNS:
+            raise InputError(
+                f"{name}, sheet {sheet.title}, has a cell in column {len(row)} of row {number}; "
+                f"the limit is {_MOST_COLUMNS} columns. Delete what stands far to the right of the "
+                "measurement."
+            )
+        empty = 0 if row else empty + 1
+        if empty < _GAP:
+            yield row
+
+
+_GAP = 100
+"""Empty rows, after which lines are no longer counted."""
+
+
+def _text(cell: object) -> str:
+    if cell is None or cell != cell:
+        return ""
+    return repr(cell) if type(cell) is float else str(cell)[:_LONGEST_CELL]
+
+
+# The suffix says what the columns are, whatever the file writes above them: RepTate 1.3 divides the
+# second column of ``.shear`` and ``.uext`` by the rate to show a viscosity, so it is a stress even
+# where it is headed "h" or "Pa-s"   [Boudara, Read & Ramírez 2020, J. Rheol. 64, 709].
+
+_TIME, _RATE, _STRESS = ("time", "s"), ("gdot", "1/s"), ("stress", "Pa")
+_MODULI = (("omega", "rad/s"), ("G'", "Pa"), ("G''", "Pa"))
+
+COLUMNS = {
+    ".tts": _MODULI,
+    ".osc": _MODULI,
+    ".shear": (_TIME, _STRESS),
+    ".uext": (_TIME, ("tensile stress", "Pa")),
+    ".laos": (_TIME, ("strain", "-"), _STRESS),
+    ".creep": (_TIME, ("strain", "-")),
+    ".gt": (_TIME, ("relaxation modulus", "Pa")),
+}
+"""Names and units of the columns, by suffix; further ones are read by their own names."""
+
+_PARAMETERS = {
+    ".shear": {"gdot": ("shear rate", "1/s")},
+    ".uext": {"gdot": ("hencky rate", "1/s"), "edot": ("hencky rate", "1/s")},
+    ".creep": {"stress": ("stress", "Pa")},
+}
+_TEMPERATURE = ("temperature", "°C")
+
+
+def read_reptate(path: Path) -> list[Block]:
+    """Return the one block of a file of RepTate.
+
+    Raises InputError if it has too few columns of numbers, or lacks a parameter that such a file
+    needs.
+    """
+    suffix = path.suffix.lower()
+    content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
+    lines = re.split(r"\r\n|\r|\n", content.decode("cp1252", "replace"))
+    table = [line.lstrip("#").replace(",", " ").split() for line in lines]
+    wanted = COLUMNS[suffix]
+    width = len(wanted)
+    data = [i for i, row in enumerate(table) if len(row) >= width and all(map(is_number, row))]
+    if len(data) < 2:
+        raise InputError(
+            f"{path.name} has no lines of {width} numbers ({', '.join(n for n, _ in wanted)}), as "
+            f"a {suffix} file of RepTate has below its first line. Correct it, or give it another "
+            "suffix and --format text."
+        )
+    whole = max(len(table[i]) for i in data)
+    # a file may hold more columns than its suffix names, under names of their own
+    named = [row for row in table[1 : data[0]] if len(row) == whole]
+    further = [name_and_unit(name, "") for name in named[0][width:]] if named else []
+    further += [(f"column {i + 1}", "") for i in range(width + len(further), whole)]
+    if len(named) > 1:
+        further = [(name, unit or below) for (name, unit), below in zip(
+            further, named[1][width:], strict=True)]  # fmt: skip
+    cells = tuple(tuple((table[i] + [""] * whole)[:whole]) for i in data)
+    first = [] if data[0] == 0 else [[lines[0]]]
+    given = {constant.name: constant.value for constant in constants_of(first)}
+    known = {**_PARAMETERS.get(suffix, {}), "T": _TEMPERATURE}
+    constants = tuple(
+        Constant(name, given[key], unit) for key, (name, unit) in known.items() if key in given
+    )
+    needed = [key for key in _PARAMETERS.get(suffix, {}) if key != "edot"]
+    if needed and len({c.name for c in constants} - {_TEMPERATURE[0]}) == 0:
+        raise InputError(
+            f"{path.name} does not say its {needed[0]} on the first line, as a {suffix} file of "
+            f"RepTate does. Write {needed[0]}=…; there."
+        )
+    # of a creep file `rec` says that the strain is the recovered one
+    name = "recovery" if float(given.get("rec", 0)) else suffix[1:]
+    return [Block(name, (*wanted, *further), cells, data[0] + 1, constants)]
+
+
+@dataclass(frozen=True)
+class Importer:
+    """A reader of one kind of file.
+
+    `read`: takes the path of a file and returns its blocks of columns; names and units are
+        understood, and units converted, as those of a text export are.
+    `suffixes`: endings of the names of such files, such as ``.npz``; these need no ``--format``.
+    """
+
+    read: Callable[[Path], Sequence[Block]]
+    suffixes: tuple[str, ...] = ()
+
+
+def _built_in() -> dict[str, Importer]:
+    return {
+        "spreadsheet": Importer(read_spreadsheet, (".xlsx", ".xlsm")),
+        "reptate": Importer(read_reptate, tuple(COLUMNS)),
+    }
+
+
+IMPORTERS: Registry[Importer] = Registry("importer", "discover.importers", _built_in)
+"""Importers by name; a package's own by entry points of this group. Text needs none of them."""
+
+TEXT = "text"
+"""What may be written as the format of a text export, which is the default."""
+
+
+def register_importer(
+    name: str, read: Callable[[Path], Sequence[Block]], suffixes: Sequence[str] = ()
+) -> Importer:
+    """Make an importer of one's own known to `discover data import`.
+
+    Parameters
+    ----------
+    name
+        As ``--format`` is to spell it: lower-case letters, digits and underscores.
+    read
+        Takes the path of a file and returns its blocks, made with `Block.of`.
+    suffixes
+        Endings of names by which such files are known.
+
+    Raises
+    ------
+    InputError
+        If the name is taken or is none, or another importer has one of the suffixes.
+
+    Examples
+    --------
+    >>> import discover as dc
+    >>> dc.register_importer("house_rheometer", read, suffixes=[".npz"])  # doctest: +SKIP
+    """
+    require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
+    endings = tuple(str(suffix).lower() for suffix in suffixes)
+    for other, known in IMPORTERS.present.items():
+        both = set(endings) & set(known.suffixes)
+        if both:
+            raise InputError(
+                f"Files that end in {sorted(both)[0]} are read by the importer {other!r} already. "
+                "Leave that suffix out, and use --format."
+            )
+    IMPORTERS[name] = Importer(read, endings)
+    return IMPORTERS.present[name]
+
+
+def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
+    """Return the blocks of a file that an importer reads; None if it is to be read as text.
+
+    `form`: name of the importer; by the suffix of the file if None. Raises InputError if there is
+    no such importer, or it cannot read the file.
+    """
+    if form == TEXT:
+        return None
+    if form is not None and form not in IMPORTERS:
+        raise InputError(
+            f"{unknown_name('format', form, [TEXT, *IMPORTERS])} Install the package that brings "
+            "it, or leave --format out."
+        )
+    ending = path.suffix.lower()
+    name = form or next((n for n, one in IMPORTERS.items() if ending in one.suffixes), None)
+    if name is None:
+        return None
+    try:
+        blocks = list(IMPORTERS[name].read(path))
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(
+            f"The file {path} cannot be read: {error.strerror or error}. Check the name."
+        ) from None
+    except Exception as error:
+        first = (str(error).splitlines() or [""])[0]
+        raise InputError(
+            f"The importer {name!r} cannot read {path.name} ({type(error).__name__}: {first}). "
+            "Give a file of its kind, or say which kind it is with --format."
+        ) from error
+    if not blocks or not all(isinstance(block, Block) for block in blocks):
+        raise InputError(
+            f"The importer {name!r} found no block of numbers in {path.name}. It must return a "
+            "list of Block; see docs/adding-a-loader.md."
+        )
+    return blocks
