@@ -9,7 +9,7 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
   that claims one.
 
 Seeds of 1 to 9 are for development. The seed that judges, written down before its first case was
-run, and never used to change anything: 20261130.
+run, and never used to change anything: 20261130; for `compare` since it is a posterior, 20261204.
 """
 
 from collections.abc import Callable

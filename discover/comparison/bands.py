@@ -35,6 +35,10 @@ _RATIO = -2.0 / 7.0
 """Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
 at small strain with independent alignment; measured ratios lie between that and zero]."""
 
+_POWERS = np.array([1.0, 2.0, 2.0])
+"""Powers of the shear stress with which σ12, N1 and N2 go   [second-order fluid: Bird, Armstrong &
+Hassager 1987, ch. 6], and so their relative errors."""
+
 _SEED = 20261128
 
 
@@ -210,7 +214,7 @@ def _band(
         variance = np.mean(off**2, axis=0) if len(off) else np.zeros_like(main)
         size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]]
         if part.is_none:
-            variance = variance + (_missed(found, part.fit, run) * size) ** 2
+            variance = variance + (_missed(found, part.fit, run) * _POWERS * size) ** 2
             prior = main.copy()
             prior[:, 2] = 0.5 * _RATIO * main[:, 1]
             wide = variance.copy()
