@@ -19,7 +19,7 @@ from discover.statistics.reading.reading_faults import FaultKind, Reading, Sessi
 WIDTHS = (0.005, 0.01, 0.02)
 """Standard deviations of the sizes, of the stress or the modulus. A choice: from what a calibrated
 transducer errs by to what careful fillings differ by. What repeats differ by counts where it is
-more; that loadings of one melt differ by 10 % is reported too (docs/ldpe.md)."""
+more; that loadings of one melt differ by 10 % is reported too (docs/findings.md)."""
 
 
 @dataclass(frozen=True)
