@@ -63,7 +63,6 @@ def stopped_at_the_first_computation() -> Iterator[None]:
 
     seams = {
         "discover.cli.study_commands.progress_bar": lambda quiet: contextlib.nullcontext(report),
-        "discover.batch.tasks.fit_declared": settle,
         "discover.inference.engine.rows.make_batch": _start,
         "discover.comparison.instrument.known.comparison_flows": lambda *_, **__: [],
     }

@@ -84,7 +84,7 @@ plt.show()
 # linear sweep. Up to a strain of 0.4 linear theory should hold, and yet it misses the fast runs by
 # half. The loop fits the runs at −10 °C; those at −23 °C are held out as a test. The data are not
 # part of this project: without `DISCOVER_DATA` this part is skipped. More on them in
-# `docs/polyisoprene.md`.
+# `docs/findings.md`.
 
 # %%
 from discover.dataset import load_dataset, relaxation_spectrum

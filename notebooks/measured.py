@@ -19,7 +19,7 @@
 # law describes it, a second loop says what is missing from the best one.
 #
 # The data are not part of this project: without `DISCOVER_DATA` every part is skipped. These are
-# five of eleven runs, thinned, so that the notebook takes a minute; `docs/polyisoprene.md` has the
+# five of eleven runs, thinned, so that the notebook takes a minute; `docs/findings.md` has the
 # whole set.
 
 # %%

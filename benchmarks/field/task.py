@@ -1,4 +1,4 @@
-"""Every contestant of `field/contestants` on every fluid: the tables of `docs/field.md`."""
+"""Every contestant of `field/contestants` on every fluid: the tables of `docs/evidence.md`."""
 
 import importlib
 import pkgutil

@@ -80,7 +80,7 @@ def test_the_batch_notebook_goes_on_after_a_stop_and_lists_the_failure(monkeypat
 def test_the_measured_notebook_goes_round_the_circle(measured_data, monkeypatch):
     del measured_data  # only whether it is there
     text = executed_text("measured", monkeypatch)
-    # the rate comes up late, as the whole set says too (docs/polyisoprene.md: 20.8 to 23.5 ms)
+    # the rate comes up late, as the whole set says too (docs/findings.md: 20.8 to 23.5 ms)
     tau = re.search(r"'rate_rise_time': \{'tau': ([\d.]+)\}", text)
     assert tau is not None
     assert 0.018 < float(tau.group(1)) < 0.026

@@ -1,1 +1,1 @@
-"""One file a contestant, registered by being here: see `docs/field.md`."""
+"""One file a contestant, registered by being here: see `docs/evidence.md`."""
