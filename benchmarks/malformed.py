@@ -54,9 +54,6 @@ def _start(*_, **__):
 def stopped_at_the_first_computation() -> Iterator[None]:
     """Let commands go on until they begin to compute, and no further."""
 
-    def settle(model, dataset):
-        return _start() if model.free else model
-
     def report(label: str, fraction: float) -> None:
         if "declared model on" in label or "starting" in label:
             raise Started
@@ -64,7 +61,6 @@ def stopped_at_the_first_computation() -> Iterator[None]:
     seams = {
         "discover.cli.study_commands.progress_bar": lambda quiet: contextlib.nullcontext(report),
         "discover.inference.engine.rows.make_batch": _start,
-        "discover.comparison.instrument.known.comparison_flows": lambda *_, **__: [],
     }
     with ExitStack() as stack:
         for name, instead in seams.items():

@@ -3,9 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
-from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.identify.design.experiment_outcome import LawOutcome
 
+from discover.comparison import LearnerOutcome
 from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
 from discover.identify import (
@@ -81,8 +80,6 @@ def test_what_was_found_out_about_a_law_shows_itself(result, words):
 
 def test_lists_of_findings_become_tables():
     assert table_of([TWIN]).loc[0, ["proof", "N2_apart"]].tolist() == ["series", 0.2]
-    weights = table_of([LawOutcome("a", 10.0, 10, 0.5), LawOutcome("b", 99.0, 10, 0.0)])
-    assert weights["refuted"].tolist() == [False, True]
     assert table_of([]).empty
 
 

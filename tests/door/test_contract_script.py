@@ -30,7 +30,7 @@ SMALL = DefaultRecipe(width=4, steps=6, polish_steps=30, max_tensors=0)
 
 @pytest.fixture(scope="module", params=[False, pytest.param(True, marks=pytest.mark.slow)],
                 ids=["verdict", "whole"])  # fmt: skip
-def after(request, tmp_path_factory, left_to_the_verdict):
+def after(request, tmp_path_factory):
     """What the script leaves behind, with settings that cost less: its words are not changed."""
     folder = tmp_path_factory.mktemp("door")
     write_folder(folder / "FOLDER")
@@ -42,7 +42,6 @@ def after(request, tmp_path_factory, left_to_the_verdict):
         network, loop = {"quick": True}, {}
         if not request.param:
             network, loop = {"recipe": SMALL}, {"explanations": 1}
-            left_to_the_verdict(patch)
         network["progress"], loop["progress"] = heard["network"], heard["loop"]
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
         patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, **network))

@@ -137,7 +137,7 @@ def test_a_term_is_determined_if_nothing_speaks_against_it(verdict, ends, rivals
 
 
 def test_python_and_a_study_search_the_same_library():
-    from discover.comparison.fitting.training import study_library
+    from discover.comparison.training import study_library
 
     study = parse_study({"data": {"folder": "a"}})
     assert study_library(study) == default_library()

@@ -3,12 +3,12 @@
 import html
 
 import numpy as np
-from discover.comparison.judging.explanation import Explanation
-from discover.comparison.judging.identifiability import Rival
-from discover.comparison.judging.statements import IN_LIBRARY, Statement
 
 from discover.comparison import Comparison, Flow, LearnerOutcome
+from discover.comparison.rivals import Rival
+from discover.comparison.statements import IN_LIBRARY, Statement
 from discover.learners import RecoveredTerm
+from discover.loop import ErrorPair, LoopResult
 from discover.protocols.protocol import oscillatory_shear
 from discover.report.comparison.report import write_comparison
 from discover.statistics import LackOfFit
@@ -49,7 +49,6 @@ def outcome(learner, number, predicted):
         "selection_frequency": [{"term": "sigma.sigma", "frequency": 0.5, "with_twins": 1.0}],
         "misfit": number,
         "coefficients": {"sigma": {"mean": number, "spread": number}},
-        "rivals_text": "",
     }
     stresses = {q: np.sin(TIMES) for q in ("sigma12", "N1", "N2")} if predicted else None
     keys = ("training/a", "held_out/b")
@@ -61,6 +60,13 @@ def outcome(learner, number, predicted):
 
 def left(verdict, misfit=0.01, correlation=0.0):
     return LackOfFit(verdict, misfit, 0.01, correlation, 0.5, reason="made up")
+
+
+def posterior(verdict, number):
+    """Return a posterior that says so, without an explanation."""
+    pair = ErrorPair(0.01, number)
+    verdicts = {"explained": "no_effect_needed"}
+    return LoopResult(verdicts.get(verdict, verdict), pair, pair, 0.01, (), {}, (), ())
 
 
 def made_up(number=0.01, predicted=True, sparse="explained", network="explained", **changes):
@@ -84,7 +90,9 @@ def made_up(number=0.01, predicted=True, sparse="explained", network="explained"
             Statement("N1", IN_LIBRARY, "If the law is in the library, σ12 gives N1."),
             Statement("N2", "no", "No."),
         ],
-        "explanation": Explanation({name: left(verdict) for name, verdict in learners.items()}),
+        "posterior": posterior(sparse or network, number),
+        "shares": {"tensor_sindy": 0.9},
+        "lack_of_fit": {name: left(verdict) for name, verdict in learners.items()},
     }
     return Comparison(**{**content, **changes})
 

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from discover.comparison.judging.next_measurement import NextMeasurement
-from discover.comparison.outcomes.flows import Flow
-from discover.comparison.outcomes.outcome import LearnerOutcome
-from discover.identify.rivals.bands import PredictionBand
 
+from discover.comparison import Flow, LearnerOutcome
+from discover.comparison.bands import Band
 from discover.comparison.comparison import Comparison
 from discover.loop import ErrorPair, LoopResult, RunRecord
 from discover.protocols.protocol import in_flow, oscillatory_shear
@@ -48,7 +46,6 @@ def flow(kind, is_truth, measured=None):
 
 
 def comparison(flows, predictions, bands=None):
-    following = replace(NextMeasurement(), bands=bands or {})
     nothing = (np.zeros(1), np.zeros(1))
     outcome = LearnerOutcome("tensor_sindy", (), 0.0, nothing, predictions=predictions)
     return Comparison(
@@ -58,11 +55,9 @@ def comparison(flows, predictions, bands=None):
         flows=flows,
         before=predictions,
         outcomes={"tensor_sindy": outcome},
-        truth=None,
-        noise=None,
-        rivals=(),
-        statements=(),
-        next_measurement=following,
+        posterior=loop(stages=1),
+        bands=bands or {},
+        shares={"tensor_sindy": 1.0},
     )
 
 
@@ -102,12 +97,14 @@ def test_computed_truth_is_no_measurement_but_noisy_records_are():
 
 def test_bands_stand_where_a_claim_is_made_and_nowhere_else():
     flows = [flow("training", True, STRESS), flow("test", True)]
-    drawn = np.stack([STRESS] * 3, axis=1)
-    band = PredictionBand(TIME, drawn, drawn, drawn, drawn - 0.5, drawn + 0.5, 0.0)
+    middle, low, high = (
+        dict.fromkeys(("sigma12", "N1", "N2"), STRESS + off) for off in (0.0, -0.5, 0.5)
+    )
+    band = Band(middle, low, high)
     table = comparison_predictions(comparison(flows, of(flows), {flows[1].key: band}))
     claimed = table.dropna(subset=["low95", "high95"])
     assert set(claimed["role"]) == {"prediction"}
-    assert set(claimed["source"]) == {"tensor_sindy"}
+    assert set(claimed["source"]) == {"tensor_sindy", "posterior"}
     np.testing.assert_allclose(claimed["high95"] - claimed["low95"], 1.0)
 
 
