@@ -2,7 +2,7 @@
 
 Each study of `studies/` is run by the command itself, in a process of its own with an empty cache
 of programs, and again. DISCOVER_DATA is the folder of the data, which are no part of this project.
-A loop on blood holds each run out in turn from a search among the four effects of docs/findings.md; a
+A loop on blood holds each run out in turn from a search among four effects; a
 comparison counts as whole with a verdict, a test of what each learner leaves, and its pictures.
 """
 

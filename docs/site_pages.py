@@ -33,7 +33,7 @@ REFERENCE = {
         "after_step_strain after_alternation after_steady_flow",
     ),
     "laws": ("Fluids and laws", "laws make_law Fluid AbstractConstitutiveLaw"),
-    "learners": ("Learners", "TensorSINDy TBNNUDE TensorDense load build_library ClosedForm"),
+    "learners": ("Learners", "TensorSINDy TBNNUDE load build_library ClosedForm"),
     "loops": ("Fitting, comparing and closing the loop", "fit compare close_loop effects"),
     "registering": (
         "Additions of your own",

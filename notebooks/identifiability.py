@@ -27,7 +27,8 @@ enable_x64()
 enable_compilation_cache()
 
 from discover.identify import analyse_structure, find_rivals, find_twins
-from discover.laws import Fluid, UpperConvectedMaxwell, make_law
+from discover.laws import Fluid, make_law
+from discover.laws.expansion import law_of_terms
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.notebook_view import table_of
 from discover.protocols import oscillatory_shear
@@ -90,47 +91,25 @@ find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 # %% [markdown]
 # ## 5. What to measure next
 #
-# The proposed experiment is the one expected to separate the remaining laws at this noise. Then we
-# run it.
+# Both laws give the same σ12 in every flow, so no shear stress separates them. N2 does.
 
 # %%
-from discover.identify.design.experiment_outcome import judge_laws
-from discover.identify.design.experiments import candidate_experiments
-from discover.identify.design.next_experiment import propose_experiments
-from discover.identify.side_by_side.many_laws import Contender
-
-maxwell = Fluid.dimensionless(UpperConvectedMaxwell())
-covariance = np.array(model.uncertainty_.covariance)
-laws = [Contender("slip", found, covariance=covariance)]
-laws += [Contender("twin", LawTerms({"tr(sigma)*gammadot": 0.32}), covariance=covariance)]
-experiments = candidate_experiments(1.0, ("laos", "start_up"), (1.0, 2.0), (0.5, 1.0))
-proposals = propose_experiments(laws[0], laws[1:], maxwell, experiments, noise=0.02)
-best = proposals[0]
-print(f"Measure {' and '.join(best.observed)} in {best.experiment.title}.")
-print(f"Expected logarithm of the odds against the twin: {best.evidence['twin']:.0f}")
-shear_alone = next(p for p in proposals if p.observed == ("sigma12",))
-print(f"With σ12 alone: {shear_alone.evidence['twin']:.1g}")
-table_of(proposals[:5])
-
-# %%
-truth = Fluid.dimensionless(make_law("johnson_segalman", {"xi": 0.4}))
-stress = simulate(truth, best.experiment.protocol, best.experiment.times)
-first = stress.first_normal_stress_difference
-exact = {"sigma12": stress.shear_stress, "N2": stress.second_normal_stress_difference}
-noise = {
-    "sigma12": 0.02 * np.sqrt(np.mean(stress.shear_stress**2)),
-    "N2": 0.02 * np.sqrt(np.mean(first**2)),
+laws = {
+    "slip": make_law("johnson_segalman", {"xi": 0.4}),
+    "twin": law_of_terms(LawTerms({"tr(sigma)*gammadot": 0.32})),
 }
-rng = np.random.default_rng(0)
-measured = {q: exact[q] + noise[q] * rng.normal(size=exact[q].size) for q in best.observed}
-table_of(judge_laws(laws, maxwell, best.experiment, measured, noise))
+flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0.0, 8.0, 161)
+stresses = {name: simulate(Fluid.dimensionless(law), flow, times) for name, law in laws.items()}
+n2 = {name: stress.second_normal_stress_difference for name, stress in stresses.items()}
+n1 = stresses["slip"].first_normal_stress_difference
+print(f"N2 differs by {np.linalg.norm(n2['slip'] - n2['twin']) / np.linalg.norm(n1):.0%} of N1.")
 
 # %%
 figure, axes = plt.subplots(1, 2, figsize=(9, 3), layout="constrained")
-for axis, quantity, column in zip(axes, ("sigma12", "N2"), (0, 2), strict=True):
-    axis.plot(best.experiment.times, measured[quantity], ".", color="0.5", label="measured")
-    for law, curve, style in zip(laws, best.curves, ("-", "--"), strict=True):
-        axis.plot(best.experiment.times, curve[:, column], style, label=law.name)
+for name, style in (("slip", "-"), ("twin", "--")):
+    axes[0].plot(times, stresses[name].shear_stress, style, label=name)
+    axes[1].plot(times, n2[name], style, label=name)
+for axis, quantity in zip(axes, ("sigma12", "N2"), strict=True):
     axis.set(xlabel="t / λ", ylabel=quantity)
 axes[0].legend()
 plt.show()

@@ -93,7 +93,7 @@ def test_every_public_name_is_in_the_reference(site):
 
 def test_methods_and_results_that_users_hold_are_in_the_reference(site):
     places = set().union(*(page.places for page in site.values()))
-    for learner in ("TensorSINDy", "TBNNUDE", "TensorDense"):
+    for learner in ("TensorSINDy", "TBNNUDE"):
         for method in ("fit", "predict", "score", "save", "to_xarray", "equation_"):
             assert f"discover.{learner}.{method}" in places
     for method in ("to_html", "to_dataframe", "to_json", "errors_table"):

@@ -8,7 +8,7 @@ from sklearn.utils import estimator_checks
 
 import discover as dc
 
-LEARNERS = (dc.TensorSINDy, dc.TBNNUDE, dc.TensorDense)
+LEARNERS = (dc.TensorSINDy, dc.TBNNUDE)
 CHECKS = (
     "check_parameters_default_constructible",
     "check_no_attributes_set_in_init",

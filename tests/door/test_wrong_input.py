@@ -10,7 +10,7 @@ import discover as dc
 
 TIMES, RATES = np.linspace(0.0, 5.0, 31), np.full(31, 0.5)
 STRESS = 50.0 * (1.0 - np.exp(-TIMES))
-LEARNERS = (dc.TensorSINDy, dc.TBNNUDE, dc.TensorDense)
+LEARNERS = (dc.TensorSINDy, dc.TBNNUDE)
 
 
 pytestmark = pytest.mark.usefixtures("as_users_run_it")

