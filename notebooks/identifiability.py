@@ -96,7 +96,7 @@ find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
 # %%
 laws = {
     "slip": make_law("johnson_segalman", {"xi": 0.4}),
-    "twin": law_of_terms(LawTerms({"tr(sigma)*gammadot": 0.32})),
+    "twin": law_of_terms(LawTerms({"tr(sigma)*gammadot": 0.32}), True),
 }
 flow, times = oscillatory_shear(2.0, 1.0), np.linspace(0.0, 8.0, 161)
 stresses = {name: simulate(Fluid.dimensionless(law), flow, times) for name, law in laws.items()}
