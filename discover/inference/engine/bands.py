@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -12,9 +12,6 @@ from scipy.stats import t as student
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.left_out import MOST_MISSED
 from discover.inference.engine.rows import Rows
-
-if TYPE_CHECKING:
-    from discover.inference.engine.posterior import Posterior
 
 _RUNS_AWAY = 10.0
 """Times the size of the largest record, which no sound prediction of another run exceeds."""
@@ -40,7 +37,7 @@ class Band:
 class Predictions:
     """Normal predictions of rows that were not fitted, one for each hypothesis."""
 
-    def __init__(self, posterior: "Posterior", rows: Rows):
+    def __init__(self, posterior: Any, rows: Rows):
         self.posterior, self.rows = posterior, rows
         self.problem = posterior.problem
         self.fitter = Fitter(self.problem, rows)
