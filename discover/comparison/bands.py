@@ -15,8 +15,9 @@ from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.problem import NUISANCES
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.expected_errors import weighed_laws
+from discover.loop.expected_errors import misfit, weighed_laws
 from discover.loop.loop import Found
+from discover.statistics.projection import rms
 
 _DRAWS = 6
 """Pairs of draws of the constants of a hypothesis."""
@@ -212,7 +213,7 @@ def _band(
         kept += part.weight
         off = own[1:][fine[1:]] - main
         variance = np.mean(off**2, axis=0) if len(off) else np.zeros_like(main)
-        size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]]
+        size = np.sqrt(np.mean(main**2, axis=0))[[0, 1, 1]] * [1.0, 1.0, -_RATIO]
         if part.is_none:
             variance = variance + (_missed(found, part.fit, run) * _POWERS * size) ** 2
             prior = main.copy()
@@ -243,10 +244,14 @@ def _band(
 def _missed(found: Found, fit: Fit, run: Run) -> float:
     """Return the deviation, over its size, by which a run may be missed.
 
+    It is that of runs left out of the law relied on, by more for laws that describe the runs worse.
     As few runs tell a deviation badly, Student's quantile is the wider.
     """
-    missed, fastest = found.posterior.missed(fit), found.posterior.problem.fitted.fastest
+    posterior = found.posterior
+    best = fit if posterior.left is None else posterior.left.fit
+    missed, fastest = posterior.missed(best), posterior.problem.fitted.fastest
     runs = len(missed)
     wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
+    worse = max(misfit(posterior, fit) / misfit(posterior, best), 1.0)
     beyond = max(float(np.max(np.abs(run.rate))) / float(np.max(fastest)), 1.0)
-    return float(min(wider * np.max(missed) * beyond, _MOST_MISSED))
+    return float(min(wider * rms(missed) * worse * beyond, _MOST_MISSED))
