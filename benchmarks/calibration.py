@@ -8,8 +8,9 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
 - ``compare``: the verdict, and the bands of σ12, N1 and N2 in the held-out runs, of every learner
   that claims one.
 
-Seeds of 1 to 9 are for development. The seed that judges, written down before its first case was
-run, and never used to change anything: 20261130; for `compare` since it is a posterior, 20261204.
+Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
+run, and never used to change anything: 20261130; since runs left out choose, 20261203 for
+``close-loop``; since bands of N1 weigh more laws, 20261205 for ``compare``.
 """
 
 from collections.abc import Callable
