@@ -169,11 +169,15 @@ class Fitter:
             model, batch = self.problem.model, self.rows.batch
             return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
 
+    def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
+        """Return the priors of all that is free where some effects are there, by position."""
+        return self.problem.priors(names)
+
     def start(
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
     ) -> Fit:
         """Return a hypothesis before its first step."""
-        priors = self.problem.priors(names)
+        priors = self.priors(names)
         theta = theta.copy()
         for at, prior in priors.items():
             theta[at] = np.clip(theta[at], prior.low, prior.high)
@@ -348,7 +352,5 @@ class Fitter:
         n = len(curvature)
         linear = float(-np.sum(np.log(self.widths)) - 0.5 * len(self.widths) * LOG_2PI)
         fit.log_evidence = (
-            -np.inf
-            if ended
-            else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
+            -np.inf if ended else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
         )
