@@ -125,8 +125,8 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
                            quick=True, **options)  # fmt: skip
         terms = found.outcomes["tensor_sindy"].terms
         names = [term.term for term in terms]
-        loadings = [] if found.loadings is None else found.loadings.found["tensor_sindy"]
-        told = {one.run: one.ci95 for one in loadings}
+        told = found.posterior.remaining.get("loading", {})
+        told = {run: one["ci95"] for run, one in told.items()}
         alone = names == ["sigma.sigma"] and terms[0].ci95
         explained = found.verdict == "explained"
     held = [

@@ -345,7 +345,7 @@ def _material(law: str, fit: _Fit) -> SimpleMaterial:
 
 
 def material_of(
-    law: str, values: Sequence[float], ci95: Sequence[Sequence[float]], error: float
+    law: str, values: Sequence[float] | Values, ci95: Sequence | np.ndarray, error: float
 ) -> SimpleMaterial:
     """Return a simple material of its constants, with their 95 % intervals and its misfit."""
     kind, title, names = _NAMES[law]

@@ -339,8 +339,8 @@ class Fitter:
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
         scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths)
         factor = np.linalg.cholesky(scale[:, None] * curvature * scale)
-        fit.root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
-        fit.covariance = fit.root @ fit.root.T
+        root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
+        fit.root, fit.covariance = root, root @ root.T
         determinant = 2.0 * float(np.sum(np.log(np.diag(factor) / scale)))
         ended = []
         for name in fit.names:

@@ -36,7 +36,7 @@ _NEAR = 6.0
 
 
 def viscosity(
-    law: str, constants: Sequence[float], rate: Float[np.ndarray, " n"]
+    law: str, constants: Sequence[float] | np.ndarray, rate: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """Return the viscosity in Pa s at shear rates in 1/s; constants in the order of `priors`."""
     if law == NEWTONIAN:
