@@ -23,6 +23,8 @@ from discover.inference.engine.priors import Prior
 from discover.linear_algebra_threads import in_one_thread
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
+_NO_FLUID = ""
+"""No stress but that of the bench, which is what a viscosity has to beat too."""
 
 _ORDER = 3.0
 """Standard deviation of the logarithm of a viscosity or a time of which little is known."""
@@ -83,6 +85,8 @@ class _InelasticFitter(Fitter):
     def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
         """Return the priors of the constants, about what the records suggest."""
         del names
+        if self.law == _NO_FLUID:
+            return {}
         moving = np.abs(self.rate[self.rate != 0.0])
         typical = float(np.exp(np.mean(np.log(moving))))
         size = np.sqrt(np.mean(self.rows.recorded**2) / np.mean(self.rate**2))
@@ -97,7 +101,7 @@ class _InelasticFitter(Fitter):
     def starts(self) -> list[Fit]:
         """Return fits before their first step."""
         middle = [prior.middle for prior in self.priors(()).values()]
-        if self.law == NEWTONIAN:
+        if self.law != CARREAU_YASUDA:
             return [self.start((), np.array(middle))]
         return [
             self.start((), np.array([*middle[:2], stretch * middle[2], middle[3], sharpness]))
@@ -107,6 +111,8 @@ class _InelasticFitter(Fitter):
 
     def predict(self, thetas: Sequence[np.ndarray]) -> Float[np.ndarray, "trials rows"]:
         """Return the records of the law, in Pa."""
+        if self.law == _NO_FLUID:
+            return np.zeros((len(thetas), len(self.rows)))
         found = [viscosity(self.law, theta, self.rate) * self.rate for theta in thetas]
         return np.array(found).reshape(len(thetas), len(self.rows))
 
@@ -129,9 +135,10 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
     runs = fitter.rows.runs
     if any(_has_memory(run) for run in runs) or not np.any(fitter.rows.recorded):
         return None
-    own = {law: _InelasticFitter(fitter, law) for law in (NEWTONIAN, CARREAU_YASUDA)}
+    own = {law: _InelasticFitter(fitter, law) for law in (_NO_FLUID, NEWTONIAN, CARREAU_YASUDA)}
     fits = {law: max(one.fit(one.starts(), _ROUNDS), key=lambda f: f.log_evidence)
             for law, one in own.items()}  # fmt: skip
+    nothing = fits.pop(_NO_FLUID).log_evidence
     law = max(fits, key=lambda name: fits[name].log_evidence)
     fit, fitted = fits[law], own[law]
     rank = fit.log_evidence + problem.log_odds_of(1.0)
@@ -145,7 +152,7 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
         if np.sqrt(np.mean(off**2)) < SAME:
             other -= _NEAR
     beside = Discrepancy(fitted, fit).log_factor + np.log(NONE / (1.0 - NONE))
-    odds = rank - float(np.logaddexp(other, rank + beside))
+    odds = rank - float(np.logaddexp.reduce([other, nothing, rank + beside]))
     if odds < 0.0:
         return None
     assert fit.covariance is not None
