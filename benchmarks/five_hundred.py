@@ -26,7 +26,9 @@ LOOP = {
     "effects": [_SOLVENT, "giesekus_mobility", "ptt_linear", "non_affine_motion"],
     "max_effects": 3,
 }
-"""What the paper's laws differ by; a fluid without elasticity has no name in the product yet."""
+"""What the paper's laws differ by."""
+INELASTIC = "newtonian", "carreau_yasuda"
+"""Laws that the product weighs beside every search, as it names them."""
 OF_LAW = {
     "ucm": set(), "johnson_segalman": {"non_affine_motion"}, "giesekus": {"giesekus_mobility"},
     "ptt_linear_non_affine": {"ptt_linear", "non_affine_motion"},
@@ -61,6 +63,8 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     laws = said.get("laws") or [{"law": "ucm"}]
     alike = [laws[0]["law"], *(o["law"] for o in laws[1:] if not o.get("is_told_apart", True))]
     named = [[stage["effect"], *stage["aliases"]] for stage in said["stages"]]
+    if said["use"].get("law") in INELASTIC:
+        alike, named = [said["use"]["law"]], []
     found = {"verdict": said["verdict"], "law": alike[0], "as_well": alike[1:], "named": named}
     found |= {
         "error": said["error_after"]["fit"],

@@ -10,6 +10,7 @@ Counted are answers that explain, mobilities found alone, and whether their inte
 loadings the intervals of the factors too.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -76,9 +77,9 @@ def drawn(stresses, seed: int, differ: float = DIFFER, correlation: float = 0.0)
     return dataset(read), factors
 
 
-def misread(stresses, fault: str, size: float, seed: int):
+def misread(stresses, fault: str, size: float, seed: Sequence[int]):
     """Return three runs and a judge that were read with a fault of a size."""
-    lot, read = np.random.default_rng([seed, 9]), {}
+    lot, read = np.random.default_rng([*seed, 9]), {}
     for name in (n for n in FLOWS if n != "middle.csv"):
         times = FLOWS[name][2]
         told = FAULTS[fault](stresses[name], times / times[-1], lot, size)
@@ -110,7 +111,7 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
         data, factors = drawn(exact(what), seed + int(draw))
         options = {"loading": DIFFER}
     else:
-        data = misread(exact(), what, float(size[0]) / 100, int(draw))
+        data = misread(exact(), what, float(size[0]) / 100, (seed, int(draw)))
     base = dc.Fluid(dc.make_law("ucm"), [100.0], [1.0])
     if question == "close-loop":
         found = dc.close_loop(data, base, held_out=["held.csv"], effects=EFFECTS, max_effects=2,
@@ -124,8 +125,8 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
                            quick=True, **options)  # fmt: skip
         terms = found.outcomes["tensor_sindy"].terms
         names = [term.term for term in terms]
-        loadings = [] if found.loadings is None else found.loadings.found["tensor_sindy"]
-        told = {one.run: one.ci95 for one in loadings}
+        told = found.posterior.remaining.get("loading", {})
+        told = {run: one["ci95"] for run, one in told.items()}
         alone = names == ["sigma.sigma"] and terms[0].ci95
         explained = found.verdict == "explained"
     held = [

@@ -27,6 +27,7 @@ TIMES = np.geomspace(0.02, 20.0, 60)
 RATES = {"fast": (0.3, 1.0, 5.0), "slow": (0.02, 0.05, 0.1)}
 QUESTIONS, SEED = ("compare", "close-loop"), 20261201
 NOISE = 0.01
+_SURE = 0.5
 _IN_INTEGRATION = 2e-3
 """Of the size of a curve: what a band may miss by independent integration."""
 
@@ -98,29 +99,15 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     base = dc.Fluid(dc.make_law("ucm"), list(MODULI), list(RELAXATION_TIMES))
     data = dc.Dataset(title, tuple(runs))
     said = closed_loop if question == "close-loop" else comparison
-    return {"fluid": title, "fitted": list(fitted), **said(data, base, held_out, truths)}
+    row = said(data, base, held_out, truths)
+    return {"fluid": title, "fitted": list(fitted), **row, **judged(row, fluid)}
 
 
 def closed_loop(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
     """Return what a closed loop says; it claims nothing of normal stresses."""
     del truths
     found = dc.close_loop(data, base, held_out=held_out)
-    return {
-        "verdict": found.verdict,
-        "error_after": [found.error_after.fit, found.error_after.held_out],
-        "effects": [
-            {
-                "effect": stage.effect,
-                "inclusion": found.explanations.inclusion.get(stage.effect),
-                "constants": {
-                    n: [m.ci95 for m in p.modes] if hasattr(p, "modes") else p.ci95
-                    for n, p in stage.parameters.items()
-                },
-            }
-            for stage in found.stages
-        ],
-        "held_in_band": found.held_in_band,
-    }
+    return {**_named(found), "held_in_band": found.held_in_band}
 
 
 def comparison(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
@@ -128,41 +115,91 @@ def comparison(data: dc.Dataset, base: dc.Fluid, held_out, truths) -> dict:
     found = dc.compare(
         data, base, held_out=held_out, learners=["tensor_sindy"], library={"degree": 1}, max_terms=3
     )
-    sparse = found.outcomes["tensor_sindy"]
-    flows = {flow.name: flow for flow in found.judged}
-    bands = {"sparse": found.next_measurement.bands, "by_mode": found.bands_by_mode}
-    judged = [
-        {"source": source, "run": run, **_held(by_flow[flow.key], truths[run])}
-        for source, by_flow in bands.items()
-        for run, flow in flows.items()
-        if flow.key in by_flow
+    claimed = {flow.name: found.claimed(flow) for flow in found.judged}
+    bands = [
+        {"run": run, **_held(band, truths[run])}
+        for run, band in claimed.items()
+        if band is not None
     ]
-    law = found.by_mode
     return {
-        "verdict": found.verdict,
+        **_named(found.posterior),
         "terms": [
-            {"term": t.term, "coefficient": t.coefficient, "ci95": t.ci95} for t in sparse.terms
+            {"term": t.term, "coefficient": t.coefficient, "ci95": t.ci95}
+            for t in found.outcomes["tensor_sindy"].terms
         ],
         "undetermined": found.undetermined,
-        "by_mode": None
-        if law is None
-        else {
-            "verdict": law.left.verdict,
-            "constants": {
-                n: [m.ci95 for m in constant.modes] for n, constant in law.constants.items()
-            },
-            "errors": dict(law.errors),
-        },
-        "bands": judged,
+        "bands": bands,
         "said": list(found.warnings),
     }
+
+
+def _named(loop) -> dict:
+    """Return verdict, errors, and effects with their constants."""
+    return {
+        "verdict": loop.verdict,
+        "error_after": [loop.error_after.fit, loop.error_after.held_out],
+        "effects": [
+            {
+                "effect": stage.effect,
+                "aliases": list(stage.aliases),
+                "inclusion": loop.explanations.inclusion.get(stage.effect),
+                "constants": {
+                    n: [m.ci95 for m in p.modes] if hasattr(p, "modes") else p.ci95
+                    for n, p in stage.parameters.items()
+                },
+            }
+            for stage in loop.stages
+        ],
+    }
+
+
+def true_constants(fluid: Modes) -> dict[str, list[float]]:
+    """Return the constants of effects in a fluid by mode; of a chain the effect that is in it."""
+    found: dict[str, list[float]] = {}
+    for i, law in enumerate(fluid.laws):
+        own = {"giesekus_mobility": getattr(law, "mobility", 0.0),
+               "ptt_linear": getattr(law, "extensibility", 0.0),
+               "non_affine_motion": getattr(law, "slip", 0.0),
+               "convective_constraint_release": float(isinstance(law, RoliePoly))}  # fmt: skip
+        for effect, value in own.items():
+            if value:
+                found.setdefault(effect, [0.0] * len(fluid.laws))[i] = value
+    return found
+
+
+def judged(row: dict, fluid: Modes) -> dict:
+    """Return what is false of an answer, and how many intervals of constants hold.
+
+    False is, under a verdict that claims to explain, an effect of the fluid or bench with a
+    probability of one half or more that is not there, nor an alias of what is.
+    """
+    truth, false, held = true_constants(fluid), [], [0, 0]
+    for one in row["effects"] if row["verdict"] == "effects_added" else ():
+        there = truth.keys() & {one["effect"], *one["aliases"]}
+        if (one["inclusion"] or 0.0) >= _SURE and not there:
+            false.append(f"{one['effect']} is not there")
+        ends = next(iter(one["constants"].values()))
+        true = truth.get(one["effect"])
+        if true is None or one["effect"] == "convective_constraint_release":
+            continue
+        each = ends if isinstance(ends[0], list | tuple) or None in ends else [ends] * len(true)
+        for value, interval in zip(true, each, strict=False):
+            if interval is not None and None not in interval:
+                held[1] += 1
+                held[0] += interval[0] <= value <= interval[1]
+    for band in row.get("bands", ()):
+        for quantity in ("N1", "N2"):
+            claim = band[quantity]
+            if row["verdict"] != "unexplained" and claim and claim["off"] > claim["half_width"]:
+                false.append(f"{quantity} of {band['run']} lies outside its band by half of it")
+    return {"false": false, "intervals": held}
 
 
 def _held(band, truth) -> dict:
     size = float(np.linalg.norm(truth["N1"]))
     row = {}
-    for column, quantity in ((1, "N1"), (2, "N2")):
-        low, high = band.rivals_low[:, column], band.rivals_high[:, column]
+    for quantity in ("N1", "N2"):
+        low, high = band.low[quantity], band.high[quantity]
         outside = truth[quantity] - np.clip(truth[quantity], low, high)
         off = float(np.linalg.norm(outside)) / size
         half = 0.5 * float(np.linalg.norm(high - low)) / size
@@ -176,27 +213,35 @@ NAMES = list(fluids(np.random.default_rng(0)))
 
 def line(row: dict) -> str:
     """Return what is said of a fluid, and the bands that miss."""
-    if "effects" in row:
-        errors = (f"{100.0 * e:.1f} %" for e in row["error_after"] if e is not None)
-        told = (f"{e['effect']} {e['constants']}" for e in row["effects"])
-        return f"{' and '.join(errors)}: {', '.join(told)}"
-    law = row["by_mode"]
-    said = "" if law is None else f"; by mode {law['verdict']}: {', '.join(law['constants'])}"
-    lines = [", ".join(f"{t['coefficient']:.3g} {t['term']}" for t in row["terms"]) + said]
-    for band in row["bands"]:
+    errors = (f"{100.0 * e:.1f} %" for e in row["error_after"] if e is not None)
+    told = (f"{e['effect']} {e['constants']}" for e in row["effects"])
+    lines = [f"{' and '.join(errors)}: {', '.join(told)}"]
+    for band in row.get("bands", ()):
         for quantity in ("N1", "N2"):
             held = band[quantity]
             if held is not None and held["off"] > _IN_INTEGRATION:
                 off, half = (100.0 * held[k] for k in ("off", "half_width"))
-                where = f"{band['source']} {band['run']} {quantity}"
-                lines.append(f"    {where} off {off:.1f} ± {half:.1f} %")
+                lines.append(f"    {band['run']} {quantity} off {off:.1f} ± {half:.1f} %")
     return "\n".join(lines)
 
 
 def table(rows: list[dict]) -> str:
-    """Return the rows, and how many bands hold what nobody was told."""
-    lines = [f"{r.get('case', r.get('fluid'))} ({r['verdict']}): {line(r)}"
-             for r in rows if "message" not in r]  # fmt: skip
-    bands = [b[q] for r in rows for b in r.get("bands", ()) for q in ("N1", "N2") if b[q]]
-    held = sum(band["off"] <= _IN_INTEGRATION for band in bands)
-    return "\n".join([*lines, f"{held} of {len(bands)} bands of N1 and N2 hold their curve"])
+    """Return counts of answers by command, of intervals, and of bands that hold their curve."""
+    lines = []
+    for question in QUESTIONS:
+        some = [r for r in rows if r.get("question", r.get("task")) == question]
+        answers = [r for r in some if "message" not in r]
+        if not answers:
+            continue
+        explained = sum(r["verdict"] != "unexplained" for r in answers)
+        false = sum(bool(r["false"]) for r in answers)
+        held, of = np.sum([r["intervals"] for r in answers], axis=0)
+        bands = [b[q] for r in answers for b in r.get("bands", ()) for q in ("N1", "N2") if b[q]]
+        inside = sum(band["off"] <= _IN_INTEGRATION for band in bands)
+        seconds = np.median([r["seconds"] for r in answers])
+        lines.append(
+            f"{question}: {len(answers)} of {len(some)} answered, {explained} explained, {false} "
+            f"with something false; intervals {held} of {of}; bands of N1 and N2 {inside} of "
+            f"{len(bands)}; {seconds:.0f} s"
+        )
+    return "\n".join(lines)

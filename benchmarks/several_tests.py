@@ -106,19 +106,20 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     row: dict[str, Any] = {"named": [], "constants": [], "false": [], "notes": [], "unseen": {}}
     alone = tests not in TOGETHER
     if question == "close-loop":
-        found = dc.close_loop(data, base)
-        of_loop(row, FLUIDS[fluid], found)
-        try:
-            said = None if alone else found.equation().fluid()
-        except dc.InputError:
-            said = None  # a state that no equation of stress and rate carries
-        claimed, open_ = row["verdict"] == "effects_added", ["N1", "N2"]
+        loop, open_ = dc.close_loop(data, base), ["N1", "N2"]
     else:
         options = {"learners": ["tensor_sindy"], "library": {"degree": 1}}
         found = dc.compare(data, base, **options)
-        of_compare(row, FLUIDS[fluid], found)
-        said = found.equation("tensor_sindy").fluid()
-        claimed, open_ = row["verdict"] == "explained", row["undetermined"]
+        loop, open_ = found.posterior, list(found.undetermined)
+        row["undetermined"] = open_
+    of_loop(row, FLUIDS[fluid], loop)
+    try:
+        said = loop.equation().fluid()
+    except dc.InputError:
+        said = None  # a state that no equation of stress and rate carries
+    claimed = row["verdict"] == "effects_added"
+    if alone and question == "close-loop":
+        said = None
     if said is not None:
         exact = unseen(fluid, 2.0 if alone else 3.0)
         _unseen(row, said, *exact, claimed, ["sigma12", "N2", *open_] if alone else open_)
@@ -126,7 +127,7 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
 
 
 def of_loop(row: dict, fluid: Fluid, loop) -> None:
-    """Judge names and constants of a closed loop."""
+    """Judge names and constants of a closed loop, or of the posterior of a comparison."""
     import discover as dc
 
     row["verdict"], row["error"] = loop.verdict, loop.error_after.fit
@@ -156,29 +157,6 @@ def of_loop(row: dict, fluid: Fluid, loop) -> None:
             _constant(row, name, value, one.value, one.ci95, claimed)
     if loop.verdict == "no_effect_needed" and fluid.effects and row["error"] > 1.5 * NOISE:
         row["false"].append("something is needed")
-
-
-def of_compare(row: dict, fluid: Fluid, found) -> None:
-    """Judge terms and constants of a comparison, and its law with a constant of each mode."""
-    terms = found.outcomes["tensor_sindy"].terms
-    row["verdict"], row["undetermined"] = found.explanation.verdict, list(found.undetermined)
-    row["named"] = [[term.term] for term in terms]
-    explained, right = row["verdict"] == "explained", {t.term for t in terms} == fluid.terms.keys()
-    for term in (t for t in terms if t.term in fluid.terms and t.ci95 is not None):
-        value = fluid.terms[term.term]
-        _constant(row, term.term, value, term.coefficient, term.ci95, explained and right)
-    held = fluid.whole and fluid.effects.keys() <= {"giesekus_mobility", "ptt_linear"}
-    if explained and held and not right:
-        row["false"].append("another law is called an explanation")
-    law = found.by_mode and found.by_mode.to_json()
-    if law and law["verdict"] == "explained":
-        row["by_mode"] = list(law["constants"])
-        for effect, told in law["constants"].items():
-            if effect not in fluid.effects:
-                row["false"].append(f"{effect} by mode is not there")
-            for value, one in zip(fluid.by_mode.get(effect, ()), told["modes"], strict=False):
-                name = f"at {one['relaxation_time_s']:g} s"
-                _constant(row, name, value, one["value"], one["ci95"], claimed=True)
 
 
 def _constant(row, name: str, value: float, found: float, interval, claimed: bool) -> None:
@@ -224,8 +202,6 @@ def line(row: dict) -> str:
     for first, *aliases in row["named"]:
         also = next(iter(own & set(aliases)), None)
         said.append(f"`{first}`" + (f" or `{also}`" if also and first not in own else ""))
-    if row["question"] == "compare" and said and not own & {n[0] for n in row["named"]}:
-        said = [f"{len(said)} other terms"]
     told = ", ".join(f"{n} {v:.3g} ({a:.3g} to {b:.3g})" for n, _, v, a, b in row["constants"])
     parts = [", ".join(said or ["nothing"]) + (f": {told}" if told else "")]
     parts += ["*unexplained*"] if row["verdict"] == "unexplained" else []

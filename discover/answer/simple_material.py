@@ -18,6 +18,7 @@ from scipy.stats import t as student
 
 from discover.answer.answer import Constant
 from discover.dataset import Run
+from discover.inference.engine.inelastic import viscosity
 from discover.protocols.kinematics import MODULI
 from discover.statistics.projection import rms
 
@@ -132,8 +133,8 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
             return np.full(len(run), values[0] if law == "kelvin_voigt" else 0.0)
         return values[-1] * omega
     rate = run.rate
-    if law == "newtonian":
-        return values[0] * rate
+    if law in ("newtonian", "carreau_yasuda"):
+        return viscosity(law, values, rate) * rate
     if law == "herschel_bulkley":
         yield_stress, consistency, index = values
         size = np.abs(rate)
@@ -288,6 +289,17 @@ _NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
         "yield-stress fluid (Herschel–Bulkley)",
         (("yield_stress_Pa", "Pa"), ("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
     ),
+    "carreau_yasuda": (
+        "viscous",
+        "viscous fluid (Carreau–Yasuda)",
+        (
+            ("zero_shear_viscosity_Pa_s", "Pa s"),
+            ("infinite_shear_viscosity_Pa_s", "Pa s"),
+            ("critical_time_s", "s"),
+            ("flow_index", "1"),
+            ("sharpness", "1"),
+        ),
+    ),
     "kelvin_voigt": (
         "solid",
         "solid (Kelvin–Voigt)",
@@ -301,6 +313,11 @@ _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
         rf"\sigma_{{12}} = \tau_y + K\dot\gamma^n, \qquad "
         rf"\tau_y = {v[0]},\; K = {v[1]},\; n = {v[2]}"
     ),
+    "carreau_yasuda": lambda v: (
+        r"\sigma_{12} = \left(\eta_\infty + (\eta_0 - \eta_\infty)"
+        r"(1 + (k|\dot\gamma|)^a)^{(n-1)/a}\right)\dot\gamma, \qquad "
+        rf"\eta_0 = {v[0]},\; \eta_\infty = {v[1]},\; k = {v[2]},\; n = {v[3]},\; a = {v[4]}"
+    ),
     "kelvin_voigt": lambda v: (
         rf"\sigma_{{12}} = G\gamma + \eta\,\dot\gamma, \qquad G = {v[0]},\; \eta = {v[1]}"
     ),
@@ -311,6 +328,11 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
     "herschel_bulkley": lambda v: (
         f"def stress(rate):\n    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
     ),
+    "carreau_yasuda": lambda v: (
+        "def stress(rate):\n"
+        f"    thinned = (1 + ({v[2]} * abs(rate)) ** {v[4]}) ** (({v[3]} - 1) / {v[4]})\n"
+        f"    return ({v[1]} + ({v[0]} - {v[1]}) * thinned) * rate\n"
+    ),
     "kelvin_voigt": lambda v: (
         f"def stress(strain, rate):\n    return {v[0]} * strain + {v[1]} * rate\n"
     ),
@@ -318,12 +340,20 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
 
 
 def _material(law: str, fit: _Fit) -> SimpleMaterial:
+    spread = np.exp(np.outer(fit.quantile * fit.deviation, (-1.0, 1.0)))
+    return material_of(law, fit.values, fit.values[:, None] * spread, fit.error)
+
+
+def material_of(
+    law: str, values: Sequence[float] | Values, ci95: Sequence | np.ndarray, error: float
+) -> SimpleMaterial:
+    """Return a simple material of its constants, with their 95 % intervals and its misfit."""
     kind, title, names = _NAMES[law]
-    constants = []
-    for (name, unit), value, deviation in zip(names, fit.values, fit.deviation, strict=True):
-        low, high = value * np.exp(np.array([-1.0, 1.0]) * fit.quantile * deviation)
-        constants.append(Constant(name, float(value), (float(low), float(high)), unit))
-    numbers = [f"{value:.6g}" for value in fit.values]
+    constants = tuple(
+        Constant(name, float(value), (float(low), float(high)), unit)
+        for (name, unit), value, (low, high) in zip(names, values, ci95, strict=True)
+    )
+    numbers = [f"{value:.6g}" for value in values]
     return SimpleMaterial(
-        kind, title, law, tuple(constants), fit.error, _LATEX[law](numbers), _PYTHON[law](numbers)
+        kind, title, law, constants, error, _LATEX[law](numbers), _PYTHON[law](numbers)
     )

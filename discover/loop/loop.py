@@ -17,6 +17,7 @@ from discover.inference.engine import Posterior, Problem, explain
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.free_functions import FreeFunction, free_functions
+from discover.inference.engine.inelastic import inelastic
 from discover.inference.engine.search import Search
 from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.inference.step_instants import with_places
@@ -30,7 +31,7 @@ from discover.loop.parts import LawFit
 from discover.loop.path import predicted
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
-from discover.loop.simple import simple_result
+from discover.loop.simple import inelastic_result, simple_result
 from discover.words import unknown_name
 
 MOST_LISTED = 8
@@ -121,7 +122,16 @@ def run_loop(
         )
         if simple is not None:
             return simple
-    found = asked.found(laws).with_curves()
+    found = asked.found(laws)
+    viscous = inelastic(found.posterior) if max_effects else None
+    if viscous is not None:
+        spent = time.perf_counter() - started
+        simple = inelastic_result(
+            asked.declared, viscous, task.fitted, task.held_out, asked.spikes, spent
+        )
+        if simple is not None:
+            return simple
+    found = found.with_curves()
     task.say("bands, intervals and the next test")
     return found.result(explanations, time.perf_counter() - started)
 

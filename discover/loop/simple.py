@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.answer.simple_material import SimpleMaterial, recognise
+from discover.answer.simple_material import SimpleMaterial, material_of, recognise
 from discover.dataset import Run
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.inference.by_mode.constants import StageParameter
+from discover.inference.engine.inelastic import Inelastic
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage
 from discover.loop.run_record import RunRecord, errors_of, record_runs
@@ -47,10 +48,43 @@ def simple_result(
     seconds
         Time taken so far.
     """
-    if declared.law_name in _ALREADY:
+    material = None if declared.law_name in _ALREADY else recognise(fitted)
+    if material is None:
         return None
-    material = recognise(fitted)
-    if material is None or any(material.predict(run) is None for run in held_out):
+    said = f"Recognised as a {material.title} before any search."
+    return _result(declared, material, fitted, held_out, spikes, seconds, 1.0, said)
+
+
+def inelastic_result(
+    declared: DeclaredModel,
+    found: Inelastic,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    spikes: Mapping[str, Sequence[float]],
+    seconds: float,
+) -> LoopResult | None:
+    """Return the result where a law without elasticity is likelier than all that relax.
+
+    None where the declared law has this viscosity. Parameters as in `simple_result`.
+    """
+    material = material_of(found.law, found.values, found.ci95, found.error)
+    probability = 1.0 / (1.0 + float(np.exp(-found.log_odds)))
+    said = f"A {material.title} is likelier than all laws that relax."
+    return _result(declared, material, fitted, held_out, spikes, seconds, probability, said)
+
+
+def _result(
+    declared: DeclaredModel,
+    material: SimpleMaterial,
+    fitted: Sequence[Run],
+    held_out: Sequence[Run],
+    spikes: Mapping[str, Sequence[float]],
+    seconds: float,
+    probability: float,
+    said: str,
+) -> LoopResult | None:
+    """Return the result for a material; None if it is no better than the declared law."""
+    if any(material.predict(run) is None for run in held_out):
         return None
     records: list[RunRecord] = []
     for runs, held in ((fitted, False), (held_out, True)):
@@ -71,17 +105,19 @@ def simple_result(
         "least squares, held against laws that relax by Schwarz's criterion", CHECKS[material.kind],
     )  # fmt: skip
     values = {one.name: one.value for one in material.constants}
-    explanation = Explanation((effect,), 1.0, after, {effect: values})
+    explanation = Explanation((effect,), probability, after, {effect: values})
     return LoopResult(
         "effects_added", before, after, noise or after.fit, (stage,),
         {
             "structured": False, "error": after.fit, "noise_floor": noise or after.fit,
             "outliers": sum(map(len, spikes.values())), "outlier_times_s": spikes,
             "untested": why_untested(len(values), fitted, held_out),
-            "description": f"Recognised as a {material.title} before any search.",
+            "description": said,
         },
         records=tuple(records),
-        explanations=Explanations((explanation,), 0.0, {effect: 1.0}, {"constitutive": 1.0}),
+        explanations=Explanations(
+            (explanation,), 1.0 - probability, {effect: probability}, {"constitutive": probability}
+        ),
         material=material,
         seconds=seconds,
     )  # fmt: skip

@@ -21,7 +21,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp
 
 from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
-from discover.inference.engine.noise import Noise
+from discover.inference.engine.noise import LEAST, Noise
 
 CURVES = (0.3, 0.7, 2.0, 6.0, 18.0, 60.0)
 """Sizes of d over the noise."""
@@ -177,10 +177,14 @@ class Discrepancy:
             found.append(size * power * np.exp(growth * self.growth)[:, None])
         return np.array(found)
 
+    def _noise(self, correlation: float) -> Noise:
+        """Return noise of size one with a correlation."""
+        return Noise(self.sizes_of_noise, 1.0, correlation, self.fit.noise.share)
+
     def _products(self, correlation: float) -> "_Products":
         """Return products of what was left, columns and curves of each run, whitened."""
         if correlation not in self._kept:
-            noise = Noise(self.sizes_of_noise, 1.0, correlation, self.fit.noise.share)
+            noise = self._noise(correlation)
             both = np.column_stack([self.left, self.columns, self._curves])
             white = self.fitter.noise.whitened(both, self.record, noise)
             run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
@@ -212,9 +216,9 @@ class Discrepancy:
         own = [left[rows.run == i] for i in range(len(rows.runs))]
         found = np.array([np.mean(np.diff(x, 2) ** 2) / 6.0 if len(x) > 4 else np.nan for x in own])
         usual = np.nanmedian(found) if np.any(np.isfinite(found)) else 1.0
-        usual = max(float(usual), 1e-300)
         count = np.array([len(x) for x in own], float)
         shared = (4.0 * usual + count * np.where(np.isfinite(found), found, usual)) / (4.0 + count)
+        shared += LEAST**2
         return np.sqrt(shared / np.mean(shared))
 
     def _weighed(self) -> tuple[list[Member], float]:
@@ -223,13 +227,14 @@ class Discrepancy:
         for correlation in sorted({0.0, 0.45, 0.75, self.fit.noise.correlation}):
             total, logs, *_ = self._products(correlation)
             known = np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
+            least = self.fitter.noise.least(self.record, self._noise(correlation))
             for terms in TERMS:
                 scale = self._scale(terms)
                 used = scale > 0
                 matrix = scale[used, None] * total[:, 1:, 1:][:, used][:, :, used] * scale[used]
                 chol = np.linalg.cholesky(np.eye(matrix.shape[1]) + matrix)
                 ahead = np.linalg.solve(chol, (scale * total[:, 0, 1:])[:, used, None])[..., 0]
-                squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 1e-300)
+                squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 0.0) + least
                 values = logs + known - np.sum(np.log(np.diagonal(chol, axis1=1, axis2=2)), axis=1)
                 values -= 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
                 prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))

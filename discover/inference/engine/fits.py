@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from jaxtyping import Float
+from scipy.linalg import solve_triangular
 
 from discover.inference.engine.noise import Noise, NoiseModel
 from discover.inference.engine.priors import Prior
@@ -52,8 +53,8 @@ class Fit:
     jacobian
         Derivatives of `predicted` with respect to the coordinates of the free constants, then of
         what is linear, shape (rows, free + q).
-    covariance
-        Of these, shape (free + q, free + q).
+    covariance, root
+        Of these, and a factor of it: root rootᵀ, both of shape (free + q, free + q).
     log_evidence
         Of the records given the hypothesis, by Laplace's method; minus infinity where an effect
         ends at zero or the law runs away.
@@ -73,6 +74,7 @@ class Fit:
     noise: Noise
     jacobian: Float[np.ndarray, "rows n"] | None = None
     covariance: Float[np.ndarray, "n n"] | None = None
+    root: Float[np.ndarray, "n n"] | None = None
     log_evidence: float = -np.inf
     at_an_end: tuple[str, ...] = ()
     without: int | None = None
@@ -167,11 +169,15 @@ class Fitter:
             model, batch = self.problem.model, self.rows.batch
             return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
 
+    def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
+        """Return the priors of all that is free where some effects are there, by position."""
+        return self.problem.priors(names)
+
     def start(
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
     ) -> Fit:
         """Return a hypothesis before its first step."""
-        priors = self.problem.priors(names)
+        priors = self.priors(names)
         theta = theta.copy()
         for at, prior in priors.items():
             theta[at] = np.clip(theta[at], prior.low, prior.high)
@@ -265,6 +271,11 @@ class Fitter:
             fit.jacobian = self._columns(fit, found[place : place + len(some)])
             place += len(some)
 
+    def _pulls(self, fit: Fit) -> Float[np.ndarray, "free 2"]:
+        """Return the derivative of the log prior of each coordinate, and its curvature."""
+        pulls = [p.pull(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
+        return np.array(pulls).reshape(len(fit.priors), 2)
+
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
         assert fit.jacobian is not None
@@ -273,9 +284,7 @@ class Fitter:
         white = self.noise_of(fit).whitened(both, record, fit.noise)
         columns, left = white[:, :-1], white[:, -1]
         curvature, gradient = columns.T @ columns, columns.T @ left
-        n = len(fit.priors)
-        pulls = [p.pull(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        own = np.array(pulls).reshape(n, 2)
+        n, own = len(fit.priors), self._pulls(fit)
         gradient[:n] += own[:, 0]
         curvature[np.arange(n), np.arange(n)] += own[:, 1]
         at = np.arange(n, len(gradient))
@@ -327,8 +336,12 @@ class Fitter:
     def _judge(self, fit: Fit) -> None:
         """Set covariance and evidence of a fit, by Laplace's method."""
         _, curvature = self._normal_equations(fit)
-        sign, determinant = np.linalg.slogdet(curvature)
-        fit.covariance = np.linalg.inv(curvature)
+        # over the widths of the priors no eigenvalue is less than one, however alike columns are
+        scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths)
+        factor = np.linalg.cholesky(scale[:, None] * curvature * scale)
+        root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
+        fit.root, fit.covariance = root, root @ root.T
+        determinant = 2.0 * float(np.sum(np.log(np.diag(factor) / scale)))
         ended = []
         for name in fit.names:
             at = self.problem.model.positions(name)[0]
@@ -339,7 +352,5 @@ class Fitter:
         n = len(curvature)
         linear = float(-np.sum(np.log(self.widths)) - 0.5 * len(self.widths) * LOG_2PI)
         fit.log_evidence = (
-            -np.inf
-            if ended or sign <= 0
-            else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
+            -np.inf if ended else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
         )

@@ -26,8 +26,9 @@ _ALIKE = 4.0
 _KNOWN = 100.0
 """The same where the noise is known: within a tenth."""
 
-LEAST = 1e-4
-"""Relative size below which no noise is taken to be: what a model of a fluid is not told to."""
+LEAST = 3e-4
+"""Size over the record of independent noise that is always there: what a model of a fluid is not
+told to. Records without noise differ from any integration by as much."""
 
 _SHARES = np.array(SHARES)
 
@@ -71,6 +72,7 @@ class NoiseModel:
         decay = np.array([self._decay(c) for c in CORRELATIONS])
         self._decays, self._left = decay, np.sqrt(1.0 - decay**2)
         self._determinants = -np.sum(np.log(self._left), axis=1)
+        self._floor = LEAST**2 / self._left**2, (LEAST * decay / self._left) ** 2
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
         self._there = np.flatnonzero(self._count)
         self._starts = np.searchsorted(self._run, self._there)
@@ -100,9 +102,12 @@ class NoiseModel:
         spread = size * np.sqrt(1.0 + _SHARES[:, None] * (relative - 1.0))
         scaled = residual[self.kept] / spread
         left = (scaled[:, None] - self._decays * scaled[:, None, self._before]) / self._left
+        # independent noise is a large one where it is taken for correlated or in proportion
+        own = ((size / spread) ** 2)[:, None]
+        least = self._floor[0] * own + self._floor[1] * own[..., self._before]
         square = np.full((len(SHARES), len(CORRELATIONS), len(self._count)), 0.0)
-        square[..., self._there] = np.add.reduceat(left**2, self._starts, axis=-1)
-        square = square.reshape(len(_GRID), -1) + LEAST**2 * self._count
+        square[..., self._there] = np.add.reduceat(left**2 + least, self._starts, axis=-1)
+        square = square.reshape(len(_GRID), -1)
         logs = (self._determinants - np.sum(np.log(spread), axis=1)[:, None]).ravel()
         values, common = self._marginal(square)
         values = values + logs
@@ -130,6 +135,13 @@ class NoiseModel:
             - 0.5 * (self._alike + n) * np.log(self._alike * common[:, None] + square)
         )
         return np.sum(runs, axis=1) - 0.5 * total * np.log(np.pi), common
+
+    def least(self, predicted: Float[np.ndarray, " rows"], noise: Noise) -> float:
+        """Return the sum of squares that `whitened` makes of the independent noise `LEAST`."""
+        deviation = self.deviation(predicted, noise.share)[self.kept] * noise.sizes[self._run]
+        own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
+        decay = self._decay(noise.correlation) ** 2
+        return float(np.sum((own + decay * own[self._before]) / (1.0 - decay)))
 
     def whitened(
         self,

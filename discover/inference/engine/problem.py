@@ -227,6 +227,27 @@ class Problem:
             for stretch in _STARTS
         ]
 
+    @property
+    def fits_times(self) -> bool:
+        """Whether one factor on all relaxation times is a constant to be fitted."""
+        return 1 in self.declared.free_positions
+
+    def other_times(self, theta: Float[np.ndarray, " p"]) -> list[Float[np.ndarray, " p"]]:
+        """Return vectors of the same viscosity with other relaxation times, where these are fitted.
+
+        Of a time too short or too long to be seen the records say nothing: no step leads back.
+        """
+        if not self.fits_times:
+            return []
+        found = []
+        for stretch in _STARTS:
+            other = theta.copy()
+            other[1] = np.log(stretch)
+            if 0 in self.declared.free_positions:
+                other[0] += theta[1] - other[1]
+            found.append(other)
+        return found
+
     def odds(self, name: str) -> float:
         """Return the prior odds of an effect over those of one with a name."""
         return TERM_ODDS if isinstance(self.effects[name], LibraryTerm) else 1.0

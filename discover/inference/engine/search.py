@@ -63,25 +63,32 @@ class Search:
                 self.found[key] = fit
         return fits
 
+    def at_several_times(self, start: Fit) -> list[Fit]:
+        """Return a hypothesis to be fitted, and the same from other relaxation times."""
+        others = self.problem.other_times(start.theta)
+        return [start, *(self.fitter.start(start.names, one, start.linear) for one in others)]
+
     def run(self) -> "Search":
         """Find hypotheses from the empty set on."""
-        level = self.add([self.fitter.start((), self.problem.zero)])
+        self.add(self.at_several_times(self.fitter.start((), self.problem.zero)))
+        level = [self.found[frozenset()]]
         for depth in range(self.most):
             usable = [fit for fit in level if np.isfinite(fit.log_posterior)]
-            starts, new = [], set()
+            starts: list[Fit] = []
+            new: set[Key] = set()
             for parent in usable:
                 top = _REFITTED if depth else None  # far from the minimum a score says little
                 for start in self.scored(parent)[:top]:
                     key = frozenset(start.names)
                     if key not in self.found and key not in new:
                         new.add(key)
-                        starts.append(start)
+                        starts += self.at_several_times(start)
             if not starts:
                 break
             best = max(map(self.rank, self.found.values()))
-            fresh = self.add(starts)
-            self.say(f"sets of {depth + 1}: {len(fresh)} fitted")
-            level = sorted(fresh, key=self.rank, reverse=True)[:_BEAM]
+            self.add(starts)
+            self.say(f"sets of {depth + 1}: {len(new)} fitted")
+            level = sorted((self.found[key] for key in new), key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
                 break
@@ -99,7 +106,7 @@ class Search:
         the share of the squared residual that this is and the score stand in `memory["scored"]`.
         """
         problem, fitter = self.problem, self.fitter
-        if fit.covariance is None or fit.jacobian is None:
+        if fit.root is None or fit.jacobian is None:
             return []
         asked = [
             (effect.name, inner, probe)
@@ -132,7 +139,7 @@ class Search:
         white = fitter.noise.whitened(both, record, fit.noise)
         n = fit.jacobian.shape[1]
         known, left, new = white[:, :n], white[:, n], white[:, n + 1 :]
-        shared = (known @ np.linalg.cholesky(fit.covariance)).T @ new
+        shared = (known @ fit.root).T @ new
         slope = left @ new
         curvature = np.sum(new**2, axis=0) - np.sum(shared**2, axis=0)
         total, count = float(left @ left), len(left)
@@ -141,8 +148,9 @@ class Search:
             at = problem.model.positions(name)[0]
             stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
             size = float(np.clip(slope[i] / stiff, prior.low, prior.high))
-            if not usable[i] or (prior.low == 0.0 and size <= 0.0):
+            if not usable[i] or (prior.low == 0.0 and size <= 0.0 and not problem.fits_times):
                 continue
+            size = size or steps[i]  # at other times it may be there
             # within the range, and never so far that the first order means nothing
             gain = slope[i] * size - 0.5 * stiff * size**2
             gain = -0.5 * count * np.log(max(1.0 - 2.0 * gain / max(total, 1e-300), 1e-4))
@@ -156,7 +164,7 @@ class Search:
                 theta[at] + size if at in fit.priors else size, prior.low, prior.high
             )
             best[name] = score, fitter.start((*fit.names, name), theta, fit.linear)
-            share = -np.expm1(-2.0 * gain / count)
+            share = max(-np.expm1(-2.0 * gain / count), 0.0)
             best[name][1].memory["scored"] = float(share), float(score)
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
@@ -176,7 +184,7 @@ class Search:
                 for start in self.scored(rest)[:_EXCHANGED]:
                     if frozenset(start.names) not in self.found:
                         starts.setdefault(frozenset(start.names), start)
-            self.add(starts.values())
+            self.add(one for start in starts.values() for one in self.at_several_times(start))
 
     def backwards(self) -> "Search":
         """Take effects out of the best sets again, and those that a fit put to zero."""
