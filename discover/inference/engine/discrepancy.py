@@ -6,9 +6,10 @@ To first order about a fit the records are
 
 with u_i the signatures of all effects and terms that are not in the hypothesis, each a third of the
 record at τ = 1 (this is the dense library, and says something of any flow), and d_r a smooth curve
-along the samples of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the shear rate   [Kennedy
-& O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4, 415, for τ by evidence].
-ρ, τ, the stiffness of S and the growth are summed over a grid.
+along the samples x of run r, b_rk ~ N(0, ρ² S_k), whose size may grow with the shear rate; or along
+the logarithm of the samples since the rate last stepped, where motor, tool and transducer are still
+on their way   [Kennedy & O'Hagan 2001, J. R. Stat. Soc. B 63, 425; MacKay 1992, Neural Comput. 4,
+415, for τ by evidence]. ρ, τ, the stiffness of S and the growth are summed over a grid.
 """
 
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from scipy.special import logsumexp
 
 from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
 from discover.inference.engine.noise import LEAST, Noise
+from discover.inference.engine.rows import Rows
 
 CURVES = (0.3, 0.7, 2.0, 6.0, 18.0, 60.0)
 """Sizes of d over the noise."""
@@ -36,11 +38,18 @@ TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
 """τ."""
 
 _MODES = 20
+_AFTER_A_STEP = 10.0
+"""Samples of a run over those that the logarithm leaves as they are."""
+
+_STEP = 0.3
+"""Of the largest rate, by which it changes from one sample to the next where it steps."""
+
 _THIRD = 1.0 / 3.0
 
 _CELLS = (0.15, 0.5, 1.2, 3.5, 10.0, 30.0, 100.0)
 """Ends of the cells of ρ of which `CURVES` are the middles."""
 
+_NO_CURVE = (0.0, STIFFNESS[0], 0.0, False)
 _LIKELY = 7.0
 _MOST = 12
 
@@ -132,8 +141,11 @@ class Discrepancy:
         self.columns = np.column_stack([fit.jacobian * self.widths, unused * self.shares])
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
-        self._curves = _cosines(rows.run, len(rows.runs)) * rows.size[:, None]
-        self._grid = list(product(CURVES, STIFFNESS, GROWTHS))
+        self._curves = _cosines(rows) * rows.size[:, None]
+        self._grid = [
+            *product(CURVES, STIFFNESS, GROWTHS, (False,)),
+            *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
+        ]
         self._kept: dict[float, _Products] = {}
         self.members, self.log_factor = self._weighed()
 
@@ -168,12 +180,12 @@ class Discrepancy:
 
     def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
         """Return the deviations of the curves of each run, for each curve of the grid."""
-        k = np.arange(_MODES)
-        found = []
-        for size, stiffness, growth in self._grid:
+        k, found = np.arange(_MODES), []
+        for size, stiffness, growth, after_a_step in self._grid:
             power = 1.0 / (1.0 + (k / stiffness) ** 4)
             # a cosine has half of the square of its size, a constant all of it
             power /= np.sqrt(np.sum(power**2 * np.where(k == 0, 1.0, 0.5)))
+            power = np.append(0.0 * power, power) if after_a_step else np.append(power, 0.0 * power)
             found.append(size * power * np.exp(growth * self.growth)[:, None])
         return np.array(found)
 
@@ -188,16 +200,16 @@ class Discrepancy:
             both = np.column_stack([self.left, self.columns, self._curves])
             white = self.fitter.noise.whitened(both, self.record, noise)
             run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
-            plain, cross, inner = [], [], []
+            plain, cross, inner, width = [], [], [], 2 * _MODES
             for i in range(len(self.growth)):
                 own = white[run == i, :m]
-                curve = white[run == i, m + i * _MODES : m + (i + 1) * _MODES]
+                curve = white[run == i, m + i * width : m + (i + 1) * width]
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
             d = self._deviations()
             scaled = d[..., :, None] * np.array(inner) * d[..., None, :]
-            chol = np.linalg.cholesky(np.eye(_MODES) + scaled)
+            chol = np.linalg.cholesky(np.eye(width) + scaled)
             along = np.linalg.solve(chol, d[..., None] * np.array(cross))
             grams = np.array(plain) - np.swapaxes(along, -1, -2) @ along
             logs = np.sum(np.log(np.diagonal(chol, axis1=-2, axis2=-1)), axis=(-1, -2))
@@ -252,7 +264,7 @@ class Discrepancy:
             if weight - total < -_LIKELY:
                 break
             mean, root = _posterior(self._products(correlation).gram[which], self._scale(terms))
-            size, stiff, growth = self._grid[which - 1] if which else (0.0, STIFFNESS[0], 0.0)
+            size, stiff, growth, _ = self._grid[which - 1] if which else _NO_CURVE
             log = float(weight - total)
             members.append(
                 Member(
@@ -272,8 +284,8 @@ class Discrepancy:
         if np.isfinite(limit):
             inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
             share = 0.8 * inside + 0.2 * share
-        per = len(STIFFNESS) * len(GROWTHS)
-        return np.log([share[CURVES.index(size)] / per for size, _, _ in self._grid])
+        per = (2 * len(STIFFNESS) * len(GROWTHS), 2)
+        return np.log([share[CURVES.index(size)] / per[after] for size, _, _, after in self._grid])
 
     def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:
         """Return draws of the root mean square of the discrepancy of each run, over its size."""
@@ -300,12 +312,12 @@ class Discrepancy:
         products, out = self._products(member.correlation), np.zeros((len(own), len(self.left)))
         deviations = self._deviations()[member.which - 1]
         for i, d in enumerate(deviations):
-            inner = np.eye(_MODES) + d[:, None] * products.inner[i] * d
+            inner = np.eye(len(d)) + d[:, None] * products.inner[i] * d
             right = d[:, None] * (products.cross[i][:, :1] - products.cross[i][:, 1:] @ own.T)
             middle = np.linalg.solve(inner, right).T
             normal = lot.standard_normal(middle.shape)
             spread = member.noise * np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
-            curves = self._curves[:, i * _MODES : (i + 1) * _MODES]
+            curves = self._curves[:, i * len(d) : (i + 1) * len(d)]
             out += ((middle + spread) * d) @ curves.T
         return out
 
@@ -325,11 +337,17 @@ def _posterior(
     return mean, root
 
 
-def _cosines(run: np.ndarray, runs: int) -> Float[np.ndarray, "rows curves"]:
-    """Return cosines along the samples of each run, zero in the others."""
-    out = np.zeros((len(run), runs * _MODES))
-    for i in range(runs):
-        at = np.flatnonzero(run == i)
-        x = (np.arange(len(at)) + 0.5) / len(at)
-        out[at, i * _MODES : (i + 1) * _MODES] = np.cos(np.pi * np.outer(x, np.arange(_MODES)))
+def _cosines(rows: Rows) -> Float[np.ndarray, "rows curves"]:
+    """Return cosines along the samples of each run and after its steps, zero in the others."""
+    width = 2 * _MODES
+    out = np.zeros((len(rows), len(rows.runs) * width))
+    for i, run in enumerate(rows.runs):
+        n, rate = len(run), np.asarray(run.rate, float)
+        steps = np.abs(np.diff(rate, prepend=rate[0])) > _STEP * rows.fastest[i]
+        since = np.arange(n) - np.maximum.accumulate(np.where(steps, np.arange(n), 0)) + 0.5
+        after = np.log1p(_AFTER_A_STEP * since / n) / np.log1p(_AFTER_A_STEP)
+        for place, x in enumerate(((np.arange(n) + 0.5) / n, after)):
+            first = i * width + place * _MODES
+            waves = np.cos(np.pi * np.outer(x, np.arange(_MODES)))
+            out[np.flatnonzero(rows.run == i), first : first + _MODES] = waves
     return out
