@@ -2,7 +2,7 @@
 
 Twenty fluids of each law of `independent.five_hundred`, without noise and with 1 %. The product is
 asked which law and effects explain the runs. An answer is *right* by name, a *twin* where the truth
-stands among what it cannot tell apart, *withheld* where none is claimed, else *wrong*.
+stands among the twins of the likeliest explanation, *withheld* where none is claimed, else *wrong*.
 """
 
 from pathlib import Path
@@ -70,7 +70,7 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
         "error": said["error_after"]["fit"],
         "constants": fluids.drawn(law, seed, int(number)),
     }
-    return {**found, "answer": judged(law, said["verdict"], alike, named, said["explanations"])}
+    return {**found, "answer": judged(law, said["verdict"], alike, named, said["explanations"][:1])}
 
 
 def judged(law: str, verdict: str, alike: list[str], named: list[list[str]], also=()) -> str:
@@ -81,7 +81,7 @@ def judged(law: str, verdict: str, alike: list[str], named: list[list[str]], als
     if parts(alike[0], [names[0] for names in named]) == truth:
         return "right"
     told = [parts(one, [n[0] for n in named]) for one in alike]
-    told += [parts(alike[0], members) for one in also for members in one.get("members", ())]
+    told += [parts(alike[0], twin) for one in also for twin in one["twins"]]
     spelled = all(truth & parts(alike[0], names) for names in named) and named
     return "twin" if truth in told or (spelled and len(named) == len(truth)) else "wrong"
 

@@ -116,19 +116,13 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     if question == "close-loop":
         found = dc.close_loop(data, base, held_out=["held.csv"], effects=EFFECTS, max_effects=2,
                               **options)  # fmt: skip
-        names, told = [s.effect for s in found.stages], found.remaining.get("loading", {})
-        told = {run: one["ci95"] for run, one in told.items()}
-        alone = names == ["giesekus_mobility"] and found.stages[0].parameters["alpha"].ci95
-        explained = found.verdict != "unexplained"
     else:
         found = dc.compare(data, base, held_out=["held.csv"], learners=["tensor_sindy"],
-                           quick=True, **options)  # fmt: skip
-        terms = found.outcomes["tensor_sindy"].terms
-        names = [term.term for term in terms]
-        told = found.posterior.remaining.get("loading", {})
-        told = {run: one["ci95"] for run, one in told.items()}
-        alone = names == ["sigma.sigma"] and terms[0].ci95
-        explained = found.verdict == "explained"
+                           quick=True, **options).posterior  # fmt: skip
+    names, told = [s.effect for s in found.stages], found.remaining.get("loading", {})
+    told = {run: one["ci95"] for run, one in told.items()}
+    alone = names == ["giesekus_mobility"] and found.stages[0].parameters["alpha"].ci95
+    explained = found.verdict != "unexplained"
     held = [
         a < factors[run] < b for run, (a, b) in told.items() if run in factors and a is not None
     ]

@@ -266,7 +266,7 @@ class Ended(Path):
     def _loadings(self) -> dict[str, Any]:
         """Return the factors of loadings by run, where each run is a loading of its own."""
         problem, fit = self.posterior.problem, self.fit
-        if not problem.loading:
+        if not problem.loads_anew:
             return {}
         runs, first = problem.fitted.runs, 1 + 2 * len(problem.fitted.runs)
         assert fit.covariance is not None

@@ -208,9 +208,7 @@ class Path:
             pair = ErrorPair(self._error(i, False) or 0.0, self._error(i, True))
             fit = self.fitted(first)
             parameters = {name: self._values(fit, effects[name]) for name in fit.names}
-            # more effects that change nothing are no other explanation
-            twins = tuple(other for other in others if not set(other) > set(first))
-            found.append(Explanation(first, one.probability, pair, parameters, twins))
+            found.append(Explanation(first, one.probability, pair, parameters, tuple(others)))
             for member, share in zip(one.members, self._shares(one), strict=True):
                 for name in member:
                     inclusion[name] = inclusion.get(name, 0.0) + float(share)

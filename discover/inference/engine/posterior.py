@@ -32,6 +32,9 @@ SAME = 0.3
 runs can tell two hypotheses apart."""
 
 _NEAR = 6.0
+_AS_LIKELY = 1.0
+"""Log odds that are not worth more than a bare mention   [Kass & Raftery 1995, JASA 90, 773]."""
+
 _NAMELESS = 0.5
 """Share that a term without a law keeps: it is as likely the first of a law nobody wrote down."""
 
@@ -300,32 +303,46 @@ def _classes(
         for one in classes:
             off = (record - one["record"]) / (one["noise"] * fitter.rows.size)
             if np.sqrt(np.mean(off**2)) < SAME and rank > one["rank"] - _NEAR:
-                one["members"].append(fit.names)
+                one["members"].append((fit.names, rank))
                 one["p"] += p
                 break
         else:
             noise = fit.noise.sizes[fitter.rows.run]
             classes.append(
-                {"record": record, "noise": noise, "rank": rank, "members": [fit.names], "p": p}
+                {
+                    "record": record,
+                    "noise": noise,
+                    "rank": rank,
+                    "members": [(fit.names, rank)],
+                    "p": p,
+                }
             )
     found, lost = [], 0.0
     for one in classes:
         share = float(one["p"])
-        if all(_has_term(problem, names) for names in one["members"]):
+        if all(_has_term(problem, names) for names, _ in one["members"]):
             lost += (1.0 - _NAMELESS) * share
             share *= _NAMELESS
-        found.append(Explanation(_smallest_sets(one["members"]), share))
+        found.append(Explanation(_without_idle(one["members"]), share))
     return tuple(sorted(found, key=lambda one: -one.probability)), lost
 
 
-def _smallest_sets(members: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], ...]:
-    """Return sets of which no part predicts the same: what is added to these changes nothing."""
-    sets = [set(names) for names in members]
-    return tuple(
-        names
-        for names, own in zip(members, sets, strict=True)
-        if not any(other < own for other in sets)
-    )
+def _without_idle(
+    members: Sequence[tuple[tuple[str, ...], float]],
+) -> tuple[tuple[str, ...], ...]:
+    """Return sets that predict the same, the smallest first, without those that only add to these.
+
+    One that adds an effect stays where it is as likely: what is added may be there.
+    """
+    ranked = [(set(names), names, rank) for names, rank in members]
+    small, large = [], []
+    for own, names, rank in ranked:
+        parts = [other for inner, _, other in ranked if inner < own]
+        if not parts:
+            small.append(names)
+        elif rank > max(parts) - _AS_LIKELY:
+            large.append(names)
+    return (*small, *large)
 
 
 def _has_term(problem: Problem, names: Sequence[str]) -> bool:
