@@ -23,7 +23,6 @@ from discover.forward.batches import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.batches.transient import Room
 from discover.forward.declared import DeclaredModel
 from discover.forward.program import Program
 from discover.forward.structure import Numbers
@@ -62,8 +61,6 @@ class Predictor:
         The declared model.
     program, of_every_effect
         What is compiled of it: of the effects that there are, and of all that there may be.
-    room
-        Of the fitted runs, into which others are laid out to share their program; None for none.
     """
 
     def __init__(
@@ -71,12 +68,11 @@ class Predictor:
         declared: DeclaredModel,
         program: Program,
         of_every_effect: Program,
-        room: Room | None,
     ):
-        self._declared, self._room = declared, room
+        self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
         self._last_weights: tuple[Any, float, Any] | None = None
-        self._laid_out: list[tuple[TransientFlows, Records, list[_Piece]]] = []
+        self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -123,10 +119,9 @@ class Predictor:
             return np.pad(found, [*[(0, 0)] * 3, (0, 2 * normal)], constant_values=np.nan)
         if not isinstance(part, TransientFlows):
             return self._of_piece(trials, (part, None, 0), normal)
-        pieces = self._pieces(part, batch, batch.rows[number])
-        found = [self._of_piece(trials, piece, normal) for piece in pieces]
+        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), normal)
         runs, samples = part.sample_index.shape
-        return np.concatenate(found, axis=1)[:, :runs, :samples]
+        return found[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once; None where nothing does."""
@@ -197,21 +192,18 @@ class Predictor:
             self._last_weights = known
         return known[2]
 
-    def _pieces(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> list[_Piece]:
-        """Return runs, and what judges them, in the room of the fitted ones, laid out once."""
-        for known, records, pieces in self._laid_out:
+    def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
+        """Return runs, and what judges them, as a program takes them, laid out once."""
+        for known, records, piece in self._laid_out:
             if known is part and records is batch.records:
-                return pieces
-        inside = [part] if self._room is None else part.laid_out(self._room)
-        judging, pieces = batch.records.of_runs(rows, part.room.samples), []
-        for flows in inside:
-            size = flows.room
-            own = min(size.runs, len(judging))
-            pieces.append((flows, judging.padded(size.runs, size.samples), own))
-            judging = judging.of_runs(range(size.runs, len(judging)))
-        self._laid_out.append((part, batch.records, pieces))
+                return piece
+        # a kernel passes over what is padding, and a program for each vector would not
+        flows = part if self.side_by_side(part) is None else part.in_shared_shape()
+        judging = batch.records.of_runs(rows, part.sample_index.shape[1])
+        piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
+        self._laid_out.append((part, batch.records, piece))
         del self._laid_out[:-_KEPT]
-        return pieces
+        return piece
 
 
 def _of_sweeps(

@@ -109,7 +109,7 @@ class Program:
         """
         flow = None
         if not isinstance(part, PeriodicFlows):
-            flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
+            flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
         choices = {}

@@ -116,8 +116,8 @@ def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
     coefficients = np.zeros(len(_TENSORS))
     for term in terms:
         coefficients[_TENSORS.names.index(term.term)] += term.coefficient
-    inner = np.zeros(0)
-    return LibraryExpansion(on_device(coefficients), on_device(inner), _TENSORS, law.linear_relaxation)
+    numbers = on_device(coefficients), on_device(np.zeros(0))
+    return LibraryExpansion(*numbers, _TENSORS, law.linear_relaxation)
 
 
 def _is_plain(law: AbstractConstitutiveLaw) -> bool:

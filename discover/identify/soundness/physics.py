@@ -29,8 +29,8 @@ from discover.identify.soundness.steady_states import (
     steady_uniaxial_extension,
 )
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import in_shared_form
 from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
