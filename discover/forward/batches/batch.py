@@ -19,12 +19,12 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 
 
 class Batch(eqx.Module):
-    """Runs of one control or several, each of which has a program of its own.
+    """Runs of one control or several, in parts of which each has a program of its own.
 
     Attributes
     ----------
     parts, rows
-        The flows of each control, and which runs they are.
+        The flows of each control, those in simple shear apart, and which runs they are.
     moduli
         Of each run that is a modulus, which one, and where its states stand in their part.
     records
@@ -75,15 +75,19 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
     strain_step
         Largest strain of a step.
     """
-    controls = dict.fromkeys(run.protocol.control for run in runs)
+    # simple shear apart from other flows, for it costs less
+    kinds = [
+        (flow.control, flow.control == "rate" and flow.kinematics is not None)
+        for flow in (run.protocol for run in runs)
+    ]
     rows = tuple(
-        tuple(i for i, run in enumerate(runs) if run.protocol.control == control)
-        for control in controls
+        tuple(i for i, own in enumerate(kinds) if own == kind) for kind in dict.fromkeys(kinds)
     )
     moduli: tuple[Places, ...] = ()
     parts: list[Flows] = []
-    for control, at in zip(controls, rows, strict=True):
+    for at in rows:
         own = [runs[i] for i in at]
+        control = own[0].protocol.control
         if control == "oscillation":
             part, moduli = oscillations(own, strain_step)
         elif control == "steady":

@@ -119,7 +119,7 @@ def _more_runs(values: ArrayLike, runs: int) -> Array:
     return on_device(np.pad(values, more, "edge"))
 
 
-def transients(runs: Sequence[Run], strain_step: float) -> TransientFlows:
+def transients(runs: Sequence[Run], strain_step: float = 0.25) -> TransientFlows:
     """Return the flows of runs at a given rate."""
     grids = []
     for run in runs:
