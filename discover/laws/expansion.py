@@ -60,10 +60,10 @@ class LibraryExpansion(AbstractExtendedLaw):
         return core, terms + self._own_terms()
 
     def _own_terms(self) -> tuple[LawTerm, ...]:
-        inner = dict(zip(self.library.inner_names, map(float, self.inner), strict=True))
+        inner = dict(zip(self.library.inner_names, np.asarray(self.inner).tolist(), strict=True))
         return tuple(
             LawTerm(term.name, float(value), {name: inner[name] for name in term.inner_names})
-            for term, value in zip(self.library.terms, self.coefficients, strict=True)
+            for term, value in zip(self.library.terms, np.asarray(self.coefficients), strict=True)
             if float(value) != 0.0
         )
 
