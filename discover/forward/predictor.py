@@ -26,7 +26,7 @@ from discover.forward.batches import (
 from discover.forward.declared import DeclaredModel
 from discover.forward.program import Program
 from discover.forward.structure import Numbers
-from discover.programs import in_threads
+from discover.programs import in_threads, on_device
 from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 
 # Of the batches that were laid out for the program
@@ -71,7 +71,6 @@ class Predictor:
     ):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        self._last_weights: tuple[Any, float, Any] | None = None
         self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
 
     @cached_property
@@ -135,14 +134,14 @@ class Predictor:
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         kernel = self.side_by_side(part)
         if kernel is None:
-            return self._one_by_one(trials, piece, normal)
+            return self._one_by_one(trials, part, normal)
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
         beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
         if not np.any(alone):
             return kernel.predict(self._numbers, *beside, part, *judging, normal)
-        found = self._one_by_one(trials.taken(alone), piece, normal)
+        found = self._one_by_one(trials.taken(alone), part, normal)
         out = np.empty((len(alone), *found.shape[1:]))
         out[alone] = found
         if not np.all(alone):
@@ -151,46 +150,35 @@ class Predictor:
         return out
 
     def _one_by_one(
-        self, trials: Trials, piece: _Piece, normal: bool
+        self, trials: Trials, part: Flows, normal: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
         """Return what vectors predict in calls of its own for each."""
-        part, judging, _ = piece
         if isinstance(part, PeriodicFlows):
-            return self._recorded_one_by_one(trials, part, judging)
-        found = [self._recorded_one_by_one(trials, part, judging)]
+            return self._recorded_one_by_one(trials, part)
+        found = [self._recorded_one_by_one(trials, part)]
         for quantity in _NORMAL if normal else ():
             if isinstance(part, StressFlows):
                 found.append(np.full_like(found[0], np.nan))
                 continue
             flow = kinematics_recording(part.kinematics, quantity, found[0].shape[1])
-            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow), judging))
+            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow)))
         return np.stack(found, axis=-1)
 
     def _recorded_one_by_one(
-        self, trials: Trials, part: Flows, judging: Records | None
+        self, trials: Trials, part: Flows
     ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self.program
 
         def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
-            theta, moduli, limit = trial
-            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
+            theta, moduli, _ = trial
+            moduli, solvent = on_device(moduli[:-1]), jnp.asarray(float(moduli[-1]))
             numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
-            used = program.fluid.in_use(theta)
-            weights = self._weights(theta, part)
-            return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
+            return np.asarray(program.predict(numbers, program.fluid.in_use(theta), theta, part))
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
-
-    def _weights(self, theta: np.ndarray, part: Flows):
-        """Return the weights of the steps, computed once for trials of the same times."""
-        known = self._last_weights
-        if known is None or known[0] is not part or known[1] != theta[1]:
-            known = (part, theta[1], self.program.weights(self._numbers, theta, part))
-            self._last_weights = known
-        return known[2]
 
     def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
         """Return runs, and what judges them, as a program takes them, laid out once."""

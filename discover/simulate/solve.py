@@ -11,8 +11,7 @@ from discover.errors import InputError
 from discover.forward.fluids import observed_in_batch, solve_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.forward.grids.grid import had_gone_on
-from discover.forward.integrators.exponential_runge_kutta import exponential_steps
-from discover.forward.integrators.in_reverse import stress_of, vector_field
+from discover.forward.integrators.by_diffrax import exponential_steps, stress_of, vector_field
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid

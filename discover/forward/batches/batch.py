@@ -9,9 +9,14 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.batches.imposed_stress import StressFlows, at_given_stress
-from discover.forward.batches.oscillation import PeriodicFlows, Places, oscillations
 from discover.forward.batches.records import Records, make_records
-from discover.forward.batches.steady import SteadyFlows, steady_states
+from discover.forward.batches.states import (
+    PeriodicFlows,
+    Places,
+    SteadyFlows,
+    oscillations,
+    steady_states,
+)
 from discover.forward.batches.transient import TransientFlows, transients
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
@@ -50,11 +55,6 @@ class Batch(eqx.Module):
     def longest(self) -> float:
         """Time of the last sample of all, in s."""
         return max(part.longest for part in self.parts)
-
-    @property
-    def transients(self) -> TransientFlows | None:
-        """The flows at a given rate in time; None where there are none."""
-        return next((part for part in self.parts if isinstance(part, TransientFlows)), None)
 
     def weighing(self, weight: Float[np.ndarray, "runs n"]) -> "Batch":
         """Return the same runs with other weights; they share the program."""
