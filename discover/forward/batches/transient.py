@@ -24,8 +24,8 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
 
-# Least sizes of arrays that data sets share, and up to how many steps runs are short
-_MANY_RUNS, _SAMPLES, _STEPS, _FEW_STEPS = 8, 128, 256, 512
+# Least sizes of arrays that data sets share; of runs where they have no more steps than that
+_MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 
 
 class TransientFlows(eqx.Module):
@@ -86,7 +86,7 @@ class TransientFlows(eqx.Module):
         step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)
         half_steps = 2 * step_ends - 1
         # of long runs a few more are not for nothing
-        runs = _rounded(len(times), _MANY_RUNS if step_ends <= _FEW_STEPS else 1)
+        runs = _rounded(len(times), _MANY_RUNS if step_ends == _STEPS else 1)
         spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
         later = times[:, -1:] + spacing * np.arange(1, half_steps - times.shape[1] + 1)
         # a straight line for one step more: the slope of the rate at the last sample stays as it is

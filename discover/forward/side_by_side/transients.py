@@ -108,11 +108,12 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
         ends = ends[ends <= last[row]]
         for first, end in pairwise(ends):
+            # a cycle is gone through in the same steps again and again
+            if end - first < _FEWEST or first < behind[row]:
+                continue
             own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
             line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
-            is_straight = np.allclose(own_rates, line, rtol=1e-10, atol=0.0)
-            # a cycle is gone through in the same steps again and again
-            if end - first >= _FEWEST and is_straight and first >= behind[row]:
+            if np.all(np.abs(own_rates - line) <= 1e-10 * np.abs(line)):
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
                 least[row, first] = _ALWAYS * length / (end - first)
