@@ -138,15 +138,18 @@ class Predictor:
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
-        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
+        beside = trials._replace(thetas=vectors)
+        alone = np.zeros(len(vectors), bool)
+        if isinstance(part, PeriodicFlows):
+            alone = kernel.alone(vectors)
+        if np.all(alone):
+            return self._one_by_one(trials, part, normal)
+        some = beside.taken(~alone)
+        found = kernel.predict(self._numbers, *some, part, *judging, normal)
         if not np.any(alone):
-            return kernel.predict(self._numbers, *beside, part, *judging, normal)
-        found = self._one_by_one(trials.taken(alone), part, normal)
+            return found
         out = np.empty((len(alone), *found.shape[1:]))
-        out[alone] = found
-        if not np.all(alone):
-            some = beside.taken(~alone)
-            out[~alone] = kernel.predict(self._numbers, *some, part, *judging, normal)
+        out[~alone], out[alone] = found, self._one_by_one(trials.taken(alone), part, normal)
         return out
 
     def _one_by_one(

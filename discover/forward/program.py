@@ -149,6 +149,7 @@ class Program:
     def _predict_all(self, numbers, used, theta, runs: Flows):
         if isinstance(runs, PeriodicFlows):
             return self._predict_moduli(numbers, used, theta, runs)
+        of_run: Any
         if isinstance(runs, TransientFlows):
             # of all runs, so that a step that is padding in each of them is not taken
             steps = jnp.max(runs.last_step)

@@ -116,8 +116,12 @@ def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
     coefficients = np.zeros(len(_TENSORS))
     for term in terms:
         coefficients[_TENSORS.names.index(term.term)] += term.coefficient
-    numbers = on_device(coefficients), on_device(np.zeros(0))
-    return LibraryExpansion(*numbers, _TENSORS, law.linear_relaxation)
+    return LibraryExpansion(
+        coefficients=on_device(coefficients),
+        inner=on_device(np.zeros(0)),
+        library=_TENSORS,
+        linear_relaxation=law.linear_relaxation,
+    )
 
 
 def _is_plain(law: AbstractConstitutiveLaw) -> bool:

@@ -29,7 +29,9 @@ SUMS = {
     "on a known law": law_of_terms(
         LawTerms.of([LawTerm("sigma.sigma", 0.1)]), True, make_law("giesekus", {"alpha": 0.3})
     ),
-    "constants": TensorBasisNetwork(None, 0.1 * jnp.arange(8.0), jnp.zeros(8)),
+    "constants": TensorBasisNetwork(
+        network=None, constants=0.1 * jnp.arange(8.0), network_mask=jnp.zeros(8)
+    ),
 }
 
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -175,10 +175,6 @@ class SideBySide:
         self._recorded = compiled(of_trials, ("recorded", *made_from))
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
-
-    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program: none."""
-        return np.zeros(len(thetas), bool)
 
     def predict(
         self,

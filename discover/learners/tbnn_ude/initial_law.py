@@ -43,7 +43,13 @@ def without_network(
 ) -> TensorBasisNetwork:
     """Return a law with h = 0 whose coefficients are constants."""
     zero = on_device(np.zeros(N_COEFFICIENTS))
-    return TensorBasisNetwork(None, zero, zero, None, linear_relaxation, base_law)
+    return TensorBasisNetwork(
+        network=None,
+        constants=zero,
+        network_mask=zero,
+        linear_relaxation=linear_relaxation,
+        base=base_law,
+    )
 
 
 @compiled
