@@ -118,12 +118,12 @@ def measured() -> dict[str, dict]:
     for name, (runs, modulus, relaxation_time) in flows().items():
         batch = make_batch(runs)
         declared = DeclaredModel.maxwell(modulus, relaxation_time, solvent_viscosity=0.01)
-        model = AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch)
+        model = AugmentedModel(declared, candidates_of(None), data_scales(runs))
         models[name] = model, batch
         if name == "ldpe":
             law = {"stretch_time_ratio": 0.1, "beta": 0.5}
             declared = DeclaredModel.named("rolie_poly", law, modulus, relaxation_time)
-            model = AugmentedModel(declared, candidates_of(None), data_scales(runs), fitted=batch)
+            model = AugmentedModel(declared, candidates_of(None), data_scales(runs))
             models["LDPE, Rolie-Poly"] = model, batch
     for case, (name, effects) in CASES.items():
         model, batch = models.get(case, models[name])

@@ -17,7 +17,8 @@ from jaxtyping import Float
 from discover.comparison.absorbed import ONLY_LOOP
 from discover.effects import AbstractEffect, KinematicEffect, KnownEffect, Record, SignalEffect
 from discover.errors import InputError
-from discover.forward import TransientFlows, make_batch
+from discover.forward import TransientFlows
+from discover.forward.batches.transient import transients
 from discover.protocols.protocol import FlowProtocol
 from discover.study.data import StudyData
 
@@ -94,8 +95,7 @@ def corrected(
             "use discover close-loop."
         )
     # an instrument is the same, whatever the loading
-    (flows,) = make_batch([replace(run, loading=None) for run in runs]).parts
-    assert isinstance(flows, TransientFlows)  # at a rate alone
+    flows = transients([replace(run, loading=None) for run in runs])
     values = [jnp.asarray(known.values, dtype=float) for known in effects]
     felt, gain, offset, missed = (
         np.asarray(part) for part in _instrument(tuple(k.effect for k in effects))(values, flows)

@@ -119,7 +119,7 @@ def fit(
     forward = forward_model(declared)
     require_samples(fitted, forward)
     batch = make_batch(fitted)
-    model = AugmentedModel(forward, [], data_scales(fitted), batch)
+    model = AugmentedModel(forward, [], data_scales(fitted))
     names = _narrow(model, declared, bounds)
     problem = FitProblem(model, batch)
     free = model.free_positions

@@ -51,8 +51,6 @@ class AugmentedModel:
         instants at which rates step.
     scales
         Size of each property of the data in which parameters are scaled; see `data_scales`.
-    fitted
-        The fitted runs, whose program others share that are no longer.
     """
 
     def __init__(
@@ -60,11 +58,8 @@ class AugmentedModel:
         declared: DeclaredModel,
         effects: Sequence[AbstractEffect],
         scales: Mapping[str, float] | None = None,
-        fitted: Batch | None = None,
     ):
         self.declared = declared
-        transients = None if fitted is None else fitted.transients
-        room = None if transients is None else transients.room
         names = {effect.name for effect in effects}
         known = (known.effect for known in declared.effects if known.name not in names)
         self.effects = (*effects, *known)
@@ -82,7 +77,7 @@ class AugmentedModel:
         )
         every_effect = structure.with_every_effect()
         program = program_of(structure)
-        self._predictor = Predictor(declared, program, program_of(every_effect), room)
+        self._predictor = Predictor(declared, program, program_of(every_effect))
         fluid = program.fluid
         self.slices, self.size, self.instants = fluid.slices, fluid.size, fluid.instants
         parameters = [p for effect in self.effects for p in effect.parameters]

@@ -145,26 +145,15 @@ class Dynamics(NamedTuple):
         """Rate over 1/λ of the relaxation that is integrated exactly."""
         return 1.0 if self.linear_relaxation else 0.0
 
-    def weights(
-        self, width: Float[Array, " s"], of_declared: Float[Array, "s 1 11 _"] | None = None
-    ) -> tuple[Float[Array, "s kinds 11 _"], ...]:
+    def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 11 _"], ...]:
         """Return what `weights_of_step` wants of steps of these widths in s.
 
         Apart for the declared modes and those of effects; of each the weights of its stress and,
         where that relaxes faster, of its trace, and so on of each further tensor.
-
-        Parameters
-        ----------
-        of_declared
-            Those of the declared modes, where they are known; see `declared_weights`.
         """
         pieces, first = [], 0
         for modes in [self.declared] if self.extra is None else [self.declared, self.extra]:
             last = first + len(modes.relaxation_time)
-            if of_declared is not None and not first:
-                pieces.append(of_declared)
-                first = last
-                continue
             h = width[:, None] / modes.relaxation_time
             kinds = [krogstad_weights(-self.decay * h, h)]
             if self.relaxations is not None:

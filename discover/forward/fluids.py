@@ -19,8 +19,8 @@ from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.grids.flow_batch import FlowBatch
 from discover.forward.grids.grid import IntegrationGrid
 from discover.forward.integrators.at_given_rate import Observe, begun, follow, without_derivatives
+from discover.forward.integrators.by_diffrax import solve_in_reverse
 from discover.forward.integrators.imposed_stress import answer_to_stress
-from discover.forward.integrators.in_reverse import solve_in_reverse
 from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid

@@ -23,11 +23,10 @@ from discover.forward.batches import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.batches.transient import Room
 from discover.forward.declared import DeclaredModel
 from discover.forward.program import Program
 from discover.forward.structure import Numbers
-from discover.programs import in_threads
+from discover.programs import in_threads, on_device
 from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 
 # Of the batches that were laid out for the program
@@ -62,8 +61,6 @@ class Predictor:
         The declared model.
     program, of_every_effect
         What is compiled of it: of the effects that there are, and of all that there may be.
-    room
-        Of the fitted runs, into which others are laid out to share their program; None for none.
     """
 
     def __init__(
@@ -71,12 +68,10 @@ class Predictor:
         declared: DeclaredModel,
         program: Program,
         of_every_effect: Program,
-        room: Room | None,
     ):
-        self._declared, self._room = declared, room
+        self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        self._last_weights: tuple[Any, float, Any] | None = None
-        self._laid_out: list[tuple[TransientFlows, Records, list[_Piece]]] = []
+        self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -123,10 +118,9 @@ class Predictor:
             return np.pad(found, [*[(0, 0)] * 3, (0, 2 * normal)], constant_values=np.nan)
         if not isinstance(part, TransientFlows):
             return self._of_piece(trials, (part, None, 0), normal)
-        pieces = self._pieces(part, batch, batch.rows[number])
-        found = [self._of_piece(trials, piece, normal) for piece in pieces]
+        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), normal)
         runs, samples = part.sample_index.shape
-        return np.concatenate(found, axis=1)[:, :runs, :samples]
+        return found[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once; None where nothing does."""
@@ -140,78 +134,67 @@ class Predictor:
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         kernel = self.side_by_side(part)
         if kernel is None:
-            return self._one_by_one(trials, piece, normal)
+            return self._one_by_one(trials, part, normal)
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
-        beside, alone = trials._replace(thetas=vectors), kernel.alone(vectors)
+        beside = trials._replace(thetas=vectors)
+        alone = np.zeros(len(vectors), bool)
+        if isinstance(part, PeriodicFlows):
+            alone = kernel.alone(vectors)
+        if np.all(alone):
+            return self._one_by_one(trials, part, normal)
+        some = beside.taken(~alone)
+        found = kernel.predict(self._numbers, *some, part, *judging, normal)
         if not np.any(alone):
-            return kernel.predict(self._numbers, *beside, part, *judging, normal)
-        found = self._one_by_one(trials.taken(alone), piece, normal)
+            return found
         out = np.empty((len(alone), *found.shape[1:]))
-        out[alone] = found
-        if not np.all(alone):
-            some = beside.taken(~alone)
-            out[~alone] = kernel.predict(self._numbers, *some, part, *judging, normal)
+        out[~alone], out[alone] = found, self._one_by_one(trials.taken(alone), part, normal)
         return out
 
     def _one_by_one(
-        self, trials: Trials, piece: _Piece, normal: bool
+        self, trials: Trials, part: Flows, normal: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
         """Return what vectors predict in calls of its own for each."""
-        part, judging, _ = piece
         if isinstance(part, PeriodicFlows):
-            return self._recorded_one_by_one(trials, part, judging)
-        found = [self._recorded_one_by_one(trials, part, judging)]
+            return self._recorded_one_by_one(trials, part)
+        found = [self._recorded_one_by_one(trials, part)]
         for quantity in _NORMAL if normal else ():
             if isinstance(part, StressFlows):
                 found.append(np.full_like(found[0], np.nan))
                 continue
             flow = kinematics_recording(part.kinematics, quantity, found[0].shape[1])
-            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow), judging))
+            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow)))
         return np.stack(found, axis=-1)
 
     def _recorded_one_by_one(
-        self, trials: Trials, part: Flows, judging: Records | None
+        self, trials: Trials, part: Flows
     ) -> Float[np.ndarray, "trials runs *columns"]:
         program = self.program
 
         def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
-            theta, moduli, limit = trial
-            moduli, solvent = jnp.asarray(moduli[:-1]), jnp.asarray(moduli[-1])
+            theta, moduli, _ = trial
+            moduli, solvent = on_device(moduli[:-1]), jnp.asarray(float(moduli[-1]))
             numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
-            used = program.fluid.in_use(theta)
-            weights = self._weights(theta, part)
-            return np.asarray(program.predict(numbers, used, theta, part, judging, weights, limit))
+            return np.asarray(program.predict(numbers, program.fluid.in_use(theta), theta, part))
 
         shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
         found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
         program.met.add(shape)
         return np.stack(found)
 
-    def _weights(self, theta: np.ndarray, part: Flows):
-        """Return the weights of the steps, computed once for trials of the same times."""
-        known = self._last_weights
-        if known is None or known[0] is not part or known[1] != theta[1]:
-            known = (part, theta[1], self.program.weights(self._numbers, theta, part))
-            self._last_weights = known
-        return known[2]
-
-    def _pieces(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> list[_Piece]:
-        """Return runs, and what judges them, in the room of the fitted ones, laid out once."""
-        for known, records, pieces in self._laid_out:
+    def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
+        """Return runs, and what judges them, as a program takes them, laid out once."""
+        for known, records, piece in self._laid_out:
             if known is part and records is batch.records:
-                return pieces
-        inside = [part] if self._room is None else part.laid_out(self._room)
-        judging, pieces = batch.records.of_runs(rows, part.room.samples), []
-        for flows in inside:
-            size = flows.room
-            own = min(size.runs, len(judging))
-            pieces.append((flows, judging.padded(size.runs, size.samples), own))
-            judging = judging.of_runs(range(size.runs, len(judging)))
-        self._laid_out.append((part, batch.records, pieces))
+                return piece
+        # a kernel passes over what is padding, and a program for each vector would not
+        flows = part if self.side_by_side(part) is None else part.in_shared_shape()
+        judging = batch.records.of_runs(rows, part.sample_index.shape[1])
+        piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
+        self._laid_out.append((part, batch.records, piece))
         del self._laid_out[:-_KEPT]
-        return pieces
+        return piece
 
 
 def _of_sweeps(

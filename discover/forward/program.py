@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import equinox as eqx
@@ -20,14 +20,12 @@ from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.batches import (
     Flows,
     PeriodicFlows,
-    Records,
     SteadyFlows,
     StressFlows,
     TransientFlows,
 )
-from discover.forward.dynamics import declared_weights
 from discover.forward.integrators.imposed_stress import answer_to_stress, strain_in_series
-from discover.forward.integrators.with_effects import RUNS, Judged, integrate
+from discover.forward.integrators.with_effects import integrate
 from discover.forward.side_by_side import (
     Kernel,
     PeriodicCode,
@@ -57,9 +55,6 @@ _LOGGER = logging.getLogger(__name__)
 # 7.5 for 6, 10 and 7.8 for 9: arithmetic on many numbers is faster in pieces of its own
 _FEW_MODES = 6
 
-# Modes from which on weights of steps are worth a program of their own
-_MANY_MODES = 4
-
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
 
@@ -88,20 +83,6 @@ class Program:
         self.met: set[tuple] = set()
         """Shapes of runs for which it is compiled."""
 
-    def weights(self, numbers: Numbers, theta: np.ndarray, runs: Flows):
-        """Return the weights of all steps that trials of the same times share; None of few modes.
-
-        None too where the law's own constants decide how a mode relaxes.
-        """
-        if not isinstance(runs, TransientFlows) or len(numbers.modulus) < _MANY_MODES:
-            return None
-        if numbers.law.retracts:
-            return None
-        times = np.asarray(numbers.relaxation_time) * np.exp(theta[1])
-        return declared_weights(
-            runs.times, times, jnp.asarray(float(numbers.law.linear_relaxation))
-        )
-
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors at once; None where that is left to `predict`.
 
@@ -109,7 +90,7 @@ class Program:
         """
         flow = None
         if not isinstance(part, PeriodicFlows):
-            flow = jax.tree.map(lambda leaf: leaf[0], part.kinematics)
+            flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
         arrays, rest = eqx.partition(numbers.law, eqx.is_array)
         shapes = tuple(leaf.shape for leaf in jax.tree.leaves(arrays))
         choices = {}
@@ -165,58 +146,31 @@ class Program:
         after = (*self._signal, *self.fluid.series)
         return not any(theta[self.fluid.slices[effect.name].start] for effect in after)
 
-    def _predict_all(
-        self, numbers, used, theta, runs: Flows, records: Records | None, weights, limit
-    ):
+    def _predict_all(self, numbers, used, theta, runs: Flows):
         if isinstance(runs, PeriodicFlows):
             return self._predict_moduli(numbers, used, theta, runs)
+        of_run: Any
         if isinstance(runs, TransientFlows):
             # of all runs, so that a step that is padding in each of them is not taken
             steps = jnp.max(runs.last_step)
-            assert records is not None  # of transients alone
-            of_run = jax.vmap(
-                self._predict_transient,
-                in_axes=(None, None, None, 0, 0, None, 0, None),
-                axis_name=RUNS,
-            )
-            return of_run(numbers, used, theta, runs, records, steps, weights, limit)
-        return jax.vmap(self._predict_run, in_axes=(None, None, None, 0))(
-            numbers, used, theta, runs
-        )
+            of_run = partial(self._predict_transient, numbers, used, theta, steps)
+        elif isinstance(runs, SteadyFlows):
+            of_run = partial(self._predict_steady_states, numbers, used, theta)
+        else:
+            of_run = partial(self._predict_strain, numbers, used, theta)
+        return jax.vmap(of_run)(runs)
 
-    def _predict_run(self, numbers, used, theta, run: SteadyFlows | StressFlows):
-        if isinstance(run, SteadyFlows):
-            return self._predict_steady_states(numbers, used, theta, run)
-        return self._predict_strain(numbers, used, theta, run)
-
-    def _predict_transient(
-        self,
-        numbers,
-        used,
-        theta,
-        run: TransientFlows,
-        judging: Records,
-        steps,
-        weights,
-        limit,
-    ):
+    def _predict_transient(self, numbers, used, theta, steps, run: TransientFlows):
         flow = run.kinematics
         present = self.fluid.present(theta)
         rate, tool_rate = self._rates(theta, present, run)
-        times = run.times[::2]
         dynamics = self.fluid.dynamics(
             numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
         )
         cycle = None
         if run.cycle_steps:
             cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        # as it is where `is_judged_by_modes`, which is where there is a limit
-        beside = self.fluid.beside(numbers, theta, rate[::2], flow)
-        nothing = jnp.zeros_like(times)
-        weight = nothing.at[run.sample_index].add(judging.weight)
-        recorded = nothing.at[run.sample_index].add(judging.recorded)
-        judged = Judged(weight, recorded, beside, limit)
-        stress, felt = integrate(dynamics, times, rate, steps, judged, flow, cycle, weights)
+        stress, felt = integrate(dynamics, run.times[::2], rate, steps, flow, cycle)
         stress = stress + self.fluid.beside(numbers, theta, felt, flow)
         return self._at_samples(theta, present, run, stress, felt, tool_rate)
 

@@ -1,7 +1,10 @@
 """A law as a sum of library terms: what sparse regression finds."""
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from discover.laws.base import (
@@ -11,9 +14,11 @@ from discover.laws.base import (
     as_state,
     stress_in,
 )
+from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.programs import on_device
 from tensor_library.algebra import Symmetric
 from tensor_library.law_terms import LawTerm, LawTerms
-from tensor_library.library import TermLibrary
+from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import parse_term
 
 
@@ -55,10 +60,10 @@ class LibraryExpansion(AbstractExtendedLaw):
         return core, terms + self._own_terms()
 
     def _own_terms(self) -> tuple[LawTerm, ...]:
-        inner = dict(zip(self.library.inner_names, map(float, self.inner), strict=True))
+        inner = dict(zip(self.library.inner_names, np.asarray(self.inner).tolist(), strict=True))
         return tuple(
             LawTerm(term.name, float(value), {name: inner[name] for name in term.inner_names})
-            for term, value in zip(self.library.terms, self.coefficients, strict=True)
+            for term, value in zip(self.library.terms, np.asarray(self.coefficients), strict=True)
             if float(value) != 0.0
         )
 
@@ -88,4 +93,45 @@ def law_of_terms(
         library=library,
         linear_relaxation=linear_relaxation,
         base=base,
+    )
+
+
+_TENSORS = build_library(degree=0)
+
+
+def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
+    """Return a law of constant coefficients on the basis tensors as an expansion on all of them.
+
+    Laws that are such sums, named or learned, then share every program: which tensors act is told
+    by numbers alone. Any other law is returned as it is. So is a user's own, which may write out
+    another h than it computes.
+    """
+    if not _is_plain(law) or any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(law)):
+        return law
+    if isinstance(law, TensorBasisNetwork) and np.any(np.asarray(law.network_mask) != 0):
+        return law
+    terms = law.as_terms()
+    if terms is None or any(term.term not in _TENSORS.names for term in terms):
+        return law
+    coefficients = np.zeros(len(_TENSORS))
+    for term in terms:
+        coefficients[_TENSORS.names.index(term.term)] += term.coefficient
+    return LibraryExpansion(
+        coefficients=on_device(coefficients),
+        inner=on_device(np.zeros(0)),
+        library=_TENSORS,
+        linear_relaxation=law.linear_relaxation,
+    )
+
+
+def _is_plain(law: AbstractConstitutiveLaw) -> bool:
+    """Return whether a law of this package says all that it does by h."""
+    below = law.base if isinstance(law, AbstractExtendedLaw) else None
+    own = (AbstractConstitutiveLaw.conformation, AbstractExtendedLaw.conformation)
+    return (
+        type(law).__module__.partition(".")[0] == "discover"
+        and type(law).conformation in own
+        and not law.variables
+        and not law.retracts
+        and (below is None or _is_plain(below))
     )

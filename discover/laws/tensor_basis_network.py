@@ -108,7 +108,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
             )
         own = tuple(
             LawTerm(name, float(value))
-            for name, value in zip(TENSOR_NAMES, self.constants, strict=True)
+            for name, value in zip(TENSOR_NAMES, np.asarray(self.constants), strict=True)
             if float(value) != 0.0
         )
         below = () if self.base is None else self.base.as_terms()

@@ -13,7 +13,7 @@ from discover.inference.engine.fits import Fit
 from discover.linear_algebra_threads import in_one_thread
 from discover.protocols import FlowProtocol, in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
-from discover.protocols.protocol import recording, shear_rates
+from discover.protocols.protocol import shear_rates
 from discover.statistics.projection import rms
 
 BEYOND = 2.0
@@ -76,26 +76,30 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
         normal = lot.standard_normal((_DRAWS, root.shape[1]))
         thetas += [fit.at(fit.coordinates + root @ one) for one in normal]
         weights += [weight / _DRAWS] * _DRAWS
-    inside = [_observing(one, q) for one in _flows_inside(runs, rates) for q in _SHEAR]
+    inside = [_run(*one) for one in _flows_inside(runs, rates)]
     fast = start_up(BEYOND * max(rates))
-    times = np.linspace(0.0, _STRAIN / (BEYOND * max(rates)), _SAMPLES)
-    beyond = [_observing((fast, times), q) for q in _SHEAR]
+    sheared = [*inside, _run(fast, np.linspace(0.0, _STRAIN / (BEYOND * max(rates)), _SAMPLES))]
     pulled = []
     for rate in (max(rates), BEYOND * max(rates)):
         flow = in_flow(start_up(rate), "uniaxial")
         pulled.append(_run(flow, np.linspace(0.0, _HENCKY / rate, _SAMPLES)))
-    tests = [*inside, *beyond, *pulled]
+    model, vectors = posterior.problem.model, np.array(thetas)
     with np.errstate(all="ignore"):
-        found = posterior.problem.model.predictions(np.array(thetas), make_batch(tests))
-    kinds = [*_SHEAR * (len(inside) // 3 + 1), "uniaxial", "uniaxial"]
-    places = ["inside"] * len(inside) + ["beyond"] * len(beyond) + ["inside", "beyond"]
+        in_shear = model.observables(vectors, make_batch(sheared))
+        in_extension = model.predictions(vectors, make_batch(pulled))
+    seen = [
+        (kind, "inside" if i < len(inside) else "beyond", in_shear[:, i, : len(test), k])
+        for i, test in enumerate(sheared)
+        for k, kind in enumerate(_SHEAR)
+    ]
+    ends = zip(("inside", "beyond"), np.moveaxis(in_extension, 1, 0), strict=True)
+    seen += [("uniaxial", place, found) for place, found in ends]
     own: dict[str, dict[str, list[float]]] = {}
-    for i, (kind, place, test) in enumerate(zip(kinds, places, tests, strict=True)):
-        of_n1 = i - 1 if kind == "N2" else i
+    for i, (kind, place, found) in enumerate(seen):
+        of_n1 = seen[i - 1][2] if kind == "N2" else found
         with np.errstate(all="ignore"):  # laws that diverge in this flow
-            size = rms(found[0, of_n1, : len(test)])
-            off = found[1:, i, : len(test)] - found[0, i, : len(test)]
-            squares = np.mean(off**2, axis=1)
+            size = rms(of_n1[0])
+            squares = np.mean((found[1:] - found[0]) ** 2, axis=1)
         sound = np.isfinite(squares)
         share = np.array(weights) * sound
         if np.sum(share) < 0.5 or not np.isfinite(size) or size == 0.0:
@@ -167,10 +171,3 @@ def _run(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Run:
     nothing = np.zeros(len(times))
     rates = np.asarray(shear_rates(protocol, times))
     return Run("flow", times, protocol, rates, nothing, nothing, nothing)
-
-
-def _observing(
-    flow: tuple[FlowProtocol, Float[np.ndarray, " n"]], quantity: RecordedQuantity
-) -> Run:
-    protocol, times = flow
-    return _run(recording(protocol, quantity), times)

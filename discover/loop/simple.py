@@ -127,7 +127,7 @@ def _predicted(
     declared: DeclaredModel, material: SimpleMaterial, fitted: Sequence[Run], runs: Sequence[Run]
 ) -> np.ndarray:
     batch = make_batch(runs)
-    model = AugmentedModel(declared, [], data_scales(fitted), make_batch(fitted))
+    model = AugmentedModel(declared, [], data_scales(fitted))
     with np.errstate(all="ignore"):
         first = model.predictions([model.zero()], batch)[0]
     second = np.zeros_like(first)

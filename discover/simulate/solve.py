@@ -1,6 +1,6 @@
 """Fluid + protocol → stresses, to a tolerance."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import diffrax
 import jax.numpy as jnp
@@ -11,9 +11,9 @@ from discover.errors import InputError
 from discover.forward.fluids import observed_in_batch, solve_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.forward.grids.grid import had_gone_on
-from discover.forward.integrators.exponential_runge_kutta import exponential_steps
-from discover.forward.integrators.in_reverse import stress_of, vector_field
+from discover.forward.integrators.by_diffrax import exponential_steps, stress_of, vector_field
 from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
@@ -114,6 +114,7 @@ def simulate(
         return ShearStress(times, np.asarray(fluid.stress(fluid.rest(), gradient))[None])
     shortest = float(np.min(np.asarray(fluid.relaxation_time)))
     stiff = fluid.n_modes > 1 and end / shortest > 1e3
+    fluid = replace(fluid, law=in_shared_form(fluid.law))
     solver = exponential_steps(fluid) if stiff else diffrax.Tsit5()
     knots = np.asarray(protocol.table_times)
     jumps = np.unique(knots[1:][np.diff(knots) <= 0.0])

@@ -1,4 +1,4 @@
-"""Runs laid out in one room: one program, and what each predicts stays the same."""
+"""Runs laid out in a shared shape: one program, and what each predicts stays the same."""
 
 import jax.numpy as jnp
 import numpy as np
@@ -6,9 +6,10 @@ import pytest
 
 from discover.dataset import Run
 from discover.effects import make_effect
-from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward import AugmentedModel, DeclaredModel, TransientFlows, make_batch
 from discover.inference.step_instants import with_places, with_rate_steps
 from discover.laws import Fluid, UpperConvectedMaxwell
+from discover.programs.program_cache import Compiled
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
 
@@ -30,42 +31,36 @@ MANY = [
 FEW = [record("short", start_up(2.0), 1.0, 12)]
 
 
-def model_of(fitted=None):
-    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)], fitted=fitted)
+def model_of():
+    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)])
     theta = model.zero()
     for name, value in AMPLITUDES.items():
         theta[model.positions(name)[0]] = value
     return model, theta
 
 
-@pytest.mark.parametrize("runs", [FEW, MANY[1:], MANY + FEW + MANY[:1]])
-def test_runs_in_the_room_of_others_are_predicted_as_in_their_own(runs):
-    batch = make_batch(runs)
-    alone, theta = model_of()
-    shared, _ = model_of(make_batch(MANY))
-    expected = alone.predict(theta, batch)
-    found = shared.predict(theta, batch)
+@pytest.mark.parametrize("runs", [FEW, MANY + FEW + MANY[:1]])
+def test_runs_in_a_shared_shape_are_predicted_as_in_their_own(runs, monkeypatch):
+    model, theta = model_of()
+    found = model.predict(theta, make_batch(runs))
+    monkeypatch.setattr(TransientFlows, "in_shared_shape", lambda flows: flows)
+    expected = model.predict(theta, make_batch(runs))
     assert found.shape == expected.shape
     # the same steps; sums of modes may be taken in another order
     np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-12 * np.max(expected))
 
 
-def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own():
-    batches = [make_batch(runs) for runs in (MANY, FEW, MANY[:2], [*MANY, *MANY])]
-    shared, theta = model_of(batches[0])
-    program, every = shared._predictor.program, shared._predictor.of_every_effect
-    program.met.clear()
-    every._kernels.clear()
-    for batch in batches:
-        shared.predict(theta, batch)
-    # one kernel for all of them, and no program for vectors one by one
-    assert (len(every._kernels), len(program.met)) == (1, 0)
-
-
-def test_longer_runs_stay_as_they_are():
-    small, large = (make_batch(runs).transients for runs in (FEW, MANY))
-    assert large.laid_out(small.room) == [large]
-    assert [batch.room for batch in small.laid_out(large.room)] == [large.room]
+def test_fewer_shorter_and_more_runs_ask_for_no_program_of_their_own(monkeypatch):
+    model, theta = model_of()
+    model.predict(theta, make_batch(MANY))
+    made, programs = Compiled._made, []
+    monkeypatch.setattr(Compiled, "_made", lambda self, *of: programs.append(1) or made(self, *of))
+    for runs in (FEW, MANY[:2], [*MANY, *MANY]):
+        model.predict(theta, make_batch(runs))
+    assert not programs
+    # negative control: more runs than stand in one shape
+    model.predict(theta, make_batch([*MANY, *MANY, *MANY]))
+    assert programs
 
 
 def test_a_rate_that_steps_between_samples_still_steps_there():
@@ -81,10 +76,10 @@ def test_a_rate_that_steps_between_samples_still_steps_there():
     assert run.rate_steps
     batch = make_batch([run])
     expected = AugmentedModel(declared, []).predict(np.array([0.0, 0.0, 0.3, 0.7]), batch)
-    shared = AugmentedModel(declared, [], fitted=make_batch([run, *others]))
-    np.testing.assert_allclose(
-        shared.predict(np.array([0.0, 0.0, 0.3, 0.7]), batch), expected, rtol=1e-10
+    both = AugmentedModel(declared, []).predict(
+        np.array([0.0, 0.0, 0.3, 0.7]), make_batch([run, *others])
     )
+    np.testing.assert_allclose(both[:1], expected, rtol=1e-10)
 
 
 def test_weights_of_steps_follow_the_times_that_are_tried():

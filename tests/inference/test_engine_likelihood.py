@@ -36,6 +36,24 @@ def rows():
     return rows_of((40, 60), np.random.default_rng(0))
 
 
+@pytest.mark.parametrize("away", [np.inf, -np.inf, 1e200, -1e13])
+def test_a_prediction_that_runs_away_is_no_number_whatever_its_size(rows, away):
+    predicted = np.full((2, *rows.seen.shape), 0.7)
+    predicted[0, 0, 5:9] = away
+    found = rows.flat(predicted)
+    assert np.all(np.isnan(found[0, 5:9]))
+    # of this trial and of the other all else is as it was, however far off a record
+    assert np.all(np.delete(found[0], slice(5, 9)) == 0.7)
+    assert np.all(rows.flat(1e9 * predicted)[1] == 0.7e9)
+    # what is made of it afterwards is no number, without a word
+    with np.errstate(all="raise"):
+        assert np.isnan(np.sum(found[0] ** 2) - np.sum(found[0] ** 2))
+        assert np.isnan(found[0] @ np.zeros(len(rows)))
+    # negative control: as it came it would not be
+    with np.errstate(all="raise"), pytest.raises(FloatingPointError):
+        np.sum(predicted[0] ** 2 * 1e290) - np.sum(predicted[0] ** 2 * 1e290)
+
+
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 @pytest.mark.parametrize("share", [0.0, 0.9])
 def test_whitening_is_the_density_of_correlated_noise(rows, correlation, share):

@@ -123,7 +123,7 @@ def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
     run = Run("steps", times, flow, rates, np.ones(60))
     batch = make_batch([run])
     # steps of 1/80 s, which the turn from 5 to 20 1/s wants, would be 4800; middles count too
-    assert batch.transients.times.shape[1] < 0.35 * 2 * 4800
+    assert batch.parts[0].times.shape[1] < 0.35 * 2 * 4800
     declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, 0.5)
     model = AugmentedModel(declared, [make_effect("stress_offset")])
     predicted = model.predict(model.zero(), batch)[0]

@@ -56,7 +56,7 @@ def test_a_run_from_a_steady_flow_is_exact_in_a_third_of_the_steps(law, before, 
     # what the grid's own steps after the jump leave, most where a law thins fast
     most = 3e-5 if law == "ptt_linear" else 5e-6
     np.testing.assert_allclose(found, exact, atol=most * np.max(np.abs(exact)))
-    assert 3 * taken[0] < int(batch.transients.last_step[0])
+    assert 3 * taken[0] < int(batch.parts[0].last_step[0])
 
 
 STRUCTURE = "thixotropic_relaxation_two_times"

@@ -43,13 +43,8 @@ def test_no_candidate_of_the_loop_brings_a_matrix_product_into_the_steps(run, te
     model = AugmentedModel(DeclaredModel.maxwell([100.0, 10.0], [0.1, 1.0]), effects)
     theta, batch = model.zero(), make_batch([run])
     program, (flows,) = model._predictor.program, batch.parts
-    records = batch.records.padded(1, len(TIMES))
-
-    def predict(numbers, used, theta, flows, records):
-        return program._predict_all(numbers, used, theta, flows, records, None, np.inf)
-
     used = program.fluid.in_use(theta)
-    assert products(predict, model._predictor._numbers, used, theta, flows, records) == 0
+    assert products(program._predict_all, model._predictor._numbers, used, theta, flows) == 0
 
 
 def test_a_contraction_is_that_of_tensordot_without_a_product_of_matrices():

@@ -118,8 +118,7 @@ def test_a_structure_slower_than_the_relaxation_is_followed_in_long_steps():
         in_modulus=False, modulus=100.0, relaxation_time=TIME, mobility=0.2,
     ).respond(RECORD, TIMES).sigma12  # fmt: skip
     assert (
-        batch.transients.times.shape[1] // 2
-        < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
+        batch.parts[0].times.shape[1] // 2 < 0.6 * make_grid(FLOW, TIMES, strain_step=0.25)[0].size
     )
     # of second order in time at the jump: tests/effects/test_structure.py
     np.testing.assert_allclose(

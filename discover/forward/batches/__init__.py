@@ -3,10 +3,8 @@
 from discover.forward.batches.batch import Batch, Flows, make_batch
 from discover.forward.batches.imposed_stress import StressFlows
 from discover.forward.batches.loadings import Loadings, names_of_loadings
-from discover.forward.batches.oscillation import PeriodicFlows, Places
-from discover.forward.batches.records import OBSERVED, Records, even, make_records
-from discover.forward.batches.scales import data_scales
-from discover.forward.batches.steady import SteadyFlows
+from discover.forward.batches.records import OBSERVED, Records, data_scales, even, make_records
+from discover.forward.batches.states import PeriodicFlows, Places, SteadyFlows
 from discover.forward.batches.transient import TransientFlows
 
 __all__ = [

@@ -9,9 +9,14 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.batches.imposed_stress import StressFlows, at_given_stress
-from discover.forward.batches.oscillation import PeriodicFlows, Places, oscillations
 from discover.forward.batches.records import Records, make_records
-from discover.forward.batches.steady import SteadyFlows, steady_states
+from discover.forward.batches.states import (
+    PeriodicFlows,
+    Places,
+    SteadyFlows,
+    oscillations,
+    steady_states,
+)
 from discover.forward.batches.transient import TransientFlows, transients
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
@@ -19,12 +24,12 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 
 
 class Batch(eqx.Module):
-    """Runs of one control or several, each of which has a program of its own.
+    """Runs of one control or several, in parts of which each has a program of its own.
 
     Attributes
     ----------
     parts, rows
-        The flows of each control, and which runs they are.
+        The flows of each control, those in simple shear apart, and which runs they are.
     moduli
         Of each run that is a modulus, which one, and where its states stand in their part.
     records
@@ -51,11 +56,6 @@ class Batch(eqx.Module):
         """Time of the last sample of all, in s."""
         return max(part.longest for part in self.parts)
 
-    @property
-    def transients(self) -> TransientFlows | None:
-        """The flows at a given rate in time; None where there are none."""
-        return next((part for part in self.parts if isinstance(part, TransientFlows)), None)
-
     def weighing(self, weight: Float[np.ndarray, "runs n"]) -> "Batch":
         """Return the same runs with other weights; they share the program."""
         return replace(self, records=replace(self.records, weight=weight))
@@ -75,15 +75,19 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
     strain_step
         Largest strain of a step.
     """
-    controls = dict.fromkeys(run.protocol.control for run in runs)
+    # simple shear apart from other flows, for it costs less
+    kinds = [
+        (flow.control, flow.control == "rate" and flow.kinematics is not None)
+        for flow in (run.protocol for run in runs)
+    ]
     rows = tuple(
-        tuple(i for i, run in enumerate(runs) if run.protocol.control == control)
-        for control in controls
+        tuple(i for i, own in enumerate(kinds) if own == kind) for kind in dict.fromkeys(kinds)
     )
     moduli: tuple[Places, ...] = ()
     parts: list[Flows] = []
-    for control, at in zip(controls, rows, strict=True):
+    for at in rows:
         own = [runs[i] for i in at]
+        control = own[0].protocol.control
         if control == "oscillation":
             part, moduli = oscillations(own, strain_step)
         elif control == "steady":

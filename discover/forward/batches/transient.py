@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import equinox as eqx
 import jax
@@ -23,6 +23,9 @@ _EARLY_STEPS = 0.5 ** np.arange(6)
 # Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
 # a run is steady. Shorter ones keep the accuracy of small steps throughout
 _LONG, _GROWTH = 2000, 0.05
+
+# Least sizes of arrays that data sets share; of runs where they have no more steps than that
+_MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 
 
 class TransientFlows(eqx.Module):
@@ -73,51 +76,38 @@ class TransientFlows(eqx.Module):
         )
         return float(np.max(ends))
 
-    @property
-    def room(self) -> "Room":
-        """Sizes of its arrays."""
-        runs, half_steps = self.times.shape
-        steps = 0 if self.steps is None else self.steps.start.shape[1]
-        return Room(runs, half_steps, self.sample_index.shape[1], steps)
+    def in_shared_shape(self) -> "TransientFlows":
+        """Return these runs padded to one of few shapes, so that data sets share programs.
 
-    def laid_out(self, room: "Room") -> list["TransientFlows"]:
-        """Return these runs padded to a room, in as many batches as they need.
-
-        A run more is the last once more, and what is beyond a run's end is at rest. Runs too long
-        for the room stay as they are.
+        A run more is the last once more, and what is beyond a run's end is at rest.
         """
-        own = self.room
-        if own == room or np.any(np.array(own[1:]) > room[1:]):
-            return [self]
-        starts = range(0, own.runs, room.runs)
-        return [self._at(slice(start, start + room.runs))._padded(room) for start in starts]
-
-    def _at(self, rows: slice) -> "TransientFlows":
-        return jax.tree.map(lambda values: values[rows], self)
-
-    def _padded(self, room: "Room") -> "TransientFlows":
         times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
+        samples = _rounded(self.sample_index.shape[1], _SAMPLES)
+        step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)
+        half_steps = 2 * step_ends - 1
+        # of long runs a few more are not for nothing
+        runs = _rounded(len(times), _MANY_RUNS if step_ends == _STEPS else 1)
         spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
-        later = times[:, -1:] + spacing * np.arange(1, room.half_steps - times.shape[1] + 1)
+        later = times[:, -1:] + spacing * np.arange(1, half_steps - times.shape[1] + 1)
         # a straight line for one step more: the slope of the rate at the last sample stays as it is
         one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
         longer = replace(
             self,
             times=on_device(np.concatenate([times, later], axis=1)),
-            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), room.half_steps),
-            sample_index=_longer(self.sample_index, room.samples, "edge"),
-            steps=self.steps and self.steps.padded(room.rate_steps),
+            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), half_steps),
+            sample_index=_longer(self.sample_index, samples, "edge"),
+            steps=self.steps and self.steps.padded(_rounded(self.steps.start.shape[1], 1)),
         )
-        return jax.tree.map(lambda values: _more_runs(values, room.runs), longer)
+        return jax.tree.map(lambda values: _more_runs(values, runs), longer)
 
 
-class Room(NamedTuple):
-    """Sizes of the arrays of flows: runs, half steps, samples and steps of the rate of each."""
-
-    runs: int
-    half_steps: int
-    samples: int
-    rate_steps: int
+def _rounded(size: int, least: int) -> int:
+    """Return the next of least × 1, 1.5, 2, 3, 4, 6, ... in whole numbers."""
+    while size > least:
+        if size <= 3 * least // 2:
+            return 3 * least // 2
+        least *= 2
+    return least
 
 
 def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
@@ -131,7 +121,7 @@ def _more_runs(values: ArrayLike, runs: int) -> Array:
     return on_device(np.pad(values, more, "edge"))
 
 
-def transients(runs: Sequence[Run], strain_step: float) -> TransientFlows:
+def transients(runs: Sequence[Run], strain_step: float = 0.25) -> TransientFlows:
     """Return the flows of runs at a given rate."""
     grids = []
     for run in runs:

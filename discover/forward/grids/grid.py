@@ -209,7 +209,7 @@ def had_gone_on(protocol: FlowProtocol) -> bool:
 
 
 def _follows_cycle(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> bool:
-    end = float(protocol.cycle[1])
+    end = float(np.asarray(protocol.cycle)[1])
     return had_gone_on(protocol) and float(times[0]) >= end - 1e-9 * abs(end)
 
 

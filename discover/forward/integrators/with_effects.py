@@ -5,11 +5,9 @@ fluid, with steps that are exact for constant coefficients, and the deformation 
 series with the fluid take away. What no candidate needs is not compiled.
 """
 
-from typing import NamedTuple
-
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from discover.forward.dynamics import Dynamics
 from discover.forward.starts.periodic_start import Cycle, periodic_start
@@ -18,51 +16,14 @@ from discover.protocols.kinematics import Kinematics
 # Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
 JUMP = 1e-9
 
-RUNS = "runs"
-"""Axis along which runs are followed side by side, all by the same number of steps."""
-
-
-class Judged(NamedTuple):
-    """What was measured, for a trial that is given up as soon as it is of no use.
-
-    Attributes
-    ----------
-    weight, recorded
-        Of one run, at step ends; of no weight where there is no sample.
-    beside
-        Recorded stress that the modes do not make, in Pa, at step ends.
-    limit
-        Sum over all runs of the squared weighted residuals from which on a trial is of no use.
-        Infinity follows every run to its end, also one whose stress runs away.
-    """
-
-    weight: Float[Array, " s"]
-    recorded: Float[Array, " s"]
-    beside: Float[Array, " s"]
-    limit: Float[Array, ""]
-
-    def missed(self, number: Int[Array, ""], stress: Float[Array, ""]) -> Float[Array, ""]:
-        """Return the squared weighted residual at the end of a step, counted from 0."""
-        at = number + 1
-        off = self.weight[at] * (stress + self.beside[at] - self.recorded[at])
-        # between samples, and past a run's last, a stress may be anything
-        return jnp.where(self.weight[at] > 0.0, off**2, 0.0)
-
-    def of_use(self, missed: Float[Array, ""]) -> Bool[Array, ""]:
-        """Return whether a trial that missed so much of each run by now is followed further."""
-        # what is no number is below no limit
-        return jnp.isinf(self.limit) | (jax.lax.psum(missed, RUNS) < self.limit)
-
 
 def integrate(
     dynamics: Dynamics,
     times: Float[Array, " s"],
     rate: Float[Array, " m"],
     steps: Int[Array, ""],
-    judged: Judged,
     flow: Kinematics | None = None,
     cycle: Cycle | None = None,
-    weights: Float[Array, "steps 1 11 _"] | None = None,
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
@@ -74,14 +35,10 @@ def integrate(
         Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
     steps
         How many steps are taken; those beyond are padding, and nothing is computed of them.
-    judged
-        What the stress is judged by on the way; zero where it is not followed to the end.
     flow
         Which flow has this rate; None is simple shear.
     cycle
         The last cycle before the record, of a batch that holds runs with a periodic start.
-    weights
-        Of the steps for the declared modes, where they are known; see `declared_weights`.
     """
     width = jnp.diff(times)
     if cycle is not None:
@@ -138,25 +95,20 @@ def integrate(
     rest = dynamics.rest()
     start = (*rest, zero, zero)
     rates = (rate[:-2:2], rate[1::2], rate[2::2])
-    inputs = (rates, width, dynamics.weights(width, weights))
+    inputs = (rates, width, dynamics.weights(width))
     begun_at, begun = -1, start
     if cycle is not None:
         begun_at, begun = cycle.start, _begun(step, start, inputs, cycle, times, dynamics)
 
-    def taken(so_far):
-        number, carry, recorded, missed = so_far
+    def taken(number, so_far):
+        carry, recorded = so_far
         if cycle is not None:
             carry = jax.tree.map(lambda a, b: jnp.where(number == begun_at, b, a), carry, begun)
         carry, seen = step(carry, jax.tree.map(lambda of: of[number], inputs))
-        missed = missed + judged.missed(number, seen[0])
-        return number + 1, carry, recorded.at[:, number].set(jnp.stack(seen)), missed
+        return carry, recorded.at[:, number].set(jnp.stack(seen))
 
-    def goes_on(so_far):
-        number, _, _, missed = so_far
-        return (number < steps) & judged.of_use(missed)
-
-    begin = (0, start, jnp.zeros((2, len(width))), zero)
-    _, _, (stress, compliance_rate), _ = jax.lax.while_loop(goes_on, taken, begin)
+    begin = (start, jnp.zeros((2, len(width))))
+    _, (stress, compliance_rate) = jax.lax.fori_loop(0, steps, taken, begin)
     felt = rate[::2]
     if series is not None:
         # constant in each step; at its ends the mean of both sides

@@ -12,8 +12,8 @@ import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.code import as_array as _array
 from discover.forward.side_by_side.cycles import Cycles
-from discover.forward.side_by_side.layout import as_array as _array
 from discover.forward.side_by_side.own_widths import OWN, OwnWidths
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.programs.lanes import LANES

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -60,10 +60,6 @@ class SteadySideBySide:
         of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0))
         of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0))
         self._recorded = compiled(of_trials, ("steady records", *made_from))
-
-    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program: none."""
-        return np.zeros(len(thetas), bool)
 
     def predict(
         self,

@@ -9,8 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.layout import as_array
+from discover.forward.side_by_side.code import Code, as_array
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.starts.approach import (
     MOST_STEPS,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import jax
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -40,10 +40,6 @@ class StressSideBySide:
         self._packed = code.packing(fluid, made_from, -1)
         of_trials = jax.vmap(jax.vmap(driven, (None, 0)), (0, None))
         self._driven = compiled(of_trials, ("driven", *made_from))
-
-    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program: none."""
-        return np.zeros(len(thetas), bool)
 
     def predict(
         self,

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -67,6 +67,8 @@ class _Runs(NamedTuple):
         Without effects of the instrument, with the lanes first.
     in_lanes
         The rate with the lanes last.
+    in_shear
+        Whether any of them is simple shear, where alone an instrument shapes and distorts.
     """
 
     last: np.ndarray
@@ -84,6 +86,7 @@ class _Runs(NamedTuple):
     rate: np.ndarray
     tool_rate: np.ndarray
     in_lanes: np.ndarray
+    in_shear: bool
 
 
 def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -105,11 +108,12 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
         ends = np.unique(np.concatenate([[0, starts], at, jumps, jumps + 1]))
         ends = ends[ends <= last[row]]
         for first, end in pairwise(ends):
+            # a cycle is gone through in the same steps again and again
+            if end - first < _FEWEST or first < behind[row]:
+                continue
             own_rates, own_times = (of[row, 2 * first : 2 * end + 1] for of in (rates, half))
             line = np.interp(own_times, own_times[[0, -1]], own_rates[[0, -1]])
-            is_straight = np.allclose(own_rates, line, rtol=1e-10, atol=0.0)
-            # a cycle is gone through in the same steps again and again
-            if end - first >= _FEWEST and is_straight and first >= behind[row]:
+            if np.all(np.abs(own_rates - line) <= 1e-10 * np.abs(line)):
                 length = own[end] - own[first]
                 held[row, first], whole[row, first] = end - first, length
                 least[row, first] = _ALWAYS * length / (end - first)
@@ -171,10 +175,6 @@ class SideBySide:
         self._recorded = compiled(of_trials, ("recorded", *made_from))
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
-
-    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program: none."""
-        return np.zeros(len(thetas), bool)
 
     def predict(
         self,
@@ -244,7 +244,8 @@ class SideBySide:
             modes = np.ascontiguousarray(modes[~absent])
         rate, tool_rate, in_lanes = laid_out.rate, laid_out.tool_rate, laid_out.in_lanes
         present = self._fluid.present(thetas)
-        if part.steps is not None or np.any(thetas[:, self._shaping]):
+        is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
+        if part.steps is not None or is_shaped:
             rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, present, part))
             in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
         time, tabled = table
@@ -261,7 +262,7 @@ class SideBySide:
             flow = jax.tree.map(lambda leaf: leaf[:runs], part.kinematics)
             own = (np.moveaxis(of, -1, 0) for of in (at_samples, of_modes[places]))
             beside = [normal_stress_differences(flow, *own)]
-        if not np.any(thetas[:, self._distorting]):
+        if not (laid_out.in_shear and np.any(thetas[:, self._distorting])):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
         if np.any(laid_out.held > 1):
             # what alters a signal looks beyond its samples, at all steps of the grid
@@ -290,6 +291,7 @@ class SideBySide:
         np.add.at(recorded, places, np.asarray(judging.recorded))
         last = np.asarray(part.last_step)
         held, whole, least = intervals(part)
+        flow = part.kinematics
         cycle = np.asarray(part.cycle).astype(np.int64)
         ends = np.take_along_axis(times, np.maximum(cycle, 0), axis=1)
         found = _Runs(
@@ -309,6 +311,7 @@ class SideBySide:
             rate,
             tool_rate,
             np.ascontiguousarray(np.moveaxis(rate, 0, -1)),
+            flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
         )
         self._known_runs.append((part, judging, found))
         del self._known_runs[:-_KEPT]

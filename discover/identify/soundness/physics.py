@@ -5,7 +5,7 @@ simulation of other flows without a second thought.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import jax
@@ -30,6 +30,7 @@ from discover.identify.soundness.steady_states import (
 )
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.notebook_view import SentenceAndTable, table_of
 from discover.programs import compiled
@@ -132,6 +133,7 @@ def check_physics(
         Largest shear rate and frequency of training, times the mean relaxation time: the corner of
         the box beyond which the law extrapolates.
     """
+    fluid = replace(fluid, law=in_shared_form(fluid.law))
     along = trajectories(fluid, in_enough_steps(fluid, flows))
     beyond = cycles(
         fluid,

@@ -122,7 +122,7 @@ class Problem:
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
         effects = [*candidates, *beside]
-        self.model = AugmentedModel(declared, effects, self.scales, self.fitted.batch)
+        self.model = AugmentedModel(declared, effects, self.scales)
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
         self.zero, self.moduli = self.model.zero(), self.model.moduli
         self._priors = self._known()

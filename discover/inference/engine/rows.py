@@ -13,6 +13,10 @@ _CURVES = ("steady", "oscillation")
 """Controls of which each value is an experiment of its own, without a neighbour in time."""
 
 
+_RUNAWAY = 1e12
+"""Of the largest record, the size from which on a prediction has run away."""
+
+
 @dataclass(frozen=True)
 class Rows:
     """What was recorded in runs, the samples of one after those of the other.
@@ -83,8 +87,14 @@ class Rows:
     def flat(
         self, predicted: Float[np.ndarray, "trials runs n"]
     ) -> Float[np.ndarray, "trials rows"]:
-        """Return predictions row by row."""
-        return predicted[:, self.seen]
+        """Return predictions row by row; not a number where they are no record's at all.
+
+        What runs away is cut off here, at any size, for its squares and products would not be
+        finite either.
+        """
+        found = predicted[:, self.seen]
+        most = _RUNAWAY * np.max(self.size, initial=0.0)
+        return np.where(np.abs(found) <= most, found, np.nan)
 
     def rms_by_run(self, values: Float[np.ndarray, " rows"]) -> Float[np.ndarray, " runs"]:
         """Return the root mean square over the rows of each run."""

@@ -1,15 +1,16 @@
-"""Levenberg–Marquardt by optimistix, for residuals whose derivatives are computed beside them."""
+"""Levenberg–Marquardt for residuals whose derivatives are computed beside them."""
 
 from collections.abc import Callable
-from typing import Any
+from contextlib import suppress
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-import lineax
 import numpy as np
 import optimistix
 from jaxtyping import Array, Bool, Float
+from scipy.linalg import cho_factor, cho_solve
 
 Linearise = Callable[[Array, Any], tuple[Array, Array, Any]]
 """Of parameters and further arguments: residuals, their derivatives, and what is known beside."""
@@ -26,11 +27,9 @@ _BOLD = optimistix.ClassicalTrustRegion(
 # that is of order one, of weights of a network far below.
 _OF_SCALED, _OF_WEIGHTS = 10.0, 30.0
 
-# Normal equations halve the digits, which is harmless here: the damping keeps them well
-# conditioned, and they cost a sixth of an orthogonal factorisation.
-_BY_STEPS = optimistix.LevenbergMarquardt(
-    rtol=1e-9, atol=1e-11, linear_solver=lineax.Normal(lineax.Cholesky())
-)
+# Of what a step promised, the shares from which on it is taken, and from which on the damping falls
+_LEAST_KEPT, _MOST_KEPT = 0.01, 0.99
+_MORE_DAMPING, _LESS_DAMPING = 4.0, 1.0 / 3.5
 
 RUNAWAY = 1e3
 """Relative misfit of a trial that has no finite trajectory: it is always rejected."""
@@ -111,64 +110,59 @@ def bounded(
     return residual, jnp.where(sane, columns, 0.0), sane
 
 
-class Linearised(eqx.Module):
-    """An objective and its derivative at one set of weights, for a descent step by step.
+class Linearised(NamedTuple):
+    """An objective around some parameters: residuals (rows,), and derivatives (rows, p)."""
 
-    Attributes
-    ----------
-    weights
-        Where it was linearised.
-    rows
-        The residuals, amplified.
-    matrix
-        Their derivatives by every weight.
-    """
-
-    weights: Float[Array, " p"]
     rows: Float[Array, " rows"]
     matrix: Float[Array, "rows p"]
 
-    @classmethod
-    def of(
-        cls,
-        weights: Float[Array, " p"],
-        rows: Float[Array, " rows"],
-        matrix: Float[Array, "rows p"],
-    ) -> "Linearised":
-        """Return an objective with these residuals and derivatives at some weights."""
-        return cls(weights, _OF_WEIGHTS * rows, _OF_WEIGHTS * matrix)
 
-    def __call__(
-        self, weights: Float[Array, " p"], _args=None
-    ) -> tuple[Float[Array, " rows"], None]:
-        """Return the residuals of the linear model: all of them, as optimistix takes them."""
-        return self.rows + self.matrix @ (weights - self.weights), None
+class Steps:
+    """A descent step by step, each from a linearisation that is computed elsewhere.
 
+    Levenberg–Marquardt with the damping of a trust region   [Moré 1978, The Levenberg-Marquardt
+    algorithm; constants: Gould et al. 2005, 4OR 3, 227, as optimistix has them], in NumPy: for
+    every number of rows and parameters a program would take longer to compile than its steps take.
 
-@eqx.filter_jit
-def first_state(linearised: Linearised):
-    """Return the solver's state before the first step."""
-    rows, aux = eqx.filter_eval_shape(linearised, linearised.weights)
-    return _BY_STEPS.init(linearised, linearised.weights, None, {}, rows, aux, frozenset())
-
-
-@eqx.filter_jit
-def next_state(weights: Float[Array, " p"], linearised: Linearised, state):
-    """Return the best weights and the solver's state after one more step.
-
-    Parameters
+    Attributes
     ----------
-    weights
-        The best weights so far.
-    linearised
-        The objective where the solver tries next, `state.y_eval`.
-    state
-        The solver's state.
+    best, norm
+        The best parameters so far, shape (p,), and the norm of the residuals there.
+    trial
+        The parameters where the objective is to be linearised next.
     """
-    weights, state, _ = _BY_STEPS.step(linearised, weights, None, {}, state, frozenset())
-    return weights, state
 
+    def __init__(self, start: Float[Array | np.ndarray, " p"]):
+        self.best = self.trial = np.asarray(start)
+        self.norm = np.nan
+        self._damping = 1.0
+        self._known: tuple[np.ndarray, ...] | None = None
 
-def best_norm(state: Any) -> float:
-    """Return the norm of the residuals at the best weights that a descent has met."""
-    return float(np.sqrt(max(2.0 * float(state.f_info.as_min()), 0.0))) / _OF_WEIGHTS
+    def take(self, linearised: Linearised) -> None:
+        """Take the step to the trial if it is one down, and find the next trial.
+
+        A trial whose residuals are not finite is none down.
+        """
+        rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
+            if self._known is None or self._is_down(rows):
+                self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
+                self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
+        _, _, curvature, slope = self._known
+        damped = curvature + self._damping * np.eye(len(slope))
+        self.trial = np.full_like(self.best, np.nan)
+        if np.all(np.isfinite(damped)) and np.all(np.isfinite(slope)):
+            with suppress(np.linalg.LinAlgError):  # more damping is asked for
+                self.trial = self.best - cho_solve(cho_factor(damped), slope)
+
+    def _is_down(self, rows: np.ndarray) -> bool:
+        assert self._known is not None
+        before, matrix, *_ = self._known
+        promised = np.sum((before + matrix @ (self.trial - self.best)) ** 2) - np.sum(before**2)
+        found = np.sum(rows**2) - np.sum(before**2)
+        if not found <= _LEAST_KEPT * promised:
+            self._damping *= _MORE_DAMPING
+            return False
+        if found < _MOST_KEPT * promised:
+            self._damping *= _LESS_DAMPING
+        return True

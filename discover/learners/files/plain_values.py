@@ -90,12 +90,13 @@ class PlainWriter:
         if isinstance(law, LibraryExpansion):
             return {KIND: "expansion", **self._fields(law, where)}
         if isinstance(law, TensorBasisNetwork):
-            assert law.network is not None  # a law that was trained has one
-            weights = jax.tree.leaves(eqx.filter(law.network, eqx.is_array))
+            network = law.network
+            weights = jax.tree.leaves(eqx.filter(network, eqx.is_array))
             return {
                 KIND: "network",
-                "width": law.network.width_size,
-                "depth": law.network.depth,
+                # of constants alone there is none
+                "width": 0 if network is None else network.width_size,
+                "depth": 0 if network is None else network.depth,
                 "weights": self.plain(weights, where),
                 "fields": {
                     name: self.plain(getattr(law, name), where)
@@ -179,6 +180,12 @@ class PlainReader:
     def _network(self, plain: Mapping[str, Any], fields: dict[str, Any]) -> TensorBasisNetwork:
         weights = self.value(plain["weights"])
         width, depth = int(plain["width"]), int(plain["depth"])
+        known: dict[str, Any] = {
+            key: jnp.asarray(value) if isinstance(value, np.ndarray) else value
+            for key, value in fields.items()
+        }
+        if not width and not depth and not weights:
+            return TensorBasisNetwork(network=None, **known)
         # a network is not made larger than the weights that the file has for it
         if len(weights) != 2 * (depth + 1) or len(weights[0]) != width:
             raise ValueError("weights do not fit the network")
@@ -188,8 +195,4 @@ class PlainReader:
         if [w.shape for w in weights] != [leaf.shape for leaf in leaves]:
             raise ValueError("weights do not fit the network")
         network = eqx.combine(structure.unflatten(map(jnp.asarray, weights)), static)
-        known: dict[str, Any] = {
-            key: jnp.asarray(value) if isinstance(value, np.ndarray) else value
-            for key, value in fields.items()
-        }
         return TensorBasisNetwork(network=network, **known)

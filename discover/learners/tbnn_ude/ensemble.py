@@ -54,8 +54,7 @@ def train_others(
         law = first.law
         halves = [seen_in(problem, half) for half in halves_of_runs(n_runs, len(keys), keys[0])]
         members = [
-            train_constants(half, key, law.linear_relaxation, recipe, law.base)
-            for half, key in zip(halves, keys, strict=True)
+            train_constants(half, law.linear_relaxation, recipe, law.base) for half in halves
         ]
         return members, "trained on halves of the runs"
     members = list(first.others[: len(keys)])

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import equinox as eqx
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
@@ -193,8 +192,7 @@ class TBNNUDE(RunPrediction):
         self.ensemble_ = agreement
         self.law_ = best.law
         self.fitting_ = [best.law, *(m for i, m in enumerate(members) if fits[i] and i != chosen)]
-        modulus = jnp.atleast_1d(jnp.asarray(known.modulus, dtype=float))
-        modes = modulus, problem.relaxation_time, float(known.solvent_viscosity)
+        modes = np.asarray(known.modulus), problem.relaxation_time, float(known.solvent_viscosity)
         self.fluid_ = Fluid(best.law, *modes)
         self.ensemble_fluids_ = [Fluid(law, *modes) for law in members]
         shortened = ""

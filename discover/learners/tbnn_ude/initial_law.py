@@ -7,12 +7,12 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import (
     Cloud,
     parts,
 )
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from tensor_library.invariants import scalar_invariants
 
 
@@ -38,9 +38,18 @@ def initial_law(
     )
 
 
-def with_network(law: TensorBasisNetwork, network: eqx.nn.MLP | None) -> TensorBasisNetwork:
-    """Return the law with another network, or with none: its coefficients are its constants."""
-    return eqx.tree_at(lambda tree: tree.network, law, network, is_leaf=lambda leaf: leaf is None)
+def without_network(
+    linear_relaxation: bool, base_law: AbstractConstitutiveLaw | None = None
+) -> TensorBasisNetwork:
+    """Return a law with h = 0 whose coefficients are constants."""
+    zero = on_device(np.zeros(N_COEFFICIENTS))
+    return TensorBasisNetwork(
+        network=None,
+        constants=zero,
+        network_mask=zero,
+        linear_relaxation=linear_relaxation,
+        base=base_law,
+    )
 
 
 @compiled

@@ -9,12 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from discover.inference.least_squares.tangents import (
-    Linearised,
-    best_norm,
-    first_state,
-    next_state,
-)
+from discover.inference.least_squares.tangents import Linearised, Steps
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, prior_residual
 from discover.learners.tbnn_ude.problem import TrainingProblem
@@ -25,7 +20,7 @@ from discover.learners.tbnn_ude.variational import (
     trajectories,
 )
 from discover.learners.tbnn_ude.weights import Rebuild
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 
 _PATIENCE = 4
 _LEAST_PROGRESS = 1e-3
@@ -78,7 +73,7 @@ def _with_prior(weights, objective, along, jacobian):
 
     rows = jnp.concatenate([misses.ravel(), prior(weights)])
     matrix = jnp.concatenate([data.reshape(misses.size, -1), jax.jacfwd(prior)(weights)])
-    return Linearised.of(weights, rows, matrix)
+    return Linearised(rows, matrix)
 
 
 class Stopping:
@@ -159,18 +154,11 @@ def minimise(
     pace
         Misfits of a rival after each of its steps: stop when far behind it.
     """
-    linearised = linearise(weights, objective, side_by_side)
-    state = first_state(linearised)
-    best, stopping = weights, Stopping(target, pace)
-    for step in range(steps):
-        if step:
-            linearised = linearise(state.y_eval, objective, side_by_side)
-        weights, state = next_state(weights, linearised, state)
-        misfit = best_norm(state)
-        if np.isfinite(misfit):
-            best = weights
+    descent, stopping = Steps(weights), Stopping(target, pace)
+    for _ in range(steps):
+        descent.take(linearise(on_device(descent.trial), objective, side_by_side))
         if callback is not None:
-            callback(misfit)
-        if stopping.done(misfit):
+            callback(descent.norm)
+        if stopping.done(descent.norm) or not np.isfinite(descent.norm):
             break
-    return best
+    return on_device(descent.best)

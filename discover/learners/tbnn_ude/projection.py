@@ -4,14 +4,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.prior import Cloud
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from tensor_library.library import TermLibrary
 
 ENOUGH = 1e-3
@@ -58,14 +57,10 @@ def project(
     if norm < 1e-12 or not np.isfinite(norm):
         return Projection(None, np.zeros(0), np.zeros(0), 0.0 if norm < 1e-12 else np.inf)
 
-    evaluate = jax.jit(jax.vmap(library.evaluate, (0, 0, None)))
-
     def design(inner):
-        return (
-            (weight[..., None] * np.asarray(evaluate(cloud.stress, cloud.rate, jnp.asarray(inner))))
-            .transpose(0, 2, 1)
-            .reshape(target.size, len(library))
-        )
+        values = np.asarray(_terms(library, cloud.stress, cloud.rate, on_device(inner)))
+        weighted = weight[..., None] * values
+        return weighted.transpose(0, 2, 1).reshape(target.size, len(library))
 
     inner = np.array(library.inner_default)
     for i, (low, high) in enumerate(library.inner_bounds):
@@ -111,6 +106,11 @@ def project(
     chosen = library.subset(support)
     kept = [inner[i] for i, form in enumerate(library.forms) if form in chosen.forms]
     return Projection(chosen, _solve(matrix[:, support], target), np.array(kept), misfit)
+
+
+@compiled
+def _terms(library, stress, rate, inner):
+    return jax.vmap(library.evaluate, (0, 0, None))(stress, rate, inner)
 
 
 @compiled

@@ -38,7 +38,7 @@ from discover.learners.tbnn_ude.functions import (
     nearly_constant_functions,
     race_of_functions,
 )
-from discover.learners.tbnn_ude.initial_law import initial_law, invariant_sizes, with_network
+from discover.learners.tbnn_ude.initial_law import initial_law, invariant_sizes, without_network
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
 from discover.learners.tbnn_ude.session import Progress, Session
@@ -75,9 +75,8 @@ def train_default(
     """
     recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
-    first = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
-    # a network that is zero, in steps of three times the work
-    start = with_network(first, None)
+    # beside a network that is zero the steps would be the same, at three times the work
+    start = without_network(linear_relaxation, base_law)
     penalised, law = session.constants(start)
     if session.misfit(law) > _FAR:
         # from h = 0 the stress of a thinning fluid is too far away: from one that thins it is not
@@ -86,7 +85,7 @@ def train_default(
         if session.misfit(again[1]) < session.misfit(law):
             penalised, law = again
     if session.settled(law) or recipe.max_tensors == 0:
-        return _constant(session, law, penalised, first, "constant coefficients")
+        return _finish(session, law, penalised, False, "constant coefficients")
     # the invariants as the data's own stresses have them, from the best law so far
     scale = invariant_sizes(session.cloud(law))
     what = "coefficients that vary with the invariants"
@@ -111,7 +110,7 @@ def train_default(
     found = [one for one in found if one.misfit <= 0.9 * least or session.settled(one.law)]
     if not found:
         end = "constant coefficients, no function better"
-        return replace(_constant(session, law, penalised, first, end), left_out=left_out)
+        return replace(_finish(session, law, penalised, False, end), left_out=left_out)
     if len(found) == 1:
         return replace(found[0], left_out=left_out)
     order = np.argsort(surprises([one.law for one in found], problem), kind="stable")
@@ -126,16 +125,14 @@ def work(problem: TrainingProblem) -> float:
 
 def train_constants(
     problem: TrainingProblem,
-    key: PRNGKeyArray,
     linear_relaxation: bool,
     recipe: DefaultRecipe,
     base_law: AbstractConstitutiveLaw | None,
 ) -> Trained:
     """Return the law of few constants that explains some runs: the recipe's first stage alone."""
     session = Session(problem, recipe, None)
-    first = initial_law(key, recipe.width, linear_relaxation, jnp.ones(N_COEFFICIENTS), base_law)
-    penalised, law = session.constants(with_network(first, None))
-    return _constant(session, law, penalised, first, "constant coefficients")
+    penalised, law = session.constants(without_network(linear_relaxation, base_law))
+    return _finish(session, law, penalised, False, "constant coefficients")
 
 
 def train_along(
@@ -164,19 +161,6 @@ def train_along(
     )
     penalised, law = functions_along(session, start, groups)
     return _finish(session, law, penalised, True, "coefficients that vary with the invariants")
-
-
-def _constant(
-    session: Session,
-    law: TensorBasisNetwork,
-    penalised: TensorBasisNetwork,
-    first: TensorBasisNetwork,
-    what: str,
-) -> Trained:
-    """Return a law of constants with the network that it began with, which counts for nothing."""
-    trained = _finish(session, law, penalised, False, what)
-    laws = [with_network(one, first.network) for one in (law, penalised)]
-    return replace(trained, law=laws[0], penalised_law=laws[1])
 
 
 def _finish(

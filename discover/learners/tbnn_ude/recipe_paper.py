@@ -12,7 +12,6 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optax
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
@@ -88,9 +87,15 @@ def paper_loss(
     )
 
 
+def _adam(rate):
+    import optax  # half a second, of which no other recipe has any use
+
+    return optax.adam(rate, 0.9, 0.999)
+
+
 @eqx.filter_jit
 def _iterate(network, state, law, problem, active, penalty, rate):
-    optimiser = optax.adam(rate, 0.9, 0.999)
+    optimiser = _adam(rate)
     static = eqx.filter(network, eqx.is_inexact_array, inverse=True)
 
     def body(carry, _):
@@ -100,7 +105,7 @@ def _iterate(network, state, law, problem, active, penalty, rate):
             current, law, problem, active, penalty
         )
         updates, new_state = optimiser.update(gradient, state)
-        updated = optax.apply_updates(dynamic, updates)
+        updated = eqx.apply_updates(dynamic, updates)
         finite = jnp.isfinite(loss) & jnp.all(
             jnp.stack([jnp.all(jnp.isfinite(g)) for g in jax.tree.leaves(gradient)])
         )
@@ -141,7 +146,7 @@ def train_paper(
     law = make_network(key, recipe.width, linear_relaxation)
     law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
     network = law.network
-    state = optax.adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
+    state = _adam(recipe.learning_rate).init(eqx.filter(network, eqx.is_inexact_array))
     n_runs = len(problem.flows)
     total = n_runs * recipe.iterations_per_series
     losses: list[np.ndarray] = []

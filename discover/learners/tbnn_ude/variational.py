@@ -52,7 +52,7 @@ def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
     Compiling an integration costs a hundred times its run, with derivatives or without. Misfits and
     states are therefore both read off the program that also trains the constants.
     """
-    everything = jnp.ones(N_COEFFICIENTS)
+    everything = np.ones(N_COEFFICIENTS)
     rebuild = Rebuild.of_constants(law, everything.astype(bool), everything)
     return side_by_side(rebuild.start, rebuild, problem)[0]
 

@@ -10,7 +10,7 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 
 
 def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
@@ -94,8 +94,8 @@ class Rebuild(eqx.Module):
             Unit of each: a constant is as large as the stress that it contributes.
         """
         n = _count_of(law)
-        positions = jnp.arange(n - N_COEFFICIENTS, n)
-        return cls(law, positions, jnp.asarray(moving), jnp.asarray(scale))
+        positions = on_device(np.arange(n - N_COEFFICIENTS, n))
+        return cls(law, positions, on_device(np.asarray(moving)), on_device(np.asarray(scale)))
 
     @classmethod
     def with_network(
@@ -142,7 +142,7 @@ def _start(rebuild):
     return weights_of(rebuild.template)[rebuild.positions] / rebuild.scale
 
 
-@eqx.filter_jit
+@compiled
 def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork:
     """Return the law with these numbers, by one compiled program."""
     return rebuild(weights)
