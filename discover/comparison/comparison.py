@@ -1,7 +1,7 @@
 """The result of comparing two learners on identical data."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pandas as pd
@@ -150,15 +150,8 @@ class Comparison(PageView, SummaryView):
         for name, outcome in self.outcomes.items():
             left = self.lack_of_fit.get(name)
             found += estimates_of(outcome.terms, left, rivals, (name,))
-        for effect in (*self.posterior.declared_effects, *self.posterior.stages):
-            for key, one in effect.parameters.items():
-                value = getattr(one, "value", None)
-                if value is not None:
-                    line = ("posterior", f"{key} of {effect.effect}")
-                    found.append(Estimate(line, value, one.ci95, one.unit or "1"))
-        for key, one in self.posterior.declared_parameters.items():
-            if getattr(one, "value", None) is not None:
-                found.append(Estimate(("posterior", key), one.value, one.ci95, one.unit or "1"))
+        for one in self.answer.estimates:
+            found.append(replace(one, key=("answer", *one.key)))
         return found
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -179,6 +172,11 @@ class Comparison(PageView, SummaryView):
     def use(self) -> dict[str, Any] | None:
         """What a simulation needs of that law."""
         return self.posterior.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
+        return self.posterior.adequate
 
     @property
     def determined_terms(self) -> bool:
@@ -275,6 +273,7 @@ class Comparison(PageView, SummaryView):
         return table_of(self.rivals)
 
     def _shown(self) -> Iterable[Any]:
+        yield from self.answer.lines
         for name, left in self.lack_of_fit.items():
             yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
         yield from self.warnings

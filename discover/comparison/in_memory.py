@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence, Sized
 from typing import Any, overload
 
+from discover.answer import TOLERANCE
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare as compare_study
 from discover.dataset import Dataset
@@ -33,6 +34,7 @@ def compare(
     second: Dataset,
     *,
     train: Dataset | None = None,
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Comparison: ...
@@ -46,6 +48,7 @@ def compare(
     held_out: HeldOut = (),
     known_effects: Mapping[str, Any] | None = None,
     free: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
     **options: Any,
@@ -60,6 +63,7 @@ def compare(
     held_out: HeldOut = (),
     known_effects: Mapping[str, Any] | None = None,
     free: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
     **options: Any,
@@ -83,6 +87,8 @@ def compare(
     free
         For a data set: what of the base is fitted along: ``"modulus_Pa"``,
         ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
+    tolerance
+        Relative discrepancy that is good enough.
     seed
         Of the learners, and of draws within intervals.
     progress
@@ -110,7 +116,7 @@ def compare(
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
         model = with_known(declared_fluid(second, first), known_effects, free)
-        study = _study(data, model, options)
+        study = _study(data, model, options, tolerance)
         return compare_study(study, seed, say, data=data, declared=model)
     judging = not isinstance(held_out, Sized) or len(held_out) > 0
     if options or judging or known_effects or len(free):
@@ -136,11 +142,19 @@ def compare(
     made = {name: (e.result_, e.fluid_) for name, e in estimators.items()}
     library = getattr(sparse, "library_", None)
     return compare_study(
-        _study(data, model, asked), seed, say, data=data, declared=model, made=made, library=library
+        _study(data, model, asked, tolerance),
+        seed,
+        say,
+        data=data,
+        declared=model,
+        made=made,
+        library=library,
     )
 
 
-def _study(data: StudyData, model: DeclaredModel, options: Mapping[str, Any]) -> Study:
+def _study(
+    data: StudyData, model: DeclaredModel, options: Mapping[str, Any], tolerance: float
+) -> Study:
     """Return the study that would ask for the same with files."""
     source: dict[str, Any] = {"folder": data.dataset.name or "data in memory"}
     whole = data.dataset
@@ -151,6 +165,7 @@ def _study(data: StudyData, model: DeclaredModel, options: Mapping[str, Any]) ->
             source = {"synthetic": made}
     known = {"known_relaxation": bool(model.law.linear_relaxation)}
     content = {"data": source, "model": known, "compare": dict(options)}
+    content["verdict"] = {"tolerance": tolerance}
     return parse_study(content, "compare()")
 
 

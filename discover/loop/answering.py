@@ -38,7 +38,7 @@ _FASTER = 1.01
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
 
-_NAMED = {
+LAW_OF_EFFECT = {
     "giesekus_mobility": "giesekus",
     "non_affine_motion": "johnson_segalman",
     "ptt_linear": "ptt_linear",
@@ -150,9 +150,9 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = LAWS[base[0]].title if base else "law"
         # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
         names = [stage.effect for stage in in_fluid]
-        core = next((n for n in names if base and base[0] == "ucm" and n in _NAMED), None)
+        core = next((n for n in names if base and base[0] == "ucm" and n in LAW_OF_EFFECT), None)
         if core is not None:
-            title = LAWS[_NAMED[core]].title
+            title = LAWS[LAW_OF_EFFECT[core]].title
         added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)

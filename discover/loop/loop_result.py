@@ -309,20 +309,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
         return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
 
     def _estimates(self) -> list[Estimate]:
-        found = [
-            Estimate((name,), p.value, p.ci95, p.unit, notes={"from": "fitted"})
-            for name, p in self.declared_parameters.items()
-        ]
-        parts = [(one, "declared", ()) for one in self.declared_effects]
-        parts += [(stage, "added", stage.aliases) for stage in self.stages]
-        for effect, origin, aliases in parts:
-            for name, p in effect.parameters.items():
-                if p.ci95 is None:
-                    continue  # declared with a value, so nothing was estimated
-                notes = {"from": origin, "indistinguishable_from": ", ".join(aliases)}
-                key = (f"{effect.effect}.{name}",)
-                found.append(Estimate(key, p.value, p.ci95, p.unit or "1", notes=notes))
-        return found
+        return self.answer.estimates
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return `table`: the effects that were added, one line for each of their parameters."""
@@ -371,7 +358,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
         return pd.DataFrame(pairs, dtype=float).T.rename_axis("error")
 
     def _shown(self) -> Iterable[Any]:
-        yield f"{self.verdict}, noise {self.noise_floor:.2g}"
+        yield from self.answer.lines
         yield self.errors_table()
         yield self.table()
         try:
