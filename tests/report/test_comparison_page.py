@@ -131,6 +131,8 @@ def test_warnings_stand_in_the_verdict_and_in_json(tmp_path, no_pictures):
 
 
 def test_a_notebook_is_told_the_verdict_first():
-    shown = made_up(sparse="unexplained")._repr_html_()
-    assert shown.startswith("<p>unexplained by tensor_sindy: made up</p>")
+    comparison = made_up(sparse="unexplained")
+    shown = comparison._repr_html_()
+    assert shown.startswith(f"<p>{comparison.answer.headline}</p>")
+    assert "<p>unexplained by tensor_sindy: made up</p>" in shown
     assert "Determined if the law is in the library: N1" in shown
