@@ -297,9 +297,7 @@ class Answer:
         for suspect in self.suspects:
             own += [(f"{suspect.effect}.{c.name}", c, "instrument") for c in suspect.constants]
         return [
-            Estimate(
-                (name,), c.value, c.ci95, c.unit, notes={"of": of, "determined": c.determined}
-            )
+            Estimate((name,), c.value, c.ci95, c.unit, notes={"of": of, "determined": c.determined})
             for name, c, of in own
         ]
 

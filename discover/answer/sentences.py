@@ -23,6 +23,11 @@ IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 
 
 def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
+    return " ".join(filter(None, [law(answer), description(answer), where(answer)]))
+
+
+def law(answer: Any) -> str:
+    """Return the law by name with its constants; without one, what stands in its place."""
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
@@ -36,7 +41,7 @@ def headline(answer: Any) -> str:
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
-    return " ".join([f"{', '.join([title, *named])}.", description(answer), where(answer)]).strip()
+    return f"{', '.join([title, *named])}."
 
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
@@ -44,6 +49,8 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_ti
 
 def description(answer: Any) -> str:
     """Return how well the law describes the runs."""
+    if not answer.title:
+        return ""
     noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
     if answer.fits_to_the_noise:
         return f"Fits to the noise{noise}."
@@ -52,7 +59,9 @@ def description(answer: Any) -> str:
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
     text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
-    return f"{text}, above the noise{noise}." if noise else f"{text}."
+    # of a material without relaxation no other law was asked
+    than = "; no law reaches the noise" if answer.modes else ", above the noise"
+    return f"{text}{than}{noise}." if noise else f"{text}."
 
 
 def flows(answer: Any) -> str:
@@ -78,7 +87,8 @@ def where(answer: Any) -> str:
         found.append(f"{span(one.rate_1_s)} 1/s")
     elif one.frequency_rad_s is not None:
         found.append(f"{span(one.frequency_rad_s)} rad/s")
-    return f"Use in {', '.join([flows(answer), *found])}." if found else ""
+    verb = "Fitted" if answer.adequate is False else "Use"
+    return f"{verb} in {', '.join([flows(answer), *found])}." if found else ""
 
 
 def _is_plain(answer: Any) -> bool:
@@ -103,15 +113,14 @@ def tolerance(answer: Any) -> str:
     asked = percent_of(answer.tolerance)
     met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
-    of = f" for {listed(met)}" if met else ""
+    kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        parts = [f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"]
+        said = f"missed{lost}{f', met{kept}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
-        parts = [f"Fitted runs meet the tolerance of {asked}, predictions do not"]
+        said = f"met by the fitted runs, missed{lost}"
     else:
-        parts = [f"Meets the tolerance of {asked}{of}"]
-    if missed:
-        parts.append(f"not for {listed(missed)}")
+        said = f"met{kept}{f', missed{lost}' if missed else ''}"
+    parts = [f"Tolerance of {asked}: {said}"]
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
     over = sorted((n for n in by_run if by_run[n] > answer.tolerance), key=lambda n: -by_run[n])
     if over and len(over) < len(by_run):

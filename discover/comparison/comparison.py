@@ -109,8 +109,6 @@ class Comparison(PageView, SummaryView):
         Effects of the instrument that were taken out of the records.
     conditions
         Material and temperature, where runs.csv names them.
-    warnings
-        What a reader should know before believing anything else, one sentence each.
     """
 
     name: str
@@ -135,7 +133,6 @@ class Comparison(PageView, SummaryView):
     known: Equation | None = None
     known_effects: Sequence[KnownEffect] = ()
     conditions: str = ""
-    warnings: tuple[str, ...] = ()
 
     _page = "discover.report.in_memory:comparison_page"
     _index = ("learner", "constant")
@@ -276,7 +273,6 @@ class Comparison(PageView, SummaryView):
         yield from self.answer.lines
         for name, left in self.lack_of_fit.items():
             yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
-        yield from self.warnings
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
             if self.known is not None:
@@ -364,7 +360,6 @@ class Comparison(PageView, SummaryView):
             "rivals": self.rivals,
             "undetermined": self.undetermined,
             "network_differs_by": self.disagreement,
-            "warnings": self.warnings,
             "statements": self.statements,
             "structure": self.structure,
             "physics": self.physics,

@@ -129,7 +129,7 @@ def compare(
     runs = _training_runs(estimators, train)
     if not isinstance(second, Dataset) or not len(second):
         raise InputError(
-            "Give the data set that judges the estimators, with one run at least: "
+            "Give the data set that tests the estimators, with one run at least: "
             "compare([sindy, network], test)."
         )
     data = StudyData(joined(second, runs), Dataset(second.name, runs), second)

@@ -103,7 +103,7 @@ def compare(
     if sweep and (declared.free_constants or declared.effects):
         raise InputError(
             "compare.sweep computes data that hold no instrument, so [model] can have neither "
-            'effects nor constants to be fitted along with it. Write numbers instead of "fit".'
+            'effects nor constants to be fitted. Write numbers instead of "fit".'
         )
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     pipkin = list(itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers))
@@ -212,10 +212,10 @@ def _titled(found: LoopResult, study: Study) -> LoopResult:
 
 
 def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
-    """Return an outcome without terms where the records hold no signal."""
+    """Return an outcome without terms where the data hold no signal."""
     if not is_silent:
         return outcome
-    message = "The records hold no signal, so what was fitted to them is no law"
+    message = "The data hold no signal, so no law was identified"
     return replace(outcome, terms=(), message=message, details={})
 
 

@@ -39,9 +39,9 @@ def what_to_measure_next(result: Any) -> str:
         check = check[:1].lower() + check[1:]
     title = effect_title(doubtful.effect)
     if not doubtful.aliases:
-        return f"To confirm {title}: {check}."
+        return f"To confirm {title}, {check}."
     others = several([*map(effect_title, doubtful.aliases)], "and")
-    return f"To distinguish {title} from {others}: {check}."
+    return f"To distinguish {title} from {others}, {check}."
 
 
 def _telling_test(result: Any) -> str:

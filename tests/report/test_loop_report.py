@@ -172,10 +172,10 @@ def test_every_verdict_answers_three_questions_in_whole_sentences():
             for sentence in answer[:-1].split(". "):
                 assert sentence[0].isupper(), answer
                 assert sentence.count(";") <= 3, sentence
-    assert "To distinguish stress gain from rate gain: a check." in loop_verdict(aliased)[2]
+    assert "To distinguish stress gain from rate gain, a check." in loop_verdict(aliased)[2]
     unaliased = replace(aliased.stages[0], aliases=())
     confirm = loop_verdict(replace(aliased, stages=(unaliased,)))[2]
-    assert confirm == "To confirm stress gain: a check."
+    assert confirm == "To confirm stress gain, a check."
 
 
 def test_what_passes_for_slow_noise_is_said_to_look_like_a_slow_effect():

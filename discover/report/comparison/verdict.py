@@ -105,7 +105,7 @@ def _unseen(comparison: Comparison, name: str) -> list[str]:
     if parts:
         told.append(f"{learner_as_subject(name)} misses unseen flows: {'; '.join(parts)}")
     if lost:
-        told.append(f"{learner_as_subject(name)} runs away in {listed(lost)}")
+        told.append(f"{learner_as_subject(name)} diverges in {listed(lost)}")
     return told
 
 
