@@ -65,7 +65,7 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Comparison(PageView, SummaryView):
-    """Both learners beside the posterior of the same runs, in the same flows.
+    """Both learners and the posterior of the same runs, in the same flows.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Comparison(PageView, SummaryView):
     noise
         Relative noise of synthetic data, or None.
     rivals, statements
-        What the data leave open.
+        What the data do not determine.
     structure
         What the training flows can determine of the library; None where that was not asked.
     classical
@@ -106,7 +106,7 @@ class Comparison(PageView, SummaryView):
     known
         The known part as an equation; None where it cannot be written out.
     known_effects
-        Effects of the instrument that were taken out of the records.
+        Effects of the instrument that the data were corrected for.
     conditions
         Material and temperature, where runs.csv names them.
     """
@@ -266,7 +266,7 @@ class Comparison(PageView, SummaryView):
         return table
 
     def rivals_table(self) -> pd.DataFrame:
-        """Return the laws that the data do not tell from the chosen one, and what would tell."""
+        """Return the laws that the data do not distinguish from the chosen one, and what would."""
         return table_of(self.rivals)
 
     def _shown(self) -> Iterable[Any]:

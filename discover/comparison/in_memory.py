@@ -75,17 +75,17 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-        For estimators the data set that judges them; for a data set the known `Fluid`, by default
+        For estimators the data set that tests them; for a data set the known `Fluid`, by default
         upper convected Maxwell with G = 1 Pa and λ = 1 s.
     train
         What the estimators were fitted to; needed only for those from a file, which holds no data.
     held_out
-        Runs of the data set that only judge, by name, or a data set of them.
+        Held-out runs of the data set, by name, or a data set of them.
     known_effects
-        For a data set: effects that are known beside the fluid, as ``[model] effects`` in a study,
+        For a data set: known effects, as ``[model] effects`` in a study,
         such as ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
     free
-        For a data set: what of the base is fitted along: ``"modulus_Pa"``,
+        For a data set: what of the base is also fitted: ``"modulus_Pa"``,
         ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
     tolerance
         Relative discrepancy that is good enough.
@@ -101,7 +101,7 @@ def compare(
     ------
     InputError
         If estimators are not fitted, or not to the same runs with the same known part, a run
-        judges that was fitted, or an option is unknown.
+        is both fitted and held out, or an option is unknown.
 
     Examples
     --------

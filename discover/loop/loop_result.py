@@ -68,7 +68,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     stages
         Effects added, in order.
     remaining
-        What is left, and whether it has structure.
+        The residual, and whether it is systematic.
     rankings
         Candidates at each stage, and those that earned nothing at the last.
     records
@@ -89,11 +89,11 @@ class LoopResult(PageView, HasEquation, SummaryView):
         The same with constants that differ from mode to mode at the mean relaxation time, and
         without states; None where `fluid` is there, or a state cannot be written out.
     states
-        States of the whole fluid beside it.
+        Structure variables of the whole fluid.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
     next_tests
-        The tests that were weighed by how well they would tell these apart.
+        The tests that were weighed by how well they would distinguish these.
     laws
         The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
@@ -287,7 +287,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
 
     @property
     def held_in_band(self) -> float | None:
-        """Share of the samples held out that lie in the band of all explanations, if any judge."""
+        """Share of held-out samples inside the band of all explanations; None without any."""
         inside = [
             (record.band[0] <= record.measured) & (record.measured <= record.band[1])
             for record in self.records
