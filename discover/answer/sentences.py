@@ -31,12 +31,13 @@ def law(answer: Any) -> str:
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
-    named = [one.text for one in answer.constants if one.name not in _OF_MODES]
-    named = named[:_MOST_CONSTANTS]
+    # of a sum without a name the table has the constants
+    own = answer.constants if answer.law is not None else ()
+    named = [one.text for one in own if one.name not in _OF_MODES][:_MOST_CONSTANTS]
     if len(answer.modes) > 1:
         named.append(counted(len(answer.modes), "mode"))
     elif len(named) < _MOST_CONSTANTS:
-        named += [one.text for one in answer.constants if one.name in _OF_MODES]
+        named += [one.text for one in own if one.name in _OF_MODES]
     if len(answer.modes) == 1 and not named and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
@@ -145,6 +146,12 @@ def suspects(answer: Any) -> str:
     return f"Instrument: {named}." if named else ""
 
 
+def further(answer: Any) -> list[str]:
+    """Return what stands below the table: instrument, tolerance, other law, failed test."""
+    found = [suspects(answer), answer.nearest, tolerance(answer), answer.failed]
+    return [line for line in found if line]
+
+
 def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
@@ -157,6 +164,6 @@ def lines(answer: Any) -> list[str]:
                 text += f", {percent_of(one.beyond)} beyond"
             parts.append(f"{text} ({one.note})" if one.note else text)
         found.append(f"Expected error: {'; '.join(parts)}.")
-    found += [suspects(answer), tolerance(answer), answer.failed]
+    found += further(answer)
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -24,7 +24,7 @@ from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
-from discover.words import effect_title, percent_of
+from discover.words import effect_title, listed, percent_of, readable
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -79,7 +79,7 @@ def loop_answer(result: Any) -> Answer:
         result.verdict in EXPLAINED,
         None if result.discrepancy is None else Discrepancy(**result.discrepancy),
         _range(result, equation),
-        _expected(result, title),
+        _expected(result, title.partition(" with ")[0] if law else "this law"),
         following,
         tuple(
             Suspect(stage.effect, _constants(stage.parameters, stage.left_open))
@@ -87,6 +87,7 @@ def loop_answer(result: Any) -> Answer:
             if stage.kind != "constitutive"
         ),
         failed=_failed(result),
+        nearest=_nearest(result),
         tolerance=result.tolerance,
     )
     if equation is None:
@@ -134,6 +135,15 @@ def _failed(result: Any) -> str:
     return ""
 
 
+def _nearest(result: Any) -> str:
+    """Return the best law of the field beside a sum that has no name; empty where there is none."""
+    if result.nearest_law is None:
+        return ""
+    (name, values), size = result.nearest_law
+    rounded = {key: float(f"{value:.2g}") for key, value in values.items()}
+    return f"Best classical law: {readable(LAWS[name].described(rounded))}, to {percent_of(size)}."
+
+
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
@@ -156,7 +166,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)
-        return None, f"{title} with {' and '.join(added)}" if added else title, tuple(found)
+        return None, f"{title} with {listed(added)}" if added else title, tuple(found)
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
     return name, title, tuple(_beside(values, found))
@@ -225,7 +235,7 @@ def _fastest(record: RunRecord) -> float:
     return float(np.max(np.abs(record.rate)))
 
 
-def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
+def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": _of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -237,7 +247,6 @@ def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
         apart = None if spread is None else spread.inside
         differ = "" if apart is None else f"laws differ by {percent_of(apart)}"
         if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
-            name = title.partition(" with ")[0]
             beyond = None if spread is None else spread.beyond
             found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
         elif kind == "N1":

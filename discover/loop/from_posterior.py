@@ -352,6 +352,7 @@ def result_of(
         discrepancy=ended.discrepancy,
         spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
         left_out_error=ended.left_out_error,
+        nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
         states=states or (),

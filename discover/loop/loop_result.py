@@ -104,6 +104,9 @@ class LoopResult(PageView, HasEquation, SummaryView):
         By how much laws that describe the runs as well differ in σ12, N1, N2, uniaxial stress.
     left_out_error
         Root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    nearest_law
+        Where the law has no name of the field: the best that has one, its constants, and its
+        root-mean-square error of runs left out.
     material
         The simple material that the runs show, recognised before any search; None where none is.
     tolerance
@@ -138,6 +141,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out_error: float | None = None
+    nearest_law: tuple[tuple[str, dict[str, float]], float] | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
     folds: tuple[Fold, ...] = ()

@@ -22,6 +22,7 @@ from discover.inference.engine.left_out import FEWEST_RUNS, left_out
 from discover.inference.engine.posterior import smallest
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, states_of
+from discover.statistics.projection import rms
 
 _MOST = 8
 """Laws with a name, the likeliest, that are fitted without each run."""
@@ -36,17 +37,18 @@ Misses = Float[np.ndarray, "laws runs"]
 def with_named_law_first(posterior: Posterior) -> Posterior:
     """Return the posterior with a law of the field ahead, where it predicts runs left out as well.
 
-    Probabilities and the verdict stay. The discrepancy is that of the law that comes first.
+    Probabilities and the verdict stay. The discrepancy is that of the law that comes first. Where
+    none predicts as well, the best of them stands in `memory["named"]`, with what it misses.
     """
     fitter = posterior.search.fitter
     few = len(posterior.problem.fitted.runs) < FEWEST_RUNS
     if posterior.verdict != "unexplained" or posterior.left is None or few:
         return posterior
     known = posterior.by_left_out or ((posterior.left.fit, 1.0),)
-    if is_named(posterior, known[0][0]):
+    if law_of(posterior, known[0][0]):
         return posterior
     leading = [fit for fit, _ in known]
-    named = [fit for fit in posterior.search.alive() if is_named(posterior, fit)][:_MOST]
+    named = [fit for fit in posterior.search.alive() if law_of(posterior, fit)][:_MOST]
     some = [*leading, *(fit for fit in named if fit not in leading)]
     asked = [fit for fit in some if "missed" not in fit.memory]
     for fit, missed in zip(asked, left_out(fitter, asked), strict=True):
@@ -54,6 +56,9 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     weights = weights_of(np.array([fit.memory["missed"] for fit in some]))
     at = first_of(weights, [fit in named for fit in some])
     if some[at] not in named:
+        if named:
+            best = max(named, key=lambda fit: weights[some.index(fit)])
+            posterior.memory["named"] = law_of(posterior, best), rms(posterior.missed(best))
         return posterior
     chosen = some[at]
     order = [at, *(i for i in np.argsort(-weights, kind="stable") if i != at)]
@@ -78,16 +83,16 @@ def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
     return at if own[at] > 0.0 and np.log(own[at] / weights[best]) >= _AS_WELL else best
 
 
-def is_named(posterior: Posterior, fit: Fit) -> bool:
-    """Return whether the fluid of a hypothesis is one law of the field, whatever the instrument."""
+def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
+    """Return the law of the field that the fluid of a hypothesis is, with its constants."""
     model = posterior.problem.model
     present = [*fit.names, *(known.name for known in model.declared.effects)]
     fluid = augmented_fluid(model, fit.theta, present)
     if states_of(model, fit.theta, present) != ():
-        return False
+        return None
     try:
         named, terms = law_parts(fluid.law)
     except InputError:
-        return False
+        return None
     relaxes = fluid.law.linear_relaxation
-    return named_law(Equation(terms, linear_relaxation=relaxes, named=named)) is not None
+    return named_law(Equation(terms, linear_relaxation=relaxes, named=named))

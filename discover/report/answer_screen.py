@@ -8,9 +8,8 @@ from discover.answer.sentences import (
     SYMBOLS,
     description,
     expected,
+    further,
     law,
-    suspects,
-    tolerance,
     where,
 )
 from discover.equations import Equation
@@ -34,7 +33,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "quality": " ".join(filter(None, [description(answer), where(answer)])),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "expected": (), "modes": (), "solvent": "", "copies": (),
-        "lines": [line for line in (suspects(answer), tolerance(answer), answer.failed) if line],
+        "lines": further(answer),
         "next_test": answer.next_test,
     }  # fmt: skip
     if not answer.title:

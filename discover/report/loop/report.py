@@ -78,7 +78,8 @@ def write_loop(
     page = render(
         "loop.html",
         data={PREDICTIONS: predictions, "loop.json": content},
-        name=f"{name}, {conditions}" if conditions else name,
+        name=name,
+        conditions=conditions,
         summary=summary,
         result=result,
         screen=answer_screen(result.answer),
@@ -96,7 +97,6 @@ def write_loop(
         declared_effects=tables.declared_effects(result),
         rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
         folds=[tables.fold_row(fold) for fold in result.folds],
-        is_unexplained=result.verdict == "unexplained",
         law=tables.law(result),
         remaining=tables.remaining_rows(result),
         loadings=tables.loadings(result),
