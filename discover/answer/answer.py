@@ -239,8 +239,8 @@ class Answer:
         A law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX alone).
     failed
         A test that the law failed, one short sentence; empty where none.
-    nearest
-        The best law of the field where this one has no name, one short sentence.
+    alternative
+        What comes next to this law, one short sentence; empty where it is settled.
     instead
         First line where there is no law to use, such as for pure noise.
     tolerance
@@ -275,7 +275,7 @@ class Answer:
     equation: Equation | None = field(default=None, repr=False)
     written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""
-    nearest: str = ""
+    alternative: str = ""
     instead: str = ""
     tolerance: float = TOLERANCE
 

@@ -10,7 +10,7 @@ _MOST_CONSTANTS = 3
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
 
-_MOST_RUNS = 2
+_MOST_RUNS = 1
 
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
@@ -60,9 +60,7 @@ def description(answer: Any) -> str:
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
     text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
-    # of a material without relaxation no other law was asked
-    than = "; no law reaches the noise" if answer.modes else ", above the noise"
-    return f"{text}{than}{noise}." if noise else f"{text}."
+    return f"{text} plus {percent_of(answer.noise)} noise." if noise else f"{text}."
 
 
 def flows(answer: Any) -> str:
@@ -148,7 +146,7 @@ def suspects(answer: Any) -> str:
 
 def further(answer: Any) -> list[str]:
     """Return what stands below the table: instrument, tolerance, other law, failed test."""
-    found = [suspects(answer), answer.nearest, tolerance(answer), answer.failed]
+    found = [suspects(answer), answer.alternative, tolerance(answer), answer.failed]
     return [line for line in found if line]
 
 

@@ -24,7 +24,7 @@ from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
-from discover.words import effect_title, listed, percent_of, readable
+from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -34,6 +34,9 @@ _WORTH_SAYING = 0.05
 
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
+
+_SETTLED = 0.95
+"""Probability from which on nothing is said of other laws."""
 
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
@@ -87,7 +90,7 @@ def loop_answer(result: Any) -> Answer:
             if stage.kind != "constitutive"
         ),
         failed=_failed(result),
-        nearest=_nearest(result),
+        alternative=_alternative(result),
         tolerance=result.tolerance,
     )
     if equation is None:
@@ -129,14 +132,22 @@ def _failed(result: Any) -> str:
         return _NOT_TESTED[untested]
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
-        return (
-            f"The residual is systematic (p {'< 0.001' if chance < 1e-3 else f'= {chance:.2g}'})."
-        )
+        p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
+        return f"No law reaches the noise: the residual is systematic (p {p})."
     return ""
 
 
-def _nearest(result: Any) -> str:
-    """Return the best law of the field beside a sum that has no name; empty where there is none."""
+def _alternative(result: Any) -> str:
+    """Return what comes next: a law of the field for a sum without a name, or the next likeliest.
+
+    Empty where the law is settled.
+    """
+    told = result.explanations
+    own = told.holding([stage.effect for stage in result.stages])
+    if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
+        others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
+        after = f"; next: {others[0] or 'the declared model'}" if others else ""
+        return f"Probability {percent_of(own.probability)}{after}."
     if result.nearest_law is None:
         return ""
     (name, values), size = result.nearest_law

@@ -30,7 +30,7 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return "Repeat one run with another geometry: what changes is the instrument's."
+        return "Repeat one run with another geometry, to separate instrument and fluid."
     doubtful = _most_doubtful(result.stages)
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."

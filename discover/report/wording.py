@@ -140,5 +140,5 @@ _MOST_NAMED = 8
 """Terms that a sentence bears: a rule may choose half a library."""
 
 
-QUESTIONS = ("What was found", "How sure", "What to measure next")
-"""What the three sentences of every verdict answer, in order."""
+QUESTIONS = ("What was found", "How sure")
+"""What the sentences of a verdict answer, in order."""

@@ -6,21 +6,19 @@ from discover.loop.asked import (
     EXPLAINED,
     MOST_NAMES,
     doubted,
-    several,
     untested_by,
 )
 from discover.loop.loop_result import LoopResult
 from discover.protocols.kinematics import ONLY_STATES
-from discover.report.wording import effect_title, percent, sentence
+from discover.report.wording import percent, sentence
 from discover.words import listed
 
-_SETTLED = 0.95
 _SLOW = 0.5  # correlation from which noise and a slow effect look alike for some samples on end
 
 
 def how_sure(result: LoopResult) -> str:
     """Return by how much the error fell, and after it what these data do not decide."""
-    sentences = [_errors(result), *_what_is_missing(result)]
+    sentences = [_errors(result)]
     if untested_by(result) == "states":
         sentences.append(ONLY_STATES)
     if (deviation := result.remaining.get("loading_deviation")) and result.verdict in EXPLAINED:
@@ -34,21 +32,8 @@ def how_sure(result: LoopResult) -> str:
             f"The rate of {runs} steps between two samples: the instants are fitted jointly, "
             "those of a held-out run to that run."
         )
-    doubts = [*_what_tests_it(result), *_samples_that_count(result), *_what_else_fits(result)]
+    doubts = [*_what_tests_it(result), *_samples_that_count(result)]
     return " ".join([*sentences, *(sentence([doubt]) for doubt in doubts)])
-
-
-def _what_is_missing(result: LoopResult) -> Iterator[str]:
-    """Tell how large what no effect explains is, and where it is largest."""
-    left = result.discrepancy
-    if left is None or left["size"] == 0.0:
-        return
-    low, high = (percent(end) for end in left["ci95"])
-    worst = max(left["by_run"], key=left["by_run"].get)
-    yield (
-        f"Discrepancy {percent(left['size'])} of the stress (95 %: {low} to {high}), largest in "
-        f"{worst} ({percent(left['by_run'][worst])})."
-    )
 
 
 def _errors(result: LoopResult) -> str:
@@ -102,31 +87,6 @@ def _samples_that_count(result: LoopResult) -> Iterator[str]:
     """Tell how many samples did not count."""
     if count := result.remaining.get("outliers", 0):
         yield f"{count} {'outliers were' if count > 1 else 'outlier was'} excluded"
-
-
-def _what_else_fits(result: LoopResult) -> Iterator[str]:
-    """Tell of explanations that fit alike, and of aliases of the effects that were found."""
-    if result.verdict == "effects_added" and (told := _alternatives(result)):
-        yield told
-    for stage in result.stages:
-        if stage.aliases:
-            others = several([*map(effect_title, stage.aliases)], "or")
-            yield f"these data do not distinguish {effect_title(stage.effect)} from {others}"
-
-
-def _alternatives(result: LoopResult) -> str:
-    """Return what is likelier than what was found, or nearly as likely; empty if nothing is."""
-    found = result.explanations.likeliest_first
-    own = result.explanations.holding([stage.effect for stage in result.stages])
-    others = [e for e in found if e is not own]
-    if own is None or not others:
-        return ""
-    share = own.probability / sum(e.probability for e in found)
-    if share > _SETTLED:
-        return ""
-    names = " with ".join(map(effect_title, others[0].effects)) or "the declared model alone"
-    rest = f" and {len(others) - 1} more" if len(others) > 1 else ""
-    return f"probability among equally good fits {percent(share)}; next: {names}{rest}"
 
 
 def _change(result: LoopResult, before: float, after: float) -> tuple[str, str]:

@@ -6,18 +6,14 @@ from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.asked import doubted, several, untested_by
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import LawFit, Stage
+from discover.loop.parts import LawFit
 from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import (
     effect_title,
-    estimate,
-    interval,
-    percent,
     readable,
     sentence,
     significant,
 )
-from discover.words import listed
 
 KINDS = {
     "constitutive": "in the fluid",
@@ -49,7 +45,7 @@ _MEASURED = {
 
 
 def what_was_found(result: LoopResult) -> str:
-    """Return the effects found, with their constants, and whether they explain the data."""
+    """Return how the declared model stands; effects and constants have a section of their own."""
     names = several([effect_title(stage.effect) for stage in result.stages], "and")
     if result.verdict == "no_signal":
         why = (
@@ -58,19 +54,10 @@ def what_was_found(result: LoopResult) -> str:
             else "the stress does not follow what was imposed"
         )
         return f"{_LOOP['no_signal']}: {why}."
-    parts = [
-        f"{KINDS[stage.kind]}: {effect_title(stage.effect)}, {_values(stage)}"
-        for stage in result.stages
-    ]
-    if parts:
-        # what does not explain the data is not called added
-        lead = "closest: " if result.verdict == "unexplained" else "added "
-        if (share := doubted(result)) is not None:
-            lead = f"most likely ({percent(share)}), "
-        parts[0] = lead + parts[0]
+    parts = []
     if result.verdict == "unexplained" and result.free_form:
         curve = result.free_form[0]
-        parts.append(f"and {free_form_sentence(curve)}")
+        parts.append(free_form_sentence(curve))
     if result.laws:
         parts.append(_law_chosen(result.laws))
     return sentence([_how_it_stands(result), *parts])
@@ -81,21 +68,6 @@ def _how_it_stands(result: LoopResult) -> str:
     if untested := untested_by(result):
         return f"{_UNTESTED[result.verdict]} {_MEASURED[untested]}"
     return _LOOP[result.verdict] if doubted(result) is None else _OPEN
-
-
-def _values(stage: Stage) -> str:
-    """Return the constants of an effect, and which of them these data do not determine."""
-    told = [
-        f"{named(name, p)} = {estimate(p.value, p.ci95)} {p.unit}".rstrip()
-        + f" (95 % {interval(p.ci95)})"
-        for name, p in stage.parameters.items()
-        if name not in stage.left_open
-    ]
-    if stage.left_open:
-        names = listed([_in_words(name) for name in stage.left_open])
-        left = f"{names} not determined by these data"
-        return f"{', '.join(told)}, with {left}" if told else left
-    return ", ".join(told)
 
 
 def _in_words(name: str) -> str:
