@@ -52,15 +52,15 @@ def description(answer: Any) -> str:
     """Return how well the law describes the runs."""
     if not answer.title:
         return ""
-    noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
+    noise = "" if answer.noise is None else percent_of(answer.noise)
     if answer.fits_to_the_noise:
-        return f"Fits to the noise{noise}."
+        return f"Fits to the noise ({noise})." if noise else "Fits to the noise."
     if answer.discrepancy is None or not answer.discrepancy.size:
-        return "" if answer.error is None else f"Misfit {percent_of(answer.error)}{noise}."
+        return "" if answer.error is None else f"Misfit {percent_of(answer.error)}."
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
     text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
-    return f"{text} plus {percent_of(answer.noise)} noise." if noise else f"{text}."
+    return f"{text} plus {noise} noise." if noise else f"{text}."
 
 
 def flows(answer: Any) -> str:

@@ -138,7 +138,3 @@ def chosen_names(support: Sequence[str]) -> list[str]:
 
 _MOST_NAMED = 8
 """Terms that a sentence bears: a rule may choose half a library."""
-
-
-QUESTIONS = ("What was found", "How sure")
-"""What the sentences of a verdict answer, in order."""

@@ -24,7 +24,6 @@ from discover.report.plots.loop.residual import residual_picture
 from discover.report.plots.loop.rivals import rivals_picture
 from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
-from discover.report.wording import QUESTIONS
 from discover.study import RunFolder
 
 
@@ -159,15 +158,15 @@ def test_a_loop_shows_itself_as_tables():
     assert result._repr_html_().startswith(f"<p>{result.answer.headline}</p>")
 
 
-def test_every_verdict_answers_its_questions_in_whole_sentences():
+def test_every_verdict_is_whole_sentences():
     aliased = loop_result()
     verdicts = []
     for verdict in ("effects_added", "unexplained", "no_effect_needed"):
         for stages in (aliased.stages, ()):
             verdicts.append(loop_verdict(replace(aliased, verdict=verdict, stages=stages)))
     for sentences in verdicts:
-        assert len(sentences) == len(QUESTIONS)
-        for answer in sentences:
+        assert sentences[0]
+        for answer in filter(None, sentences):
             assert answer.endswith(".")
             for sentence in answer[:-1].split(". "):
                 assert sentence[0].isupper(), answer
@@ -216,19 +215,6 @@ def test_the_verdict_of_an_unexplained_loop_begins_with_that_and_calls_nothing_a
     assert "dded" not in text
 
 
-@pytest.mark.parametrize(
-    ("before", "after", "said"),
-    [
-        (0.4, 0.2, "the error falls from 40 % to 20 %; fitted runs: from 40 % to 1 %"),
-        (0.2, 0.4, "the error rises from 20 % to 40 %; fitted runs: the error falls from"),
-        (0.201, 0.2, "the error stays at 20 %; fitted runs: the error falls from 40 %"),
-    ],
-)
-def test_an_error_that_does_not_fall_is_not_said_to_fall(before, after, said):
-    changed = replace(loop_result(after), error_before=ErrorPair(0.4, before))
-    assert said in loop_verdict(changed)[1]
-
-
 def test_where_nothing_was_added_the_verdict_names_the_hardest_test():
     clean = replace(
         loop_result(), verdict="no_effect_needed", stages=(), error_before=ErrorPair(0.01, 0.012),
@@ -236,8 +222,7 @@ def test_where_nothing_was_added_the_verdict_names_the_hardest_test():
     )  # fmt: skip
     found, sure = loop_verdict(clean)
     assert "nothing is missing" in found
-    assert "the error is 1.2 %; fitted runs: 1 %" in sure
-    assert "falls" not in sure
+    assert sure == ""
     assert "it tests the model hardest" in clean.answer.next_test
 
 

@@ -21,7 +21,7 @@ from discover.report.plots.loop.rivals import rivals_picture
 from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
-from discover.report.wording import QUESTIONS, SMALL_FAULTS
+from discover.report.wording import SMALL_FAULTS
 from discover.study.run_folder import RunFolder
 
 
@@ -83,7 +83,6 @@ def write_loop(
         summary=summary,
         result=result,
         screen=answer_screen(result.answer),
-        questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=tables.error_rows(result)
         + [tables.overlay_row(result, one) for one in overlays],
