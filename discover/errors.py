@@ -8,7 +8,7 @@ from contextlib import contextmanager
 class InputError(ValueError):
     """Something the user gave is wrong.
 
-    The message says what was got, what was wanted and how to mend it. The command line
+    The message says what was got, what was wanted and how to fix it. The command line
     prints it on standard error without a traceback and exits with status 2.
 
     Examples

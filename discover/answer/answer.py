@@ -8,6 +8,7 @@ from typing import Any, Literal
 from discover.answer import sentences
 from discover.equations.equation import Equation
 from discover.plain_json import plain
+from discover.summary_view import Estimate
 from discover.words import effect_title, estimate, interval, readable
 
 TOLERANCE = 0.05
@@ -238,6 +239,8 @@ class Answer:
         A law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX alone).
     failed
         A test that the law failed, one short sentence; empty where none.
+    alternative
+        What comes next to this law, one short sentence; empty where it is settled.
     instead
         First line where there is no law to use, such as for pure noise.
     tolerance
@@ -272,6 +275,7 @@ class Answer:
     equation: Equation | None = field(default=None, repr=False)
     written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""
+    alternative: str = ""
     instead: str = ""
     tolerance: float = TOLERANCE
 
@@ -288,6 +292,17 @@ class Answer:
         if not self.title or self.size is None:
             return None
         return self.size <= self.tolerance
+
+    @property
+    def estimates(self) -> list[Estimate]:
+        """Constants of the law, then those of the instrument, as a summary lists them."""
+        own = [(one.name, one, "law") for one in self.constants]
+        for suspect in self.suspects:
+            own += [(f"{suspect.effect}.{c.name}", c, "instrument") for c in suspect.constants]
+        return [
+            Estimate((name,), c.value, c.ci95, c.unit, notes={"of": of, "determined": c.determined})
+            for name, c, of in own
+        ]
 
     def expected(self, quantity: str) -> ExpectedError:
         """Return the expected error of a quantity."""

@@ -10,7 +10,7 @@ _MOST_CONSTANTS = 3
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
 
-_MOST_RUNS = 2
+_MOST_RUNS = 1
 
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
@@ -23,20 +23,26 @@ IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 
 
 def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
+    return " ".join(filter(None, [law(answer), description(answer), where(answer)]))
+
+
+def law(answer: Any) -> str:
+    """Return the law by name with its constants; without one, what stands in its place."""
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
-    named = [one.text for one in answer.constants if one.name not in _OF_MODES]
-    named = named[:_MOST_CONSTANTS]
+    # of a sum without a name the table has the constants
+    own = answer.constants if answer.law is not None else ()
+    named = [one.text for one in own if one.name not in _OF_MODES][:_MOST_CONSTANTS]
     if len(answer.modes) > 1:
         named.append(counted(len(answer.modes), "mode"))
     elif len(named) < _MOST_CONSTANTS:
-        named += [one.text for one in answer.constants if one.name in _OF_MODES]
+        named += [one.text for one in own if one.name in _OF_MODES]
     if len(answer.modes) == 1 and not named and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
-    return " ".join([f"{', '.join([title, *named])}.", description(answer), where(answer)]).strip()
+    return f"{', '.join([title, *named])}."
 
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
@@ -44,15 +50,17 @@ _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_ti
 
 def description(answer: Any) -> str:
     """Return how well the law describes the runs."""
-    noise = "" if answer.noise is None else f" ({percent_of(answer.noise)})"
+    if not answer.title:
+        return ""
+    noise = "" if answer.noise is None else percent_of(answer.noise)
     if answer.fits_to_the_noise:
-        return f"Fits to the noise{noise}."
+        return f"Fits to the noise ({noise})." if noise else "Fits to the noise."
     if answer.discrepancy is None or not answer.discrepancy.size:
-        return "" if answer.error is None else f"Misfit {percent_of(answer.error)}{noise}."
+        return "" if answer.error is None else f"Misfit {percent_of(answer.error)}."
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
     text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
-    return f"{text}, above the noise{noise}." if noise else f"{text}."
+    return f"{text} plus {noise} noise." if noise else f"{text}."
 
 
 def flows(answer: Any) -> str:
@@ -78,7 +86,8 @@ def where(answer: Any) -> str:
         found.append(f"{span(one.rate_1_s)} 1/s")
     elif one.frequency_rad_s is not None:
         found.append(f"{span(one.frequency_rad_s)} rad/s")
-    return f"Use in {', '.join([flows(answer), *found])}." if found else ""
+    verb = "Fitted" if answer.adequate is False else "Use"
+    return f"{verb} in {', '.join([flows(answer), *found])}." if found else ""
 
 
 def _is_plain(answer: Any) -> bool:
@@ -103,15 +112,14 @@ def tolerance(answer: Any) -> str:
     asked = percent_of(answer.tolerance)
     met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
-    of = f" for {listed(met)}" if met else ""
+    kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        parts = [f"Misses the tolerance of {asked}{f', met{of}' if met else ''}"]
+        said = f"missed{lost}{f', met{kept}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
-        parts = [f"Fitted runs meet the tolerance of {asked}, predictions do not"]
+        said = f"met by the fitted runs, missed{lost}"
     else:
-        parts = [f"Meets the tolerance of {asked}{of}"]
-    if missed:
-        parts.append(f"not for {listed(missed)}")
+        said = f"met{kept}{f', missed{lost}' if missed else ''}"
+    parts = [f"Tolerance of {asked}: {said}"]
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
     over = sorted((n for n in by_run if by_run[n] > answer.tolerance), key=lambda n: -by_run[n])
     if over and len(over) < len(by_run):
@@ -136,6 +144,12 @@ def suspects(answer: Any) -> str:
     return f"Instrument: {named}." if named else ""
 
 
+def further(answer: Any) -> list[str]:
+    """Return what stands below the table: instrument, tolerance, other law, failed test."""
+    found = [suspects(answer), answer.alternative, tolerance(answer), answer.failed]
+    return [line for line in found if line]
+
+
 def lines(answer: Any) -> list[str]:
     """Return the answer as lines of text."""
     found = [headline(answer)]
@@ -148,6 +162,6 @@ def lines(answer: Any) -> list[str]:
                 text += f", {percent_of(one.beyond)} beyond"
             parts.append(f"{text} ({one.note})" if one.note else text)
         found.append(f"Expected error: {'; '.join(parts)}.")
-    found += [suspects(answer), tolerance(answer), answer.failed]
+    found += further(answer)
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

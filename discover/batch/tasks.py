@@ -118,7 +118,6 @@ def run_compare(
         return there
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
-    from discover.report.comparison.verdict import comparison_verdict
     from discover.report.overlay import comparison_overlays, read_overlays
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model
@@ -137,7 +136,7 @@ def run_compare(
         overlays = comparison_overlays(sources, comparison.flows, fluid)
     relaxes = study.model.known_relaxation
     write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
-    ended = _end("compare", folder, [*comparison_verdict(comparison), *comparison.warnings])
+    ended = _end("compare", folder, comparison.answer.lines)
     progress("done", 1.0)
     return ended
 
@@ -204,7 +203,7 @@ def _chosen(result) -> str:
 
 def _beside(model) -> str:
     """Return the effects of the declared model, in words."""
-    return f", beside them {', '.join(e.text for e in model.effects)}" if model.effects else ""
+    return f"; known effects: {', '.join(e.text for e in model.effects)}" if model.effects else ""
 
 
 def run_demo(

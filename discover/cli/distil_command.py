@@ -74,7 +74,7 @@ def distil(
         return
     typer.echo("\nWhat is lost, as a share of each (of N2, as a share of N1):")
     for flow, errors in rows[0]["errors"].items():
-        shown = "one of the two runs away" if errors is None else _values(errors, percent=True)
+        shown = "one of the two diverges" if errors is None else _values(errors, percent=True)
         typer.echo(f"{flow:<14}{shown}")
 
 

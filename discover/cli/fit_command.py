@@ -29,7 +29,7 @@ def fit(
         list[str] | None, typer.Option("--fix", help="Constant that is not fitted: alpha=0.2.")
     ] = None,
     solvent: Annotated[
-        bool, typer.Option("--solvent", help="Fit a solvent viscosity along.")
+        bool, typer.Option("--solvent", help="Also fit a solvent viscosity.")
     ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for page, JSON and equation.")

@@ -158,6 +158,6 @@ def _tell_of_folder(study: "Study") -> None:
         name = "the study" if study.path is None else study.path.name
         say(
             f"discover: note: {name} reads its data from {folder}, which is neither "
-            "beside it nor under DISCOVER_DATA or the working directory.",
+            "next to it nor under DISCOVER_DATA or the working directory.",
             err=True,
         )

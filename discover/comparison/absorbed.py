@@ -73,7 +73,7 @@ def _with_effect(
     beside = np.asarray(effect.instantaneous_stress(values, jnp.asarray(_RATES)))
     if not np.isclose(beside[1], _RATES[1] * beside[0], rtol=1e-9):
         raise InputError(
-            f"compare cannot take {known.name} as known: a learner is told of no stress beside the "
+            f"compare cannot take {known.name} as known: learners know no stress besides the "
             f"modes but a solvent's. {ONLY_LOOP}"
         )
     modulus, relaxation_time = declared.modulus, declared.relaxation_time

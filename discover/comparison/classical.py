@@ -14,17 +14,11 @@ from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.laws import LAWS
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found, with_law
 
-_AS_EFFECTS = {
-    "ucm": (),
-    "johnson_segalman": ("non_affine_motion",),
-    "giesekus": ("giesekus_mobility",),
-    "ptt_linear": ("ptt_linear",),
-    "ptt_exponential": ("ptt_exponential",),
-}
+_AS_EFFECTS = {"ucm": (), **{law: (effect,) for effect, law in LAW_OF_EFFECT.items()}}
 """Effects that make each law of upper convected Maxwell."""
-
 
 _STARTS = (0.03, 0.3)
 """Shares of the range of a constant from which its fits start."""

@@ -1,7 +1,7 @@
 """The result of comparing two learners on identical data."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import pandas as pd
@@ -65,7 +65,7 @@ class SweepPoint:
 
 @dataclass(frozen=True)
 class Comparison(PageView, SummaryView):
-    """Both learners beside the posterior of the same runs, in the same flows.
+    """Both learners and the posterior of the same runs, in the same flows.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Comparison(PageView, SummaryView):
     noise
         Relative noise of synthetic data, or None.
     rivals, statements
-        What the data leave open.
+        What the data do not determine.
     structure
         What the training flows can determine of the library; None where that was not asked.
     classical
@@ -106,11 +106,9 @@ class Comparison(PageView, SummaryView):
     known
         The known part as an equation; None where it cannot be written out.
     known_effects
-        Effects of the instrument that were taken out of the records.
+        Effects of the instrument that the data were corrected for.
     conditions
         Material and temperature, where runs.csv names them.
-    warnings
-        What a reader should know before believing anything else, one sentence each.
     """
 
     name: str
@@ -135,7 +133,6 @@ class Comparison(PageView, SummaryView):
     known: Equation | None = None
     known_effects: Sequence[KnownEffect] = ()
     conditions: str = ""
-    warnings: tuple[str, ...] = ()
 
     _page = "discover.report.in_memory:comparison_page"
     _index = ("learner", "constant")
@@ -150,15 +147,8 @@ class Comparison(PageView, SummaryView):
         for name, outcome in self.outcomes.items():
             left = self.lack_of_fit.get(name)
             found += estimates_of(outcome.terms, left, rivals, (name,))
-        for effect in (*self.posterior.declared_effects, *self.posterior.stages):
-            for key, one in effect.parameters.items():
-                value = getattr(one, "value", None)
-                if value is not None:
-                    line = ("posterior", f"{key} of {effect.effect}")
-                    found.append(Estimate(line, value, one.ci95, one.unit or "1"))
-        for key, one in self.posterior.declared_parameters.items():
-            if getattr(one, "value", None) is not None:
-                found.append(Estimate(("posterior", key), one.value, one.ci95, one.unit or "1"))
+        for one in self.answer.estimates:
+            found.append(replace(one, key=("answer", *one.key)))
         return found
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -179,6 +169,11 @@ class Comparison(PageView, SummaryView):
     def use(self) -> dict[str, Any] | None:
         """What a simulation needs of that law."""
         return self.posterior.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
+        return self.posterior.adequate
 
     @property
     def determined_terms(self) -> bool:
@@ -271,13 +266,13 @@ class Comparison(PageView, SummaryView):
         return table
 
     def rivals_table(self) -> pd.DataFrame:
-        """Return the laws that the data do not tell from the chosen one, and what would tell."""
+        """Return the laws that the data do not distinguish from the chosen one, and what would."""
         return table_of(self.rivals)
 
     def _shown(self) -> Iterable[Any]:
+        yield from self.answer.lines
         for name, left in self.lack_of_fit.items():
             yield f"{left.verdict.replace('_', ' ')} by {name}: {left.reason}"
-        yield from self.warnings
         for name, outcome in self.outcomes.items():
             yield f"{name}: {outcome.message}"
             if self.known is not None:
@@ -365,7 +360,6 @@ class Comparison(PageView, SummaryView):
             "rivals": self.rivals,
             "undetermined": self.undetermined,
             "network_differs_by": self.disagreement,
-            "warnings": self.warnings,
             "statements": self.statements,
             "structure": self.structure,
             "physics": self.physics,

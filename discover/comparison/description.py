@@ -36,7 +36,7 @@ def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
         text += f" ({', '.join(declared.free_constants)} fitted)"
     if frame.effects:
         taken = ", ".join(effect.text for effect in frame.effects)
-        text += f"; taken out of the records: {taken}"
+        text += f"; corrected for in the data: {taken}"
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 

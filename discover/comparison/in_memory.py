@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence, Sized
 from typing import Any, overload
 
+from discover.answer import TOLERANCE
 from discover.comparison.comparison import Comparison
 from discover.comparison.run_comparison import compare as compare_study
 from discover.dataset import Dataset
@@ -33,6 +34,7 @@ def compare(
     second: Dataset,
     *,
     train: Dataset | None = None,
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> Comparison: ...
@@ -46,6 +48,7 @@ def compare(
     held_out: HeldOut = (),
     known_effects: Mapping[str, Any] | None = None,
     free: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
     **options: Any,
@@ -60,6 +63,7 @@ def compare(
     held_out: HeldOut = (),
     known_effects: Mapping[str, Any] | None = None,
     free: Sequence[str] = (),
+    tolerance: float = TOLERANCE,
     seed: int = 0,
     progress: Progress | None = None,
     **options: Any,
@@ -71,18 +75,20 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-        For estimators the data set that judges them; for a data set the known `Fluid`, by default
+        For estimators the data set that tests them; for a data set the known `Fluid`, by default
         upper convected Maxwell with G = 1 Pa and λ = 1 s.
     train
         What the estimators were fitted to; needed only for those from a file, which holds no data.
     held_out
-        Runs of the data set that only judge, by name, or a data set of them.
+        Held-out runs of the data set, by name, or a data set of them.
     known_effects
-        For a data set: effects that are known beside the fluid, as ``[model] effects`` in a study,
+        For a data set: known effects, as ``[model] effects`` in a study,
         such as ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
     free
-        For a data set: what of the base is fitted along: ``"modulus_Pa"``,
+        For a data set: what of the base is also fitted: ``"modulus_Pa"``,
         ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
+    tolerance
+        Relative discrepancy that is good enough.
     seed
         Of the learners, and of draws within intervals.
     progress
@@ -95,7 +101,7 @@ def compare(
     ------
     InputError
         If estimators are not fitted, or not to the same runs with the same known part, a run
-        judges that was fitted, or an option is unknown.
+        is both fitted and held out, or an option is unknown.
 
     Examples
     --------
@@ -110,7 +116,7 @@ def compare(
             raise InputError("train is for estimators from a file; leave it out.")
         data = data_in_memory(first, held_out)
         model = with_known(declared_fluid(second, first), known_effects, free)
-        study = _study(data, model, options)
+        study = _study(data, model, options, tolerance)
         return compare_study(study, seed, say, data=data, declared=model)
     judging = not isinstance(held_out, Sized) or len(held_out) > 0
     if options or judging or known_effects or len(free):
@@ -123,7 +129,7 @@ def compare(
     runs = _training_runs(estimators, train)
     if not isinstance(second, Dataset) or not len(second):
         raise InputError(
-            "Give the data set that judges the estimators, with one run at least: "
+            "Give the data set that tests the estimators, with one run at least: "
             "compare([sindy, network], test)."
         )
     data = StudyData(joined(second, runs), Dataset(second.name, runs), second)
@@ -136,11 +142,19 @@ def compare(
     made = {name: (e.result_, e.fluid_) for name, e in estimators.items()}
     library = getattr(sparse, "library_", None)
     return compare_study(
-        _study(data, model, asked), seed, say, data=data, declared=model, made=made, library=library
+        _study(data, model, asked, tolerance),
+        seed,
+        say,
+        data=data,
+        declared=model,
+        made=made,
+        library=library,
     )
 
 
-def _study(data: StudyData, model: DeclaredModel, options: Mapping[str, Any]) -> Study:
+def _study(
+    data: StudyData, model: DeclaredModel, options: Mapping[str, Any], tolerance: float
+) -> Study:
     """Return the study that would ask for the same with files."""
     source: dict[str, Any] = {"folder": data.dataset.name or "data in memory"}
     whole = data.dataset
@@ -151,6 +165,7 @@ def _study(data: StudyData, model: DeclaredModel, options: Mapping[str, Any]) ->
             source = {"synthetic": made}
     known = {"known_relaxation": bool(model.law.linear_relaxation)}
     content = {"data": source, "model": known, "compare": dict(options)}
+    content["verdict"] = {"tolerance": tolerance}
     return parse_study(content, "compare()")
 
 

@@ -65,7 +65,7 @@ def _lack_of_fit(
                 continue
             if prediction is None or not np.all(np.isfinite(prediction[quantity])):
                 nan = float("nan")
-                reason = f"the law runs away in {flow.name}, a run that it was learned from"
+                reason = f"the law diverges in {flow.name}, a run that it was learned from"
                 return LackOfFit("unexplained", nan, nan, nan, None, reason=reason)
             record = np.asarray(record, dtype=float)
             residuals.append(prediction[quantity] - record)

@@ -60,9 +60,7 @@ def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
         replace(part, runs=tuple(cleaned.get(run.name, run) for run in part.runs))
         for part in (data.dataset, data.fit)
     )
-    return replace(data, dataset=dataset, fit=fit), (
-        f"Left out before the fit, for they stand alone: {', '.join(told)} samples"
-    )
+    return replace(data, dataset=dataset, fit=fit), (f"Outliers excluded: {', '.join(told)}")
 
 
 def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
@@ -90,6 +88,6 @@ def require_one_known_law(declared: DeclaredModel) -> None:
     if declared.by_mode:
         raise InputError(
             f"[model] by_mode lets {', '.join(declared.by_mode)} differ from mode to mode, which "
-            "only close-loop fits. Run discover close-loop on this study, and compare beside what "
+            "only close-loop fits. Run discover close-loop on this study, and start from what "
             'it finds: [model] from = "its folder". Or leave by_mode out.'
         )

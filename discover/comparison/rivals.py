@@ -170,7 +170,7 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
         law = LawTerms.of(terms)
         if own is not None and law.coefficients.keys() == LawTerms.of(own).coefficients.keys():
             continue
-        reason = f"Its probability beside these runs is {percent_of(share)}."
+        reason = f"Its probability given these runs is {percent_of(share)}."
         rival = judge_rival(Rival(law, reason), told[0], predictions, seen, unseen)
         if rival is not None:
             rivals.append(rival)

@@ -4,13 +4,14 @@ import itertools
 from collections.abc import Mapping
 from dataclasses import replace
 
-from discover.answer import TOLERANCE
-from discover.comparison.bands import flow_bands
+import numpy as np
+
+from discover.comparison.bands import Band, flow_bands
 from discover.comparison.classical import fit_classical_laws
 from discover.comparison.comparison import Comparison
 from discover.comparison.description import data_in_words, known_in_words
 from discover.comparison.equations import known_equation
-from discover.comparison.flows import DRAWN
+from discover.comparison.flows import DRAWN, Flow, comparison_flows
 from discover.comparison.hypotheses import search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher
@@ -24,19 +25,22 @@ from discover.comparison.prepared import (
     without_spikes_in_fit,
 )
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
-from discover.comparison.statements import make_statements
+from discover.comparison.statements import Statement, make_statements
 from discover.comparison.sweep import sweep_points, sweep_studies
 from discover.comparison.training import study_library
 from discover.comparison.truth import true_terms
+from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.learners.results.result import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found
+from discover.loop.loop_result import LoopResult
+from discover.loop.simple import simple_result
 from discover.progress import Progress, silent
 from discover.study.data import StudyData, load_study_data
-from discover.study.declared_model import DeclaredModel, declared_model
+from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.law_terms import LawTerm
@@ -99,13 +103,19 @@ def compare(
     if sweep and (declared.free_constants or declared.effects):
         raise InputError(
             "compare.sweep computes data that hold no instrument, so [model] can have neither "
-            'effects nor constants to be fitted along with it. Write numbers instead of "fit".'
+            'effects nor constants to be fitted. Write numbers instead of "fit".'
         )
     data = settled_by(data, float(max(declared.relaxation_time)), declared.law.linear_relaxation)
     pipkin = list(itertools.product(options.next.weissenberg_numbers, options.next.deborah_numbers))
     library = study_library(study) if library is None else library
     learning = Learning(study, options.seed if seed is None else seed, store, made)
 
+    if made is None:
+        model = forward_model(declared)
+        simple = simple_result(model, data.fit.runs, data.held_out.runs, {}, 0.0)
+        if simple is not None:
+            progress("done", 1.0)
+            return _of_material(simple, study, data, declared, learning.seed)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(
         study, data, declared, library, lambda line: progress(line, 0.5 * _SEARCH)
@@ -142,9 +152,7 @@ def compare(
         flows=frame.shown,
         before=frame.alone(),
         outcomes=outcomes,
-        posterior=replace(
-            found.result(), title=study.name, tolerance=study.verdict.tolerance or TOLERANCE
-        ),
+        posterior=_titled(found.result(), study),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=lacks_of_fit(
             outcomes, frame.shown, expectation_of(study, declared, data),
@@ -164,11 +172,50 @@ def compare(
     return comparison
 
 
+def _of_material(
+    simple: LoopResult, study: Study, data: StudyData, declared: DeclaredModel, seed: int
+) -> Comparison:
+    """Return the comparison for a yield stress, a viscous fluid or a solid: no learner is asked."""
+    assert simple.material is not None
+    data = replace(data, dataset=Dataset(data.dataset.name, (*data.fit, *data.held_out)))
+    flows = comparison_flows(data, ())
+    records = {record.name: record for record in simple.records}
+
+    def column(flow: Flow, values: np.ndarray) -> dict[str, np.ndarray]:
+        unknown = np.full(len(values), np.nan)
+        return {"sigma12": values, "N1": unknown, "N2": unknown}
+
+    before = {flow.key: column(flow, records[flow.name].predicted[0]) for flow in flows}
+    bands = {}
+    for flow in flows:
+        middle = column(flow, records[flow.name].predicted[1])
+        bands[flow.key] = Band(middle, middle, middle).claiming(())
+    why = f"A {simple.material.title} has no law for it, and it was not measured."
+    return Comparison(
+        name=study.name,
+        data_summary=data_in_words(data, study),
+        known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
+        flows=flows,
+        before=before,
+        outcomes={},
+        posterior=_titled(simple, study),
+        bands=bands,
+        statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")],
+        seed=seed,
+        conditions=material_and_temperature(data.dataset, study.data.material),
+    )
+
+
+def _titled(found: LoopResult, study: Study) -> LoopResult:
+    """Return a result with the study's name and tolerance."""
+    return replace(found, title=study.name, tolerance=study.verdict.tolerance)
+
+
 def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
-    """Return an outcome without terms where the records hold no signal."""
+    """Return an outcome without terms where the data hold no signal."""
     if not is_silent:
         return outcome
-    message = "The records hold no signal, so what was fitted to them is no law"
+    message = "The data hold no signal, so no law was identified"
     return replace(outcome, terms=(), message=message, details={})
 
 

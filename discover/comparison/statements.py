@@ -25,7 +25,7 @@ NARROW = 0.1
 """Relative half-width of a 95 % band up to which a quantity is said to be determined."""
 
 _NORMAL_STRESSES = ("N1", "N2")
-_NO_SIGNAL = "The records hold no signal, so they say nothing of {}."
+_NO_SIGNAL = "The data hold no signal, so {} is not determined."
 _ONLY_EXTENSION = "Only extension was measured, which does not say what a fluid does in shear."
 _UNEXPLAINED = "No law describes these runs to the noise{}."
 _FEW = (
@@ -139,7 +139,7 @@ def _said_of(quantity, verdict, flows, bands, structure, spread, terms) -> State
         return Statement(quantity, "no", _FEW.format(terms, tested))
     half_width = _widest(quantity, flows, bands)
     if half_width is None:
-        return Statement(quantity, "no", "In some flow the laws that fit run away.")
+        return Statement(quantity, "no", "In some flow the laws that fit diverge.")
     width = f"± {percent_of(max(half_width, 1e-5))}{of_n1} (95 %)"
     if half_width > NARROW:
         return Statement(quantity, "no", f"Its band is {width} at the widest.")

@@ -38,7 +38,7 @@ class Dataset(NotebookView):
     set_aside
         Runs of the folder that cannot be fitted, by name, with the reason.
     material_functions
-        Tables beside the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``,
+        Tables next to the runs, as runs, by kind: ``flow_curve``, ``relaxation``, ``creep``,
         ``amplitude_sweep``.
 
     Examples
@@ -208,13 +208,13 @@ class Dataset(NotebookView):
         return replace(self, runs=tuple(runs))
 
     def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":
-        """Return the data with tables beside the runs as runs among them.
+        """Return the data with its tables as runs.
 
         Parameters
         ----------
         kinds
             Of `material_functions`, or ``lve`` for the linear sweep; by default all tables, and the
-            linear sweep only where there is nothing else. G′ and G″ of a sweep become a record
+            linear sweep only where there is nothing else. G′ and G″ of a sweep become a run
             each, such as ``"amplitude_sweep.csv (loss_modulus)"``.
 
         Raises
@@ -240,10 +240,10 @@ class Dataset(NotebookView):
         return replace(self, runs=(*self.runs, *added), material_functions=left)
 
     def quantity_by_quantity(self) -> "Dataset":
-        """Return the data with N1 and N2, where recorded, as records of their own beside σ12.
+        """Return the data with N1 and N2, where recorded, as runs of their own next to σ12.
 
-        A record of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and judged like a run.
-        Samples that no fluid can have are left out; a record of nothing else is set aside.
+        The run of N1 is called ``"a.csv (N1)"`` and is fitted, weighted and tested like any other.
+        Samples that no fluid can have are left out; a run of nothing else is set aside.
         """
         late, never = sound_normal_stress(self.runs, self.linear_sweep)
         aside = {f"{name} (N1)": why for name, why in never.items()}
@@ -257,7 +257,7 @@ class Dataset(NotebookView):
     def split(
         self, held_out: Sequence[str], fit: Sequence[str] | None = None
     ) -> "tuple[Dataset, Dataset]":
-        """Return the runs to fit and those that only judge, as two data sets.
+        """Return the runs to fit and the held-out runs, as two data sets.
 
         Parameters
         ----------

@@ -43,7 +43,7 @@ def from_dataframe(
         What ``runs.csv`` would say: the column ``file`` (or ``run``) and metadata such as ``flow``,
         ``control``, ``start`` or ``temperature_C``; by default every run is in shear from rest.
     tables
-        Tables beside the runs by name: ``lve``, ``flow_curve``, ``amplitude_sweep``,
+        Tables by name: ``lve``, ``flow_curve``, ``amplitude_sweep``,
         ``relaxation``, ``creep``, with the columns of the files.
     name
         Of the data set.
@@ -53,7 +53,7 @@ def from_dataframe(
     Raises
     ------
     InputError
-        If something in the tables is wrong; the message says what, where and how to mend it.
+        If something in the tables is wrong; the message says what, where and how to fix it.
 
     Examples
     --------

@@ -136,7 +136,7 @@ def load_dataset(
     Raises
     ------
     InputError
-        If something in the folder is wrong; the message says what, where and how to mend it.
+        If something in the folder is wrong; the message says what, where and how to fix it.
 
     Examples
     --------

@@ -113,10 +113,10 @@ class Run(NotebookView):
     metadata
         What else the source says of the run.
     weight
-        How much its samples weigh in a fit beside those of other runs: one over the size of its
-        noise, in units of the mean. Misfits that are told or judged do not know it.
+        How much its samples weigh in a fit relative to other runs: one over the size of its
+        noise, in units of the mean. Reported misfits do not contain it.
     normal_weights
-        The same of its N1 and N2, where they are fitted beside the stress.
+        The same of its N1 and N2, where they are fitted together with the stress.
     loading
         How much a factor of its own on its record may differ from one; None where there is none.
     rate_error
@@ -244,7 +244,7 @@ class Run(NotebookView):
 
     @property
     def quantity(self) -> RecordedQuantity:
-        """What of the record is fitted or judged, as studies and results spell it."""
+        """What is fitted or tested, as studies and results spell it."""
         return self.protocol.quantity
 
     @property
@@ -272,7 +272,7 @@ class Run(NotebookView):
         return sizes_of(values, self.protocol)
 
     def observing(self, quantity: RecordedQuantity) -> "Run":
-        """Return the same run with another quantity fitted or judged, under a name of its own.
+        """Return the same run with another quantity fitted or tested, under a name of its own.
 
         Parameters
         ----------
@@ -292,7 +292,7 @@ class Run(NotebookView):
 
     @property
     def beside(self) -> tuple[RecordedQuantity, ...]:
-        """What was recorded beside σ12: N1, N2, both or neither."""
+        """What was recorded next to σ12: N1, N2, both or neither."""
         both: tuple[RecordedQuantity, ...] = ("N1", "N2")
         columns = (self.first_normal_stress_difference, self.second_normal_stress_difference)
         if self.quantity != "sigma12":
@@ -301,7 +301,7 @@ class Run(NotebookView):
 
     @property
     def records(self) -> "tuple[Run, ...]":
-        """What of the run is fitted or judged by default: itself, or the moduli of oscillations."""
+        """What of the run is fitted or tested by default: itself, or the moduli of oscillations."""
         if self.protocol.control != "oscillation" or self.name != self.source:
             return (self,)
         return tuple(replace(self, name=self.source).observing(modulus) for modulus in MODULI)

@@ -53,7 +53,7 @@ def fit(
 ) -> NamedLawFit:
     """Fit one named law to runs.
 
-    Modes come from `base`, else from the linear sweep of the data, else one mode is fitted along.
+    Modes come from `base`, else from the linear sweep of the data, else one mode is fitted.
 
     Parameters
     ----------
@@ -68,11 +68,11 @@ def fit(
         ``modulus_Pa``, ``relaxation_time_s``. Naming one of the last two fits it, for several modes
         as one factor on all of them.
     start
-        Values from which the fit starts, by name, beside the starts that it spreads by itself.
+        Values from which the fit starts, by name, besides the automatic ones.
     fixed
         Constants that are not fitted, by name.
     effects
-        Effects beside the law, as ``[model] effects`` in a study, such as
+        Known effects, as ``[model] effects`` in a study, such as
         ``{"solvent_viscosity": "fit"}``.
     held_out
         Names of runs of `data` that only test the fit, or a data set of such runs.

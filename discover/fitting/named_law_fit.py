@@ -96,7 +96,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
     fluid
         The fitted fluid.
     effects
-        Effects that were fitted or declared beside the law, with their values, by name.
+        Effects that were fitted or declared, with their values, by name.
     misfit
         What the fit leaves of the runs, and whether that is noise.
     records

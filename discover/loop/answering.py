@@ -24,7 +24,7 @@ from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
-from discover.words import effect_title, percent_of
+from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -35,10 +35,13 @@ _WORTH_SAYING = 0.05
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
+_SETTLED = 0.95
+"""Probability from which on nothing is said of other laws."""
+
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
 
-_NAMED = {
+LAW_OF_EFFECT = {
     "giesekus_mobility": "giesekus",
     "non_affine_motion": "johnson_segalman",
     "ptt_linear": "ptt_linear",
@@ -79,7 +82,7 @@ def loop_answer(result: Any) -> Answer:
         result.verdict in EXPLAINED,
         None if result.discrepancy is None else Discrepancy(**result.discrepancy),
         _range(result, equation),
-        _expected(result, title),
+        _expected(result, title.partition(" with ")[0] if law else "this law"),
         following,
         tuple(
             Suspect(stage.effect, _constants(stage.parameters, stage.left_open))
@@ -87,6 +90,7 @@ def loop_answer(result: Any) -> Answer:
             if stage.kind != "constitutive"
         ),
         failed=_failed(result),
+        alternative=_alternative(result),
         tolerance=result.tolerance,
     )
     if equation is None:
@@ -128,10 +132,27 @@ def _failed(result: Any) -> str:
         return _NOT_TESTED[untested]
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
-        return (
-            f"The residual is systematic (p {'< 0.001' if chance < 1e-3 else f'= {chance:.2g}'})."
-        )
+        p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
+        return f"No law reaches the noise: the residual is systematic (p {p})."
     return ""
+
+
+def _alternative(result: Any) -> str:
+    """Return what comes next: a law of the field for a sum without a name, or the next likeliest.
+
+    Empty where the law is settled.
+    """
+    told = result.explanations
+    own = told.holding([stage.effect for stage in result.stages])
+    if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
+        others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
+        after = f"; next: {others[0] or 'the declared model'}" if others else ""
+        return f"Probability {percent_of(own.probability)}{after}."
+    if result.nearest_law is None:
+        return ""
+    (name, values), size = result.nearest_law
+    rounded = {key: float(f"{value:.2g}") for key, value in values.items()}
+    return f"Best classical law: {readable(LAWS[name].described(rounded))}, to {percent_of(size)}."
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -150,13 +171,13 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = LAWS[base[0]].title if base else "law"
         # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
         names = [stage.effect for stage in in_fluid]
-        core = next((n for n in names if base and base[0] == "ucm" and n in _NAMED), None)
+        core = next((n for n in names if base and base[0] == "ucm" and n in LAW_OF_EFFECT), None)
         if core is not None:
-            title = LAWS[_NAMED[core]].title
+            title = LAWS[LAW_OF_EFFECT[core]].title
         added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)
-        return None, f"{title} with {' and '.join(added)}" if added else title, tuple(found)
+        return None, f"{title} with {listed(added)}" if added else title, tuple(found)
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
     return name, title, tuple(_beside(values, found))
@@ -225,7 +246,7 @@ def _fastest(record: RunRecord) -> float:
     return float(np.max(np.abs(record.rate)))
 
 
-def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
+def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": _of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
@@ -237,7 +258,6 @@ def _expected(result: Any, title: str) -> dict[str, ExpectedError]:
         apart = None if spread is None else spread.inside
         differ = "" if apart is None else f"laws differ by {percent_of(apart)}"
         if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
-            name = title.partition(" with ")[0]
             beyond = None if spread is None else spread.beyond
             found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
         elif kind == "N1":

@@ -1,7 +1,7 @@
 """A posterior as the result of a closed loop: everything that is reported, in one object."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -9,10 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
 
 from discover.forward.by_mode import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.inference.engine.design import NextTests, design
+from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
 from discover.inference.engine.rows import Rows
 from discover.inference.step_instants import instants_found
@@ -108,9 +110,23 @@ class Ended(Path):
 
     @cached_property
     def discrepancy(self) -> dict[str, Any] | None:
-        """Size of what no hypothesis holds; None where no hypothesis can be followed."""
+        """Size of what the law leaves; None where no hypothesis can be followed.
+
+        Where runs left out in turn tell it, by how much the law misses these: then their root mean
+        square, and its interval for misses that are normal.
+        """
         size = None if self.without_fluid else self.posterior.discrepancy()
-        return None if size is None else asdict(size)
+        if size is None or self.verdict != "unexplained" or self.left_out_error is None:
+            return None if size is None else asdict(size)
+        assert self.posterior.left is not None
+        missed = self.posterior.missed(self.posterior.left.fit)
+        if len(missed) < FEWEST_RUNS:
+            return asdict(size)
+        ends = np.sqrt(len(missed) / chi2.ppf((0.975, 0.025), len(missed)))
+        low, high = (float(end) * self.left_out_error for end in ends)
+        names = [run.name for run in self.posterior.problem.fitted.runs]
+        by_run = dict(zip(names, map(float, missed), strict=True))
+        return asdict(replace(size, size=self.left_out_error, ci95=(low, high), by_run=by_run))
 
     @property
     def left_out_error(self) -> float | None:
@@ -313,6 +329,10 @@ def result_of(
     # only what is fitted of a known effect has an interval
     free = {at: ends for at, ends in ended.bounds.items() if at in model.free_positions}
     stages = ended.stages()
+    tests = NextTests()
+    if not ended.without_fluid:
+        with np.errstate(invalid="ignore"):  # laws that diverge in a test
+            tests = design(ended.posterior)
     return LoopResult(
         verdict=ended.verdict,
         error_before=errors_of(ended.records, 0),
@@ -326,12 +346,13 @@ def result_of(
         declared_effects=declared_effects(model, theta, free, by_mode),
         declared_law=declared_law(declared, theta, of_law),
         explanations=ended.explanations,
-        next_tests=NextTests() if ended.without_fluid else design(ended.posterior),
+        next_tests=tests,
         laws=laws,
         free_form=ended.free_form,
         discrepancy=ended.discrepancy,
         spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
         left_out_error=ended.left_out_error,
+        nearest_law=ended.posterior.memory.get("named"),
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
         states=states or (),

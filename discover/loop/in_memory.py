@@ -48,14 +48,14 @@ def close_loop(
         Runs that only test: a data set of their own, names of runs of `data`, or ``"each"`` to
         hold each run out in turn.
     free
-        What of the base is fitted along: parameters of its law, which must be one with a name, and
+        What of the base is also fitted: parameters of its law, which must be one with a name, and
         ``"modulus_Pa"``, ``"relaxation_time_s"``, with several modes one factor on all.
     by_mode
         What may differ from mode to mode, as a smooth function of the relaxation time: parameters
         of the law, of those in `free`, and effects by the size of their term. How smooth is for the
         data to say.
     known_effects
-        Effects that are known beside the base, as ``[model] effects`` in a study, such as
+        Known effects, as ``[model] effects`` in a study, such as
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
         model and not proposed again.
     tolerance

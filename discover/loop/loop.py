@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
 from discover.loop.path import predicted
+from discover.loop.preference import with_named_law_first
 from discover.loop.run_record import errors_of, record_runs
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.loop.simple import inelastic_result, simple_result
@@ -175,9 +177,13 @@ class Found:
         posterior = self.posterior.with_something_else(curves[0].log_odds)
         return replace(self, posterior=posterior, curves=curves)
 
+    @cached_property
+    def _reported(self) -> Posterior:
+        return with_named_law_first(self.posterior)
+
     def ended(self, explanations: int = MOST_LISTED) -> Ended:
         """Return what is reported of the posterior, with so many explanations at most."""
-        posterior = self.posterior
+        posterior = self._reported
         return Ended(posterior, without_fluid(posterior), self.order, explanations, self.curves)
 
     def result(self, explanations: int = MOST_LISTED, seconds: float = 0.0) -> LoopResult:

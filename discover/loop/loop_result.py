@@ -68,7 +68,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     stages
         Effects added, in order.
     remaining
-        What is left, and whether it has structure.
+        The residual, and whether it is systematic.
     rankings
         Candidates at each stage, and those that earned nothing at the last.
     records
@@ -89,11 +89,11 @@ class LoopResult(PageView, HasEquation, SummaryView):
         The same with constants that differ from mode to mode at the mean relaxation time, and
         without states; None where `fluid` is there, or a state cannot be written out.
     states
-        States of the whole fluid beside it.
+        Structure variables of the whole fluid.
     explanations
         What explains the fitted runs about as well as what was found, and how probable each is.
     next_tests
-        The tests that were weighed by how well they would tell these apart.
+        The tests that were weighed by how well they would distinguish these.
     laws
         The laws that the declared one was chosen from, the best first; none where one was declared.
     free_form
@@ -104,6 +104,9 @@ class LoopResult(PageView, HasEquation, SummaryView):
         By how much laws that describe the runs as well differ in σ12, N1, N2, uniaxial stress.
     left_out_error
         Root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    nearest_law
+        Where the law has no name of the field: the best that has one, its constants, and its
+        root-mean-square error of runs left out.
     material
         The simple material that the runs show, recognised before any search; None where none is.
     tolerance
@@ -138,6 +141,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out_error: float | None = None
+    nearest_law: tuple[tuple[str, dict[str, float]], float] | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
     folds: tuple[Fold, ...] = ()
@@ -287,7 +291,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
 
     @property
     def held_in_band(self) -> float | None:
-        """Share of the samples held out that lie in the band of all explanations, if any judge."""
+        """Share of held-out samples inside the band of all explanations; None without any."""
         inside = [
             (record.band[0] <= record.measured) & (record.measured <= record.band[1])
             for record in self.records
@@ -309,20 +313,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
         return pd.DataFrame(lines, columns=[*columns, "error_fit", "error_held_out", "aliases"])
 
     def _estimates(self) -> list[Estimate]:
-        found = [
-            Estimate((name,), p.value, p.ci95, p.unit, notes={"from": "fitted"})
-            for name, p in self.declared_parameters.items()
-        ]
-        parts = [(one, "declared", ()) for one in self.declared_effects]
-        parts += [(stage, "added", stage.aliases) for stage in self.stages]
-        for effect, origin, aliases in parts:
-            for name, p in effect.parameters.items():
-                if p.ci95 is None:
-                    continue  # declared with a value, so nothing was estimated
-                notes = {"from": origin, "indistinguishable_from": ", ".join(aliases)}
-                key = (f"{effect.effect}.{name}",)
-                found.append(Estimate(key, p.value, p.ci95, p.unit or "1", notes=notes))
-        return found
+        return self.answer.estimates
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return `table`: the effects that were added, one line for each of their parameters."""
@@ -371,7 +362,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
         return pd.DataFrame(pairs, dtype=float).T.rename_axis("error")
 
     def _shown(self) -> Iterable[Any]:
-        yield f"{self.verdict}, noise {self.noise_floor:.2g}"
+        yield from self.answer.lines
         yield self.errors_table()
         yield self.table()
         try:

@@ -30,7 +30,7 @@ def what_to_measure_next(result: Any) -> str:
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return "Repeat one run with another geometry: what changes is the instrument's."
+        return "Repeat one run with another geometry, to separate instrument and fluid."
     doubtful = _most_doubtful(result.stages)
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
@@ -39,9 +39,9 @@ def what_to_measure_next(result: Any) -> str:
         check = check[:1].lower() + check[1:]
     title = effect_title(doubtful.effect)
     if not doubtful.aliases:
-        return f"To confirm {title}: {check}."
+        return f"To confirm {title}, {check}."
     others = several([*map(effect_title, doubtful.aliases)], "and")
-    return f"To distinguish {title} from {others}: {check}."
+    return f"To distinguish {title} from {others}, {check}."
 
 
 def _telling_test(result: Any) -> str:

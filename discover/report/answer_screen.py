@@ -4,7 +4,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from discover.answer import Answer
-from discover.answer.sentences import SYMBOLS, expected, suspects, tolerance
+from discover.answer.sentences import (
+    SYMBOLS,
+    description,
+    expected,
+    further,
+    law,
+    where,
+)
 from discover.equations import Equation
 from discover.equations.files import FORMATS
 from discover.equations.spelling.markup import law_element
@@ -22,10 +29,11 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if answer is None:
         return None
     found: dict[str, Any] = {
-        "headline": answer.headline,
+        "headline": law(answer),
+        "quality": " ".join(filter(None, [description(answer), where(answer)])),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "expected": (), "modes": (), "solvent": "", "copies": (),
-        "lines": [line for line in (suspects(answer), tolerance(answer), answer.failed) if line],
+        "lines": further(answer),
         "next_test": answer.next_test,
     }  # fmt: skip
     if not answer.title:

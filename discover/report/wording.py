@@ -86,7 +86,7 @@ def worst(errors: Mapping[str, Mapping[str, float | None]], quantity: str) -> fl
 def terms_text(outcome: LearnerOutcome) -> str:
     """Return the law's terms as plain text, with the intervals of the coefficients."""
     if not outcome.terms:
-        return "nothing beside the known part"
+        return "nothing but the known part"
     parts = []
     for term in outcome.terms:
         text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
@@ -138,7 +138,3 @@ def chosen_names(support: Sequence[str]) -> list[str]:
 
 _MOST_NAMED = 8
 """Terms that a sentence bears: a rule may choose half a library."""
-
-
-QUESTIONS = ("What was found", "How sure", "What to measure next")
-"""What the three sentences of every verdict answer, in order."""

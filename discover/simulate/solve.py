@@ -130,7 +130,7 @@ def simulate(
     components = np.asarray(components)[: times.size]
     if not successful or not np.all(np.isfinite(components)):
         raise SimulationError(
-            f"The law could not be integrated to t = {end:g}: its stress runs away, or it needs "
+            f"The law could not be integrated to t = {end:g}: its stress diverges, or it needs "
             f"more than {MAX_STEPS} steps. Check its parameters and the shear rate."
         )
     return ShearStress(times, components)
@@ -227,7 +227,7 @@ def simulate_homogeneous_flow(
     stress = np.asarray(found)
     if not successful or not np.all(np.isfinite(stress)):
         raise SimulationError(
-            f"The law could not be integrated to t = {float(times[-1]):g}: its stress runs away. "
+            f"The law could not be integrated to t = {float(times[-1]):g}: its stress diverges. "
             "Check its parameters and the rate of deformation."
         )
     return stress

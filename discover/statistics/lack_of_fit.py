@@ -161,7 +161,9 @@ def lack_of_fit(
     if holds_signal(measured, rates):
         return left
     return replace(
-        left, verdict="no_signal", reason="the records are noise about a constant, whatever flows"
+        left,
+        verdict="no_signal",
+        reason="the data are noise about a constant, whatever was imposed",
     )
 
 
@@ -202,25 +204,25 @@ def what_is_left(
         rest = _IF_CORRELATED.format(correlation)
     if explained and misfit > ONLY_NOISE:
         verdict = "no_signal"
-        reason = f"what is left ({percent_of(misfit)} of the records) is noise, and nearly all"
+        reason = f"the residual ({percent_of(misfit)} of the data) is noise, and nearly all"
     elif explained and probability is None:
         rest = "is no larger than noise; there are too few samples to look for a pattern in it"
-        reason = f"what is left ({percent_of(misfit)}) {rest}"
+        reason = f"the residual ({percent_of(misfit)}) {rest}"
     elif explained and probability is not None and probability > SIGNIFICANCE:
-        reason = f"what is left ({percent_of(misfit)}) {rest}"
+        reason = f"the residual ({percent_of(misfit)}) {rest}"
     elif explained:
         given = _PATTERNED[expectation.noise is not None, expectation.repeat_error > 0.0]
         rest = f"has a pattern no larger than {given}"
-        reason = f"what is left ({percent_of(misfit)}) {rest}"
+        reason = f"the residual ({percent_of(misfit)}) {rest}"
     elif probability is None and misfit > STRUCTURE * expected and expectation.noise is None:
         reason = (
-            f"what is left ({percent_of(misfit)}) is more than changes from sample to sample "
+            f"the residual ({percent_of(misfit)}) is more than changes from sample to sample "
             f"({percent_of(expected)}), but so few samples hardly tell what is noise"
         )
     elif misfit > STRUCTURE * expected:
-        reason = f"what is left ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
+        reason = f"the residual ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
     else:
-        reason = f"what is left ({percent_of(misfit)}) has {pattern}"
+        reason = f"the residual ({percent_of(misfit)}) has {pattern}"
     like = likeness(residuals, measured) if verdict == "unexplained" else Likeness()
     count = sum(len(where) for where in outliers)
     if count:

@@ -49,14 +49,14 @@ def likeness(
     often = [read_times(np.asarray(record)) for record in measured]
     if often and min(often) > 1:
         return Likeness(
-            f"each value of the records stands in {max(often)} samples, which looks like a lag",
+            f"each recorded value stands in {max(often)} samples, which looks like a lag",
             "record a sample for each value of the transducer, or keep the first of those alike",
         )
     sizes = [rms(record) or 1.0 for record in measured]
     rows = [np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)]
     if width := averaged_over(rows):
         return Likeness(
-            f"what is left looks like noise of which each sample is the mean of {width}, and no "
+            f"the residual looks like noise of which each sample is the mean of {width}, and no "
             "test tells such noise from a small error of the law",
             f"record the stress without smoothing it over {width} samples, or give the size of its "
             "noise, as by noise = 0.01",
@@ -65,7 +65,7 @@ def likeness(
     if far is None:
         return Likeness()
     return Likeness(
-        "what is left wanders as a zero does that drifts at random, by some "
+        "the residual wanders as a zero does that drifts at random, by some "
         f"{percent_of(far)} of the stress over a run, and not as smoothly as what a law lacks",
         "read the zero before and after each run, or repeat one, in which a missing effect comes "
         "back and a wandering zero does not",
@@ -82,8 +82,8 @@ def _of_steps(residuals, measured, steps: Sequence[float]) -> Likeness:
     largest = [float(np.max(np.abs(record))) or 1.0 for record in measured]
     size = float(np.mean([step / most for step, most in zip(steps, largest, strict=True)]))
     return Likeness(
-        f"the records come in steps of {percent_of(size)} of their largest value, and "
-        f"{percent_of(within)} of what is left stands within half of one, so it may be nothing but "
+        f"the data come in steps of {percent_of(size)} of their largest value, and "
+        f"{percent_of(within)} of the residual stands within half of one, so it may be nothing but "
         "the steps, which hide as much of a law as well",
         "record with a finer range of the transducer",
     )

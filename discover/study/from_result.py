@@ -105,7 +105,7 @@ def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
         raise InputError(f"[model] from: {file} is no result of discover. {_AGAIN}")
     if content.get("verdict") == "no_signal":
         raise InputError(
-            f"[model] from: the records behind {file} hold no signal, so it found nothing that "
+            f"[model] from: the data behind {file} hold no signal, so it found nothing that "
             "could be taken. Declare the law with law and its constants."
         )
     return _of_loop(content, file) if file.name == LOOP else _of_comparison(content, file)
@@ -122,7 +122,7 @@ def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
         raise InputError(
             f"[model] from: in the loop of {file} {', '.join(map(str, declared['by_mode']))} "
             "differs from one relaxation mode to the next, and the file does not have the law of "
-            "each mode: an earlier version wrote it, or the loop added a mode beside a law with "
+            "each mode: an earlier version wrote it, or the loop added a mode to a law with "
             f"constants of its own. {_AGAIN} If that does not help, declare both modes."
         )
     if declared.get("law") is None:
@@ -285,7 +285,7 @@ def _text(
         below = LAWS[named.law].described(named.constants[0])
         if named.differing:
             below = f"{LAWS[named.law].title}, {', '.join(named.differing)} by mode"
-    terms = f"{counted(n, 'term')} beside {below}" if n else below
+    terms = f"{counted(n, 'term')} added to {below}" if n else below
     terms = terms if n or named else "upper convected Maxwell"
     text = f"Taken from {file.parent.name}: {law} ({terms}) with "
     text += counted(modes, "relaxation mode")

@@ -180,7 +180,7 @@ def test_a_loop_from_a_law_with_a_name_leaves_with_what_was_added_to_it(tmp_path
     assert content["named"] == {"law": "xpp", "constants": [XPP]}
     (term,) = content["terms"]
     assert term["term"] == "sigma.gammadot+gammadot.sigma"
-    assert "none beside xpp" in invoke("export", tmp_path, "--format", "rheotool").stderr
+    assert "cannot add terms to xpp" in invoke("export", tmp_path, "--format", "rheotool").stderr
     assert "<math" in result._repr_html_()
 
 

@@ -171,7 +171,7 @@ BY_HAND = {
     "unit of something else": ("time_Pa,shear_rate_1_s,stress_Pa\n0,1,1\n", "not a unit of time"),
     "capitals": ("Time_s,shear_rate_1_s,stress_Pa\n0,1,1\n", "case-sensitive"),
     "brackets": ("time [s],shear_rate_1_s,stress_Pa\n0,1,1\n", "Rename time [s] to time_s"),
-    "quote left open": (HEADER + '0,1,"1\n', "Mend the quotes"),
+    "quote left open": (HEADER + '0,1,"1\n', "Fix the quotes"),
     "one sample of strain": ("time_s,strain,stress_Pa\n0,1,1\n", "1 samples of strain"),
 }
 

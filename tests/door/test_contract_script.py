@@ -129,7 +129,7 @@ def test_an_estimator_from_a_file_is_compared_with_its_runs_at_hand(after):
         (lambda s: dc.compare([TBNNUDE()], s["test"]), "is not fitted"),
         (lambda s: dc.compare([], s["test"]), "got none"),
         (lambda s: dc.compare(["law.discover"], s["test"]), "got a str"),
-        (lambda s: dc.compare([s["sindy"]], s["base"]), "Give the data set that judges"),
+        (lambda s: dc.compare([s["sindy"]], s["base"]), "Give the data set that tests"),
         (lambda s: dc.compare([s["sindy"]], s["test"], quick=True), "fitted already"),
         (lambda s: dc.compare(s["data"], s["base"], gremlins=1), "unknown key"),
         (lambda s: dc.compare(s["data"], "ucm"), "must be a Fluid"),

@@ -367,7 +367,7 @@ def test_terms_are_added_to_a_law_with_a_name():
         np.testing.assert_allclose(module["extra_term"](stress, rate), wanted, rtol=1e-12)
         by_law = again.law().extra_term(jnp.asarray(stress), jnp.asarray(rate))
         np.testing.assert_allclose(by_law, wanted, rtol=1e-12)
-    with pytest.raises(InputError, match="none beside rolie_poly"):
+    with pytest.raises(InputError, match="cannot add terms to rolie_poly"):
         write_equation(again, "rheotool")
     assert "<msqrt>" in law_element(both.terms, True, both.named)
     assert "scalar" not in law_element(both.terms, True, both.named)

@@ -44,11 +44,11 @@ def test_a_name_that_one_flow_alone_tells_is_fitted_and_not_tested(repeated):
     runs = [run("once", 2.0, 0), *([run("again", 2.0, 1)] if repeated else [])]
     loop = looped(*runs)
     assert loop.verdict == "effects_added"
-    found, sure, following = loop_verdict(loop)
+    found, sure = loop_verdict(loop)
     assert found.startswith("Fitted, not tested")
     assert "there are as few flows as fitted constants" in sure
     assert "fitted to the noise" not in found
-    assert following
+    assert loop.answer.next_test
 
 
 def test_a_name_that_two_flows_tell_is_believed():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import discover as dc
 from discover.answer.simple_material import recognise
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
@@ -90,3 +91,19 @@ def test_a_loop_names_a_yield_stress_without_a_search():
     assert found.use["constants"]["yield_stress_Pa"]["unit"] == "Pa"
     assert "stress(rate)" in found.answer.written["python"]
     assert "Use in shear, 0.01–100 1/s" in found.answer.written["python"]
+
+
+def test_a_comparison_says_the_same_and_asks_no_learner(tmp_path):
+    data = Dataset("carbopol", (flow_curve(lambda r: 15.0 + 4.0 * r**0.5),))
+    lines = []
+    compared = dc.compare(data, tolerance=0.2, progress=lambda line, share: lines.append(line))
+    assert not any("search" in line for line in lines)
+    assert compared.answer.lines == dc.close_loop(data, tolerance=0.2).answer.lines
+    assert compared.answer.tolerance == 0.2
+    assert compared.adequate
+    assert compared.undetermined == ["N1", "N2"]
+    names = ["yield_stress_Pa", "consistency_Pa_sn", "flow_index"]
+    assert list(compared.summary().loc["answer"].index) == names
+    page = compared.to_html(tmp_path / "page.html").read_text("utf-8")
+    assert "Yield-stress fluid" in page
+    assert "Laws found" not in page

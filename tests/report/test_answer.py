@@ -35,20 +35,21 @@ MELT = Answer(
 
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
-        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7), "
-        "above the noise (0.25 %). Use in shear, 0.003–3 1/s."
+        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7) "
+        "plus 0.25 % noise. Fitted in shear, 0.003–3 1/s."
     )
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits to the noise (1 %)." in exact.headline
 
 
 @pytest.mark.parametrize(
-    ("asked", "adequate", "said"), [(0.05, False, "Misses"), (0.1, True, "Meets")]
+    ("asked", "adequate", "said"),
+    [(0.05, False, "5 %: missed for σ12; exceeded"), (0.1, True, "10 %: met for σ12.")],
 )
 def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
-    assert tolerance(answer).startswith(said)
+    assert tolerance(answer).startswith(f"Tolerance of {said}")
     assert ("a.csv (8 %)" in tolerance(answer)) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
     assert Answer("", instead="No signal.").adequate is None
@@ -71,7 +72,7 @@ def test_a_sum_of_terms_is_known_by_its_name():
 
 def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
     screen = answer_screen(MELT)
-    prose = [screen["headline"], *screen["lines"], screen["next_test"]]
+    prose = [screen["headline"], screen["quality"], *screen["lines"], screen["next_test"]]
     words = [one for one in " ".join(prose).split() if any(c.isalpha() for c in one)]
     assert len(words) <= 60
     page = render("answer.html", screen=screen)

@@ -129,7 +129,7 @@ def residual_in_steps(told, share=0.04):
 def test_steps_of_a_converter_are_told_where_they_may_be_all_that_is_left():
     text = str(likeness(*residual_in_steps(Giesekus(0.3, **SCALE))))
     assert "steps of 4 % of their largest value" in text
-    assert "100 % of what is left stands within half of one" in text
+    assert "100 % of the residual stands within half of one" in text
     assert "hide as much of a law" in text
 
 

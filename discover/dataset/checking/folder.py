@@ -178,8 +178,8 @@ def _tables(
         if sweep is not None:
             text = (
                 f"{SWEEP_FILE} is taken for a frequency sweep at small strain, {len(sweep)} "
-                "frequencies: it gives the modes, and is fitted or judges only if the study says "
-                "so."
+                "frequencies: used for the relaxation spectrum; not fitted unless the study asks "
+                "for it."
             )
             findings.append(Finding("note", "tables", SWEEP_FILE, text))
         findings += doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)

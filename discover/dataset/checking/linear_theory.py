@@ -233,11 +233,11 @@ def _shared_gain(
     why = (
         "a gain, such as another gap, radius, temperature or filling than in the sweep"
         if warned
-        else "no more than gap and filling leave open where nothing is wrong"
+        else "within the usual error of gap and filling"
     )
     text = (
         f"In {which} it, the stress at small strain is {np.exp(shared):.3g} times what "
-        f"{SWEEP_FILE} foretells: {why}. Correct it, or let the study fit it: [model] modes = "
+        f"{SWEEP_FILE} predicts: {why}. Correct it, or let the study fit it: [model] modes = "
         '"lve" with modulus_Pa = "fit".'
     )
     yield Finding("warning" if warned else "note", "gain", "", text)
@@ -258,7 +258,7 @@ def _unlike_gains(
     low, high = np.exp(np.min(gains)), np.exp(np.max(gains))
     text = (
         f"At small strain the runs stand at {low:.3g} to {high:.3g} times what {SWEEP_FILE} "
-        f"foretells, so they differ among themselves by {percent_of(spread)}, standard deviation, "
+        f"predicts, so they differ among themselves by {percent_of(spread)}, standard deviation, "
         "as fillings of one sample do. If each run is a loading of its own, say so in the study: "
         f"loading = {spread:.1g} in [loop] and in [compare]."
     )
@@ -274,8 +274,8 @@ def _small_strain(
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
         text = (
             f"At strains below {_LINEAR_STRAIN:g} the stress in {run.name} is {ratio:.2g} times "
-            f"what {SWEEP_FILE} foretells. Units, temperature, sample loading, a slow start or a "
-            "soft instrument do that; the closed loop can tell some of them apart."
+            f"what {SWEEP_FILE} predicts. Units, temperature, sample loading, a slow start or a "
+            "soft instrument do that; the closed loop can distinguish some of them."
         )
         yield Finding("warning", "linear", run.name, text)
 

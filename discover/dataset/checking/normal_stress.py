@@ -29,7 +29,7 @@ _AVERAGED, _STANDARD_ERRORS = 9, 4.0
 _NOTICEABLE = 0.005  # share of the largest N1; what is off by less matters to no fit
 _FEWEST_LEFT = 10
 # Second-order behaviour, N1 ∝ rate², holds below about this Weissenberg number, and of what it
-# foretells a modulus and a time that are off leave this factor open
+# predicts a modulus and a time that are off leave this factor open
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
 # Laun's rule is one of experience, and holds to some ten per cent where Cox's and Merz's does
 _COX_MERZ, _LAUN_FACTOR = 1.15, 2.0
@@ -141,7 +141,7 @@ def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
     least = np.where(
         early & (memory >= _MOSTLY_ELASTIC * most), memory / _ELASTIC_FACTOR, -0.5 * most
     )
-    # of the noise of N1, and of the stress in what it foretells
+    # of the noise of N1, and of the stress in what it predicts
     error = np.hypot(local_noise(run.time, normal), local_noise(run.time, stress) * strain)
     width = min(_AVERAGED, int(np.sum(early)))
     excess = np.maximum(
@@ -159,9 +159,13 @@ def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
     return _Fault(
         f"cannot be right early, up to {until:.4g} s (strain {strain[last]:.2g}): by more than "
         f"its noise it is negative, above {_ELASTIC_FACTOR:g} times stress × strain, the elastic "
-        "limit, or below half of what the stress foretells. The normal force lags, gives way or "
+        "limit, or below half of what the stress predicts. The normal force lags, gives way or "
         "has a baseline. "
-        + ("Nothing is left of it." if lasts else "These samples are neither fitted nor judge."),
+        + (
+            "Nothing is left of it."
+            if lasts
+            else "These samples are neither fitted nor used as a test."
+        ),
         np.inf if lasts else until,
     )
 
@@ -188,7 +192,7 @@ def _second_order(
     if 0 <= end <= _SECOND_ORDER_FACTOR * most:
         return None
     return (
-        f"ends at {end:.3g} Pa; at this slow rate the linear sweep foretells a value between 0 and "
+        f"ends at {end:.3g} Pa; at this slow rate the linear sweep predicts a value between 0 and "
         f"{most:.3g} Pa, quadratic in the rate. The normal force is below what the transducer "
         "resolves, or has a baseline."
     )

@@ -316,8 +316,8 @@ def _among_alike(start_ups: Sequence[Run]) -> Iterator[Finding]:
             large = f"{ratio:.2g} times too large"
             size = large if ratio > 1.0 else f"{1.0 / ratio:.2g} times too small"
             text = (
-                f"{what} in {run.name} is at least {size} for its shear rate, beside the other "
-                "start-ups. Check the units of its stress and time (kPa for Pa, ms for s)."
+                f"{what} in {run.name} is at least {size} for its shear rate, compared with the "
+                "other start-ups. Check the units of its stress and time (kPa for Pa, ms for s)."
             )
             yield Finding("warning", "units", run.name, text)
 

@@ -46,7 +46,7 @@ def doubts_of_start(
     if _only_falls(run):
         why = "it falls from there whatever the rate does, as after a step of strain"
     elif _steady_alternation(run):
-        why = "its first cycle is like the later ones, as where the oscillation had gone on before"
+        why = "its first cycle is like the later ones, as in the periodic steady state"
     elif sweep is not None and spectrum is not None and _more_than_linear(run, sweep, spectrum):
         why = "the linear sweep allows less than half of that so early"
     elif _strained_before(run):

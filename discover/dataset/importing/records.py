@@ -194,7 +194,7 @@ def _start(made: Record) -> None:
         return
     if goes_on(time, imposed, moved if made.kind == "creep" else stress):
         made.conditions["start"] = "periodic"
-        made.notes.append("its cycles repeat from the first sample on: it had gone on before")
+        made.notes.append("its cycles repeat from the first sample on: periodic steady state")
     else:
         made.notes.append("taken as an oscillation that starts from rest")
 

@@ -248,7 +248,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
             lines.append(first)
     except csv.Error as error:
         raise InputError(
-            f"{name} is not a comma-separated table: line {start} ({error}). Mend the quotes there."
+            f"{name} is not a comma-separated table: line {start} ({error}). Fix the quotes there."
         ) from None
     if ragged:
         raise InputError(why_ragged + _like_it(ragged))

@@ -56,7 +56,7 @@ EFFECT = ConvectiveConstraintRelease(
         r"\left[(1+\beta)\,\sigma + I\right]"
     ),
     source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
-    check="A steady shear stress that does not fall with rate; step strain after start-up.",
+    check="Measure steady shear at high rates: the stress should not fall with the rate.",
     visible="c of about 0.02 at a Weissenberg number of 1.",
     complexity=3,
     explicit_rate=True,

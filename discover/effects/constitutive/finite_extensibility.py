@@ -46,7 +46,7 @@ EFFECT = FiniteExtensibility(
         r"\mathrm{tr}\,\sigma\right](\sigma + I),\quad q = 1/L^2"
     ),
     source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213 (FENE-P)",
-    check="An extensional viscosity that levels off; no second normal stress difference.",
+    check="Measure uniaxial extension: the viscosity should level off; N2 should be zero.",
     visible="q of about 0.02 at a Weissenberg number of 1, less in faster flow.",
     complexity=2,
 )

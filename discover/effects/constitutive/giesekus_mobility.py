@@ -32,6 +32,6 @@ EFFECT = GiesekusMobility(
     ),
     equation=r"h \mathrel{+}= \alpha\,\sigma\cdot\sigma",
     source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
-    check="A second normal stress difference N2/N1 near −α/2 at low rates.",
+    check="Measure N2 at low rates: N2/N1 should be near −α/2.",
     visible="alpha of about 0.05 at a Weissenberg number of 1.",
 )

@@ -33,7 +33,7 @@ EFFECT = NonAffineMotion(
     ),
     equation=r"h \mathrel{+}= \tfrac{\xi}{2}(\sigma\cdot\dot\gamma + \dot\gamma\cdot\sigma)",
     source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
-    check="N2/N1 near −ξ/2 at all rates, and a stress that oscillates in fast start-up.",
+    check="Measure a fast start-up: the stress should oscillate; N2/N1 should be near −ξ/2.",
     visible="xi of about 0.05 at a Weissenberg number of 1.",
     explicit_rate=True,
 )

@@ -36,7 +36,7 @@ EFFECT = ExponentialNetworkLoss(
     ),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
-    check="An extensional viscosity with a maximum; no second normal stress difference.",
+    check="Measure uniaxial extension: the viscosity should pass a maximum; N2 should be zero.",
     visible="epsilon of about 0.03 at a Weissenberg number of 1.",
     complexity=2,
 )

@@ -33,6 +33,6 @@ EFFECT = LinearNetworkLoss(
     ),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
-    check="No second normal stress difference; a bounded extensional viscosity.",
+    check="Measure uniaxial extension: the viscosity should level off; N2 should be zero.",
     visible="epsilon of about 0.03 at a Weissenberg number of 1.",
 )

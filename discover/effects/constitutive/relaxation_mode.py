@@ -44,7 +44,7 @@ EFFECT = RelaxationMode(
         r" + h(\sigma_+) = \lambda_+\dot\gamma"
     ),
     source="Ferry 1980, Viscoelastic Properties of Polymers, ch. 1",
-    check="Small-amplitude oscillation around the angular frequency 1/lambda; stress relaxation.",
+    check="Measure small-amplitude oscillation around the angular frequency 1/λ.",
     visible="G lambda of about 5 % of the zero-shear viscosity.",
     complexity=2,
 )

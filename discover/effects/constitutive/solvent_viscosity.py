@@ -29,6 +29,6 @@ EFFECT = SolventViscosity(
     ),
     equation=r"\sigma \mathrel{+}= \eta_s\,\dot\gamma",
     source="Oldroyd 1950, Proc. R. Soc. A 200, 523",
-    check="A stress jump when the rate jumps; G'' linear in frequency at high frequency.",
+    check="Step the rate: the stress should jump at once; G'' should end linear in frequency.",
     visible="eta_s of about 5 % of the zero-shear viscosity; less where the rate changes fast.",
 )

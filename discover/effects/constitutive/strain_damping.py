@@ -41,7 +41,7 @@ EFFECT = StrainDamping(
     ),
     equation=r"h \mathrel{+}= n\,\lambda|\dot\gamma|\,(\sigma + I)",
     source="Wagner 1976, Rheol. Acta 15, 136; Wagner & Stephenson 1979, J. Rheol. 23, 489",
-    check="Relaxation after steps of strain: its curves differ by a factor e^{−nγ} alone.",
+    check="Step the strain: the relaxation curves should differ by a factor e^{−nγ} alone.",
     visible="n times the strain within a relaxation time of about 0.05.",
     explicit_rate=True,
 )

@@ -25,7 +25,7 @@ EFFECT = ThixotropicModulus(
     ),
     source="Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214; Dullaert & Mewis 2006, "
     "J. Non-Newtonian Fluid Mech. 139, 21",
-    check="Small oscillations after flow at several rates: the moduli grow while it rests.",
+    check="Oscillate gently after flow at several rates: the moduli should grow at rest.",
     visible="largest rate over the critical one, to the power n, of about 0.05, over t_b.",
     complexity=3,
 )

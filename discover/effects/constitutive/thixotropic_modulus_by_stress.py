@@ -25,7 +25,7 @@ EFFECT = ThixotropicModulusByStress(
     ),
     source="de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673; Mewis & Wagner 2009, Adv. "
     "Colloid Interface Sci. 147-148, 214",
-    check="Small oscillations after creep at several stresses: the moduli grow while it rests.",
+    check="Oscillate gently after creep at several stresses: the moduli should grow at rest.",
     visible="largest stress over the critical one, to the power n, of about 0.05, over t_b.",
     complexity=3,
 )

@@ -41,7 +41,7 @@ EFFECT = YieldStress(
         r"\quad \sigma_\mathrm{y} = Y\,G"
     ),
     source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
-    check="Creep below and above Y times the modulus; stress left after flow has stopped.",
+    check="Creep below and above Y times the modulus: only above it should flow go on.",
     visible="Y of about 5 % of the dimensionless stress.",
     complexity=2,
 )

@@ -39,7 +39,7 @@ class InASolver:
         """The same in one sentence."""
         flows = f"At Wi {self.weissenberg:.3g}, the edge of the box, in start-up and oscillation"
         if not np.isfinite(self.smallest_eigenvalue):
-            return f"{flows} of shear, mode {self.of_mode} runs away."
+            return f"{flows} of shear, mode {self.of_mode} diverges."
         lost = "" if self.smallest_eigenvalue > 0.0 else ", no conformation any more"
         smallest = f"{self.smallest_eigenvalue:.3g}{lost} (mode {self.of_mode})"
         step = f"{self.largest_step:.3g} s (mode {self.limiting_mode})"

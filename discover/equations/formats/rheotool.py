@@ -250,7 +250,9 @@ def _of_name(equation: Equation) -> RheoToolModel:
     if named.law not in _OF_NAME:
         raise _unknown([f"the law {named.law}"], "rheoTool has it not")
     if equation.terms:
-        raise _unknown([t.term for t in equation.terms], f"rheoTool has none beside {named.law}")
+        raise _unknown(
+            [t.term for t in equation.terms], f"rheoTool cannot add terms to {named.law}"
+        )
     kind, renamed, fixed, words = _OF_NAME[named.law]
     parameters = dict(fixed)
     for ours, value in named.constants[0].items():

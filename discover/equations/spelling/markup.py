@@ -52,10 +52,16 @@ def law_latex(
             n: value for n, value in term.inner.items() if letters.setdefault(n, value) != value
         }
         sign = "+" if term.coefficient >= 0 else "-"
-        text += f" {sign} {parse_term(term.term).spell(notation, abs(term.coefficient), other)}"
+        text += f" {sign} {parse_term(term.term).spell(notation, _factor(term), other)}"
     text += r" = \dot{\boldsymbol{\gamma}}"
     defined += [(notation.letter(n), latex_number(v, digits)) for n, v in letters.items()]
     return text + "".join(f"{SEPARATOR}{letter} = {value}" for letter, value in defined)
+
+
+def _factor(term: LawTerm) -> float | None:
+    """Return the size of a coefficient; None for one, which nobody writes."""
+    size = abs(term.coefficient)
+    return None if size == 1.0 else size
 
 
 def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
@@ -228,7 +234,7 @@ def law_element(
     relaxation = f"<mo>+</mo>{stress}" if linear_relaxation else ""
     extra = [
         _SIGN.format("+" if t.coefficient >= 0 else "−")
-        + parse_term(t.term).spell(notation, abs(t.coefficient), t.inner)
+        + parse_term(t.term).spell(notation, _factor(t), t.inner)
         for t in terms
     ]
     where = []

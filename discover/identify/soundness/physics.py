@@ -157,7 +157,7 @@ def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
     name = "conformation tensor positive definite"
     run, value = along.lowest(along.smallest_conformation)
     if run is None:
-        return PhysicsCheck(name, None, None, "", "The law runs away in every flow looked at.")
+        return PhysicsCheck(name, None, None, "", "The law diverges in every flow looked at.")
     passed = value > -_ROUNDING
     where = names[run]
     verb = "stays positive definite" if passed else "loses positive definiteness"
@@ -196,7 +196,7 @@ def _work(beyond: Cycles) -> PhysicsCheck:
     # at the Weissenberg number of training, which is the first
     usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
     if not usable:
-        return PhysicsCheck(name, None, None, "", "The law runs away in the oscillations tried.")
+        return PhysicsCheck(name, None, None, "", "The law diverges in the oscillations tried.")
     run, value = min(usable, key=lambda pair: pair[1])
     where = beyond.names[run]
     return PhysicsCheck(
@@ -349,7 +349,7 @@ def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
     failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
-        f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress runs away "
+        f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress diverges "
         f"first in {failed[0]} (training reached Wi = {plainly(weissenberg)}, "
         f"De = {plainly(deborah)})."
     )

@@ -8,15 +8,14 @@ from discover.equations.spelling.markup import PREAMBLE, law_latex
 from discover.learners.registry import learner_title
 from discover.plain_json import json_text
 from discover.report.answer_screen import answer_screen
+from discover.report.comparison.learners import learner_lines
 from discover.report.comparison.pictures import comparison_pictures
 from discover.report.comparison.sections import sections
-from discover.report.comparison.verdict import comparison_verdict
 from discover.report.overlay import Overlay
 from discover.report.page import made_by, render, safe_name
-from discover.report.parts import Missing, attempt
+from discover.report.parts import attempt
 from discover.report.plots.style import Picture
 from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
-from discover.report.wording import QUESTIONS
 from discover.study.run_folder import RunFolder
 
 
@@ -62,15 +61,13 @@ def write_comparison(
         ("comparison.json", "predictions.csv", "equations.tex", "figures/*.svg"),
         study_text,
     )
-    sentences = attempt("The verdict", lambda: comparison_verdict(comparison))
+    lines = attempt("What the learners found", lambda: learner_lines(comparison))
     page = render(
         "comparison.html",
         data={PREDICTIONS: predictions, "comparison.json": content},
         comparison=comparison,
         screen=answer_screen(comparison.answer),
-        questions=QUESTIONS,
-        sentences=[] if isinstance(sentences, Missing) else sentences,
-        lost=[sentences] if isinstance(sentences, Missing) else [],
+        learners=lines,
         pictures=pictures,
         sections=sections(comparison, run, linear_relaxation),
         training_pictures=training,

@@ -20,17 +20,17 @@ _STANDING = {
     "explained": "",
     "unexplained": "None of these laws describes the data to the noise. They are the best "
     "descriptions in their class.",
-    "no_signal": "The records hold no signal, so no law is reported.",
+    "no_signal": "The data hold no signal, so no law is reported.",
 }
 _CONDITION = {
-    True: "The intervals hold if the law is in the library, with what every sound instrument has a "
-    "little of fitted along.",
+    True: "The intervals hold if the law is in the library, with small instrument errors "
+    "fitted jointly.",
     False: "The intervals hold for this law alone, which is not the likeliest.",
 }
 _NO_TERM = {
     "explained": "No term: the known part alone explains the data.",
     "unexplained": "No term.",
-    "no_signal": "No term is reported: the records hold no signal.",
+    "no_signal": "No term is reported: the data hold no signal.",
 }
 
 
@@ -87,6 +87,8 @@ def sections(comparison: Comparison, run: Content, linear_relaxation: bool) -> l
     """Return the sections between the pictures and how it was learned, without the empty ones."""
     drawn = []
     for anchor, heading, link, parts in _outline(comparison, linear_relaxation):
+        if anchor == "law" and not comparison.outcomes:  # a simple material asks no learner
+            continue
         shown = [part.draw(comparison, run) for part in parts]
         kept = tuple(part for part in shown if part is not None)
         if kept:
@@ -196,10 +198,10 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         ),
         (
             "open",
-            "What these data do not determine",
-            "What stays open",
+            "Not determined",
+            "Not determined",
             [
-                Part("What stays open", "statements", dict),
+                Part("What is not determined", "statements", dict),
                 Part("The table of rivals", "rivals", rivals),
             ],
         ),

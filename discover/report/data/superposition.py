@@ -53,9 +53,7 @@ def superposition_words(
         )
     if found.apart:
         degrees = ", ".join(f"{t:g}" for t in found.apart)
-        said.append(
-            f"The tests at {degrees} °C are not moved: nothing of their kind is beside them."
-        )
+        said.append(f"The tests at {degrees} °C are not moved: no test of their kind to compare.")
     return [*said, *(_law_words(law, found) for law in found.laws)]
 
 

@@ -21,7 +21,7 @@ from discover.report.plots.loop.rivals import rivals_picture
 from discover.report.plots.loop.runs import runs_picture
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
-from discover.report.wording import QUESTIONS, SMALL_FAULTS
+from discover.report.wording import SMALL_FAULTS
 from discover.study.run_folder import RunFolder
 
 
@@ -78,11 +78,11 @@ def write_loop(
     page = render(
         "loop.html",
         data={PREDICTIONS: predictions, "loop.json": content},
-        name=f"{name}, {conditions}" if conditions else name,
+        name=name,
+        conditions=conditions,
         summary=summary,
         result=result,
         screen=answer_screen(result.answer),
-        questions=QUESTIONS,
         sentences=loop_verdict(result),
         error_rows=tables.error_rows(result)
         + [tables.overlay_row(result, one) for one in overlays],
@@ -96,7 +96,6 @@ def write_loop(
         declared_effects=tables.declared_effects(result),
         rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
         folds=[tables.fold_row(fold) for fold in result.folds],
-        is_unexplained=result.verdict == "unexplained",
         law=tables.law(result),
         remaining=tables.remaining_rows(result),
         loadings=tables.loadings(result),

@@ -12,7 +12,7 @@ from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import CandidateScore, Fold, Stage
-from discover.report.loop.found import KINDS, named
+from discover.report.loop.verdict import KINDS, named
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay
 from discover.report.page import safe_name

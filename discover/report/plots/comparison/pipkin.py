@@ -48,7 +48,7 @@ def error_map_picture(comparison: Comparison) -> Picture | None:
             drawing,
             "pipkin_error",
             "Pipkin map of error: relative L2 error in one late cycle of γ̇ = Wi cos(De t), N₂'s "
-            "relative to N₁; a dash where the law runs away. Open circles: flows whose σ₁₂ the "
+            "relative to N₁; a dash where the law diverges. Open circles: flows whose σ₁₂ the "
             "learners saw. Away from them a law is an extrapolation.",
         )
 

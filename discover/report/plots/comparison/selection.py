@@ -93,7 +93,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
                 [100.0 * row["with_twins"] for row in rows],
                 color=GREEN,
                 alpha=0.35,
-                label="term or a twin",
+                label="term or an equivalent one",
             )
             bars.barh(
                 [readable(row["term"]) for row in rows],
@@ -110,7 +110,7 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             drawing,
             "selection",
             "The best law of each size: its misfit, and its BIC above the lowest (linear below "
-            "10). A gap: a law that runs away in a run left out. Right: how often each term is "
+            "10). A gap: a law that diverges in a run left out. Right: how often each term is "
             "chosen when half of the data are looked at; the line marks what counts as stable. A "
             "pale bar beyond the full one: terms of identical signature take each other's place.",
         )

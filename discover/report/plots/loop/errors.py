@@ -93,7 +93,7 @@ def ranking_picture(result: LoopResult) -> Picture | None:
             drawing,
             "ranking",
             "What each candidate would explain of the squared residual of the fitted runs, to "
-            "first order and beside what is fitted already; in green the one that was added. "
+            "first order, given what is fitted already; in green the one that was added. "
             "Evidence chooses among sets of effects, so it need not be the longest bar.",
         )
 

@@ -41,5 +41,5 @@ def next_test_picture(result: LoopResult) -> Picture | None:
             drawing,
             "next_test",
             f"What to measure next: {best.title}. Each explanation as it predicts it, all of which "
-            f"fit the records at hand; noise is {percent(following.noise)}.",
+            f"fit these data; noise is {percent(following.noise)}.",
         )

@@ -72,8 +72,7 @@ def residual_picture(result: LoopResult) -> Picture:
             + ("what was varied and what was measured" if only_states else "time and strain")
             + "."
             + " Note the different scales above and below." * (len(models) > 1)
-            + " What is left should look like noise around zero; anything else is an effect still "
-            "missing.",
+            + " It should look like noise around zero; anything else is a missing effect.",
             switched=tuple(record.name for record in records),
         )
 
@@ -103,7 +102,7 @@ def reading_picture(result: LoopResult) -> Picture | None:
         legend_above(drawing, axes)
         caption = (
             "Left: how much of the squared residual the runs share when drawn against each "
-            "coordinate, judged run by run from the others. Right of it: the error of each run."
+            "coordinate, each run predicted from the others. Right of it: the error of each run."
         )
         if waves:
             caption += (

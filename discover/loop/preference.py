@@ -1,0 +1,98 @@
+"""Which law heads the answer where none is all there is: one with a name, if it predicts as well.
+
+Fitted runs that are left out in turn say by how much each law misses a run that it did not see. A
+sum of effects that the field has no name for leads laws with a name only where it misses less than
+they do by more than so few runs can scatter.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import logsumexp
+
+from discover.answer.naming import named_law
+from discover.equations import Equation, law_parts
+from discover.errors import InputError
+from discover.inference.engine import Posterior
+from discover.inference.engine.discrepancy import Discrepancy
+from discover.inference.engine.fits import Fit
+from discover.inference.engine.left_out import FEWEST_RUNS, left_out
+from discover.inference.engine.posterior import smallest
+from discover.linear_algebra_threads import in_one_thread
+from discover.loop.final_model import augmented_fluid, states_of
+from discover.statistics.projection import rms
+
+_MOST = 8
+"""Laws with a name, the likeliest, that are fitted without each run."""
+
+_AS_WELL = float(np.log(0.05))
+"""Log of odds against the best down to which runs left out do not exclude a law."""
+
+Misses = Float[np.ndarray, "laws runs"]
+
+
+@in_one_thread
+def with_named_law_first(posterior: Posterior) -> Posterior:
+    """Return the posterior with a law of the field ahead, where it predicts runs left out as well.
+
+    Probabilities and the verdict stay. The discrepancy is that of the law that comes first. Where
+    none predicts as well, the best of them stands in `memory["named"]`, with what it misses.
+    """
+    fitter = posterior.search.fitter
+    few = len(posterior.problem.fitted.runs) < FEWEST_RUNS
+    if posterior.verdict != "unexplained" or posterior.left is None or few:
+        return posterior
+    known = posterior.by_left_out or ((posterior.left.fit, 1.0),)
+    if law_of(posterior, known[0][0]):
+        return posterior
+    leading = [fit for fit, _ in known]
+    named = [fit for fit in posterior.search.alive() if law_of(posterior, fit)][:_MOST]
+    some = [*leading, *(fit for fit in named if fit not in leading)]
+    asked = [fit for fit in some if "missed" not in fit.memory]
+    for fit, missed in zip(asked, left_out(fitter, asked), strict=True):
+        fit.memory["missed"] = missed
+    weights = weights_of(np.array([fit.memory["missed"] for fit in some]))
+    at = first_of(weights, [fit in named for fit in some])
+    if some[at] not in named:
+        if named:
+            best = max(named, key=lambda fit: weights[some.index(fit)])
+            posterior.memory["named"] = law_of(posterior, best), rms(posterior.missed(best))
+        return posterior
+    chosen = some[at]
+    order = [at, *(i for i in np.argsort(-weights, kind="stable") if i != at)]
+    return replace(
+        posterior,
+        left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
+        by_left_out=tuple((some[i], float(weights[i])) for i in order),
+    )
+
+
+def weights_of(missed: Misses) -> Float[np.ndarray, " laws"]:
+    """Return how far to rely on each law by runs left out, as `by_left_out` weighs them."""
+    logs = -0.5 * missed.shape[1] * np.log(np.maximum(np.sum(missed**2, axis=1), 1e-300))
+    return np.exp(logs - logsumexp(logs))
+
+
+def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
+    """Return the best law with a name, where the best of all does not exclude it; else the best."""
+    best = int(np.argmax(weights))
+    own = np.where(named, weights, 0.0)
+    at = int(np.argmax(own))
+    return at if own[at] > 0.0 and np.log(own[at] / weights[best]) >= _AS_WELL else best
+
+
+def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
+    """Return the law of the field that the fluid of a hypothesis is, with its constants."""
+    model = posterior.problem.model
+    present = [*fit.names, *(known.name for known in model.declared.effects)]
+    fluid = augmented_fluid(model, fit.theta, present)
+    if states_of(model, fit.theta, present) != ():
+        return None
+    try:
+        named, terms = law_parts(fluid.law)
+    except InputError:
+        return None
+    relaxes = fluid.law.linear_relaxation
+    return named_law(Equation(terms, linear_relaxation=relaxes, named=named))
