@@ -12,6 +12,7 @@ loadings the intervals of the factors too.
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from independent import (
@@ -106,7 +107,8 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
 
     del folder
     kind, what, *size, draw = name.split(" ")
-    options, factors = {}, {}
+    options: dict[str, Any] = {}
+    factors: dict[str, float] = {}
     if kind == "loading":
         data, factors = drawn(exact(what), seed + int(draw))
         options = {"loading": DIFFER}

@@ -146,10 +146,6 @@ def of_loop(row: dict, fluid: Fluid, loop) -> None:
         for name in true.keys() - {*stage.left_open}:
             found = stage.parameters[name]
             _constant(row, name, true[name], found.value, found.ci95, claimed)
-        for one in stage.told_together if true else ():
-            first, second = (true[name] for name in one.constants)
-            value = first / second if one.is_ratio else first * second
-            _constant(row, one.name, value, one.value, one.ci95, claimed)
         (*_, last) = stage.parameters.values()
         pairs = zip(fluid.by_mode.get(stage.effect, ()), getattr(last, "modes", ()), strict=False)
         for value, one in pairs:

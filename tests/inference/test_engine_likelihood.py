@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
 import discover as dc
-from discover.inference.engine.noise import Noise, NoiseModel
+from discover.inference.engine.noise import LEAST, Noise, NoiseModel
 from discover.inference.engine.posterior import quantiles
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
@@ -81,6 +81,17 @@ def test_the_correlation_of_noise_is_told_from_its_residual(correlation, about):
     assert noise.correlation == about
     # of 400 samples a deviation is told to 3.5 %, of as many as 100 independent ones to 7 %
     np.testing.assert_allclose(noise.sizes, [0.01, 0.03], rtol=0.2)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-5])
+def test_what_lies_below_the_floor_is_neither_correlated_nor_in_proportion(size):
+    lot = np.random.default_rng(4)
+    rows = rows_of((400, 400), lot)
+    smooth = size * rows.size * np.sin(3.0 * rows.time)  # as an integration errs
+    _, noise = NoiseModel(rows).log_likelihood(smooth, rows.recorded)
+    assert (noise.correlation, noise.share) == (0.0, 0.0)
+    # the size is that of the floor, to which a thirtieth of it adds nothing
+    np.testing.assert_allclose(noise.sizes, LEAST, rtol=1e-2)
 
 
 def test_a_run_left_out_says_nothing(rows):

@@ -116,8 +116,10 @@ def test_runs_of_one_loading_have_the_same_answer_with_wider_intervals(exact):
 
 
 @pytest.mark.slow
-def test_without_loadings_such_runs_are_unexplained(exact):
-    loop = closed(data_of(exact, FACTORS), effects=EFFECTS[:1], max_effects=1)
+def test_without_loadings_runs_far_apart_are_unexplained(exact):
+    # runs of a sound bench differ by half a per cent: 9 % are out of the question
+    far = {run: 1.0 + 3.0 * (factor - 1.0) for run, factor in FACTORS.items()}
+    loop = closed(data_of(exact, far), effects=EFFECTS[:1], max_effects=1)
     assert loop.verdict == "unexplained"
     assert "loading" not in loop.remaining
 

@@ -8,7 +8,7 @@ from discover.answer.simple_material import recognise
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
 from discover.loop import run_loop
-from discover.protocols import start_up, steady_rates
+from discover.protocols import oscillatory_shear, start_up, steady_rates
 
 RATES = np.geomspace(0.01, 100.0, 25)
 FREQUENCIES = np.geomspace(0.1, 100.0, 25)
@@ -107,3 +107,44 @@ def test_a_comparison_says_the_same_and_asks_no_learner(tmp_path):
     page = compared.to_html(tmp_path / "page.html").read_text("utf-8")
     assert "Yield-stress fluid" in page
     assert "Laws found" not in page
+
+
+def oscillations(stress, noise):
+    """Return two oscillations, of which the stress is a function of time, rate and amplitude."""
+    times, runs = np.linspace(0.0, 12.0, 60), []
+    for amplitude in (0.5, 5.0):
+        rate = amplitude * np.cos(times)
+        values = stress(times, rate, amplitude)
+        lot = np.random.default_rng(int(10 * amplitude))
+        values = values + noise * np.sqrt(np.mean(values**2)) * lot.standard_normal(60)
+        flow = oscillatory_shear(amplitude, 1.0)
+        runs.append(Run(f"{amplitude:g}", times, flow, rate, values))
+    return Dataset("oscillations", tuple(runs))
+
+
+def thinned(times, rate, amplitude):
+    del times, amplitude
+    return (0.1 + 4.9 * (1.0 + (0.8 * np.abs(rate)) ** 2.0) ** (-0.3)) * rate
+
+
+def maxwell(times, rate, amplitude):
+    """Return σ12 of one mode of 5 Pa and 1 s from rest under γ̇0 cos t, by hand."""
+    del rate
+    return 2.5 * amplitude * (np.cos(times) + np.sin(times) - np.exp(-times))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize(
+    ("stress", "law"),
+    [(lambda t, rate, a: 3.0 * rate, "newtonian"), (thinned, "carreau_yasuda"), (maxwell, None)],
+)
+def test_a_fluid_without_elasticity_is_named_where_effects_are_listed(stress, law, noise):
+    declared = DeclaredModel.named(
+        "ucm", {}, [1.0], [1.0], free=["modulus_Pa", "relaxation_time_s"]
+    )
+    found = run_loop(oscillations(stress, noise), declared, effects=["solvent_viscosity"])
+    assert found.verdict != "unexplained"
+    assert (found.material.law if found.material else None) == law
+    if law == "newtonian":
+        # the gain of a sound bench is known to 1 %
+        assert found.use["constants"]["viscosity_Pa_s"]["value"] == pytest.approx(3.0, rel=0.03)

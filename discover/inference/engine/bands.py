@@ -98,7 +98,12 @@ class Predictions:
         shared[:, 0] = linear[:, 0]
         shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]
         alone = slice(1, 1 + each * len(self.rows.runs))
-        apart = np.sum((linear[:, alone] * self.fitter.widths[alone]) ** 2, axis=1)
+        # zero, drift and loading of another run are as large as those of the fitted runs
+        assert fit.covariance is not None
+        at = slice(1, 1 + each * runs)
+        own_variance = np.diag(fit.covariance)[len(fit.priors) :][at]
+        seen = np.mean((fit.linear[at] ** 2 + own_variance).reshape(each, runs), axis=1)
+        apart = linear[:, alone] ** 2 @ np.repeat(seen, len(self.rows.runs))
         found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
         fit.memory["jacobian"] = found
         return found
