@@ -15,6 +15,7 @@ from discover.simulate import simulate
 
 MODULI, TIMES = np.array([50.0, 120.0, 30.0, 10.0]), np.array([3.0, 0.5, 0.05, 0.01])
 DECLARED = DeclaredModel.maxwell(MODULI, TIMES)
+IN_SOLVENT = DeclaredModel.maxwell(MODULI, TIMES, solvent_viscosity=5.0)
 AMPLITUDES = {"giesekus_mobility": 0.3, "instrument_inertia": 2.0, "tool_compliance": 1e-4}
 
 
@@ -32,7 +33,7 @@ FEW = [record("short", start_up(2.0), 1.0, 12)]
 
 
 def model_of():
-    model = AugmentedModel(DECLARED, [*map(make_effect, AMPLITUDES)])
+    model = AugmentedModel(IN_SOLVENT, [*map(make_effect, AMPLITUDES)])
     theta = model.zero()
     for name, value in AMPLITUDES.items():
         theta[model.positions(name)[0]] = value

@@ -111,8 +111,9 @@ def integrate(
     _, (stress, compliance_rate) = jax.lax.fori_loop(0, steps, taken, begin)
     felt = rate[::2]
     if series is not None:
-        # constant in each step; at its ends the mean of both sides
-        inside = 0.5 * (compliance_rate[1:] + compliance_rate[:-1])
+        # constant in each step; at its ends the mean of both sides, behind the last one its own
+        before, after = compliance_rate[:-1], compliance_rate[1:]
+        inside = 0.5 * (before + jnp.where(jnp.arange(1, len(width)) < steps, after, before))
         felt = felt + jnp.concatenate([compliance_rate[:1], inside, compliance_rate[-1:]])
     return jnp.concatenate([jnp.zeros(1), stress]), felt
 

@@ -389,7 +389,8 @@ class Kernel(Code):
         # at a step's end the mean of both sides; it is still the rate taken that `felt` holds
         at = w.at((run, ends), (number, 1), (1, 1))
         taken = w.load("felt", at)
-        is_last = builder.icmp_signed("==", w.at((number, 1), (1, 1)), steps)
+        # behind the last step that is taken nothing is known
+        is_last = builder.icmp_signed("==", w.at((number, 1), (1, 1)), w.load("last", run))
         following = w.load(
             "felt", w.at((at, 1), (builder.select(is_last, INTEGER(0), INTEGER(1)), 1))
         )
