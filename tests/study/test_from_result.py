@@ -120,7 +120,7 @@ def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(t
     core, terms = found.law.split()
     assert type(core).__name__ == "RoliePoly"
     assert [share.term for share in terms] == ["sigma.sigma"]
-    assert "1 term beside Rolie–Poly" in found.source
+    assert "1 term added to Rolie–Poly" in found.source
     assert forward_model(found).free_positions == []
 
 
