@@ -12,14 +12,8 @@ def first_order_lag(
 ) -> Float[Array, " n"]:
     """Return y with τ y' + y = x, y = 0 at the first time; exact for x linear between times.
 
-    Parameters
-    ----------
-    times
-        In s, increasing.
-    values
-        x at those times.
-    time_constant
-        τ in s; at zero, y = x (also at the first time).
+    `times` in s, increasing. `values`: x at those times. `time_constant`: τ in s; at zero, y = x
+    (also at the first time).
     """
     active = time_constant > 0.0
     safe = jnp.where(active, time_constant, 1.0)

@@ -66,10 +66,7 @@ def simplest_terms(beside: Container[str] = ()) -> list[LibraryTerm]:
 def library_effects(degree: int = 1) -> tuple[LibraryTerm, ...]:
     """Return every term of the tensor library up to a degree that no named effect covers.
 
-    Parameters
-    ----------
-    degree
-        Highest degree of the invariant multipliers.
+    `degree`: highest degree of the invariant multipliers.
     """
     terms = build_library(degree=degree).terms
     return tuple(library_term(term) for term in terms if term.name not in _NAMED)

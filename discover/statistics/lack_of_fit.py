@@ -43,40 +43,24 @@ _PATTERN_OF_SHORT = (
 class LackOfFit:
     """What a model leaves of the records that it was fitted to.
 
-    Attributes
-    ----------
-    verdict
-        ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if the
-        records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
-    misfit
-        Root-mean-square residual over rms measurement, mean over runs.
-    noise
-        Relative noise of the records, mean over runs.
-    lag_one_correlation
-        Of neighbouring residuals, mean over runs.
-    probability
-        Of residuals as structured as these, if they are noise; None where all runs together are
-        too short to look for a pattern.
-    outliers
-        Number of samples that are far outside the noise and do not vote.
-    outlier_samples
-        Which these are, of each run.
-    reason
-        The verdict in one sentence.
-    expected
-        Relative error that noise and the error of the linear data explain together.
-    pattern
-        What speaks against noise where `probability` is small, in words.
-    changing
-        Relative size of what changes from sample to sample; None where the noise is given.
-    rest
-        Of a model that explains the records: what is left, as a predicate.
-    likeness
-        Of one that does not: what of the instrument's what is left looks like, as a clause; empty
-        where it looks like nothing that has a word.
-    advice
-        Of one that something else refutes, or leaves what looks like something: what to do about
-        that, as a clause.
+    `verdict`: ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if
+        the records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
+    `misfit`: root-mean-square residual over rms measurement, mean over runs.
+    `noise`: relative noise of the records, mean over runs.
+    `lag_one_correlation`: of neighbouring residuals, mean over runs.
+    `probability`: of residuals as structured as these, if they are noise; None where all runs
+        together are too short to look for a pattern.
+    `outliers`: number of samples that are far outside the noise and do not vote.
+    `outlier_samples`: which these are, of each run.
+    `reason`: the verdict in one sentence.
+    `expected`: relative error that noise and the error of the linear data explain together.
+    `pattern`: what speaks against noise where `probability` is small, in words.
+    `changing`: relative size of what changes from sample to sample; None where the noise is given.
+    `rest`: of a model that explains the records: what is left, as a predicate.
+    `likeness`: of one that does not: what of the instrument's what is left looks like, as a clause;
+        empty where it looks like nothing that has a word.
+    `advice`: of one that something else refutes, or leaves what looks like something: what to do
+        about that, as a clause.
     """
 
     verdict: FitVerdict
@@ -136,21 +120,11 @@ def lack_of_fit(
 
     Samples that are outliers (`stray`) are counted and left out.
 
-    Parameters
-    ----------
-    residuals
-        Prediction minus measurement of each fitted run, in any unit.
-    measured
-        The measurements, in the same unit.
-    expectation
-        What a complete model may leave; by default noise of unknown size.
-    rates
-        What was imposed, at the samples; with them a record that never follows it is told.
-    even
-        By what records and residuals are multiplied so that their noise has one size; by default
-        by nothing.
-    intervals
-        As in `what_is_left`.
+    `residuals`: prediction minus measurement of each fitted run, in any unit. `measured`: the
+    measurements, in the same unit. `expectation`: what a complete model may leave; by default noise
+    of unknown size. `rates`: what was imposed, at the samples; with them a record that never
+    follows it is told. `even`: by what records and residuals are multiplied so that their noise has
+    one size; by default by nothing.
     """
     factors = [np.ones(len(record)) for record in measured] if even is None else even
     residuals, records = (
@@ -173,14 +147,10 @@ def what_is_left(
 ) -> LackOfFit:
     """Return the same of records that are known to hold a signal; see `lack_of_fit`.
 
-    Parameters
-    ----------
-    residuals, measured, expectation
-        As there.
-    intervals
-        Time between neighbouring samples of each run, by which the correlations of their noise are
-        held against one another (`same_correlation_probability`); not a number of what is recorded
-        otherwise. Without them they are not.
+    `residuals`, `measured`, `expectation`: as there. `intervals`: time between neighbouring samples
+    of each run, by which the correlations of their noise are held against one another
+    (`same_correlation_probability`); not a number of what is recorded otherwise. Without them they
+    are not.
     """
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)

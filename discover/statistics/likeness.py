@@ -38,10 +38,8 @@ def likeness(
 
     That is no finding: a law that errs by less than a step, or at random, looks the same.
 
-    Parameters
-    ----------
-    residuals, measured
-        Prediction minus measurement of each run, and the measurement, in one unit.
+    `residuals`, `measured`: prediction minus measurement of each run, and the measurement, in one
+    unit.
     """
     steps = [step_of_converter(np.asarray(record)) for record in measured]
     if steps and all(steps):

@@ -15,18 +15,10 @@ from discover.statistics.noise.covariance import least_squares_covariance
 class Told:
     """Half of the 95 % interval of one number over its size, by the tests that were fitted.
 
-    Attributes
-    ----------
-    name
-        What the number is.
-    together
-        By all tests.
-    alone
-        By the tests of each kind, if there had been no others.
-    without
-        By all others than those of each kind.
-
-    From one on, a half-width is infinite: the tests do not determine the number.
+    `name`: what the number is.
+    `together`: by all tests.
+    `alone`: by the tests of each kind, if there had been no others.
+    `without`: by all others than those of each kind.
     """
 
     name: str
@@ -50,12 +42,8 @@ class Told:
 class Sized:
     """Numbers that follow from the parameters, to first order.
 
-    Attributes
-    ----------
-    name
-        What they are.
-    slopes
-        Their derivatives in each parameter over their root-mean-square, shape (n, p).
+    `name`: what they are.
+    `slopes`: their derivatives in each parameter over their root-mean-square, shape (n, p).
     """
 
     name: str
@@ -77,14 +65,8 @@ def told_by_tests(
     records of each kind show. So a half-width says what the tests of a kind would leave of a law
     that is known to be this one.
 
-    Parameters
-    ----------
-    columns, residual, sequences, shared, sizes
-        As `least_squares_covariance` takes them.
-    kinds
-        The kind of test of each sequence.
-    numbers
-        Constants and predictions to judge.
+    `columns`, `residual`, `sequences`, `shared`, `sizes`: as `least_squares_covariance` takes them.
+    `kinds`: the kind of test of each sequence. `numbers`: constants and predictions to judge.
     """
     different = list(dict.fromkeys(kinds))
     if len(different) < 2 or not columns.shape[1]:

@@ -9,10 +9,7 @@ _FEWEST_VALUES = 5  # that all of fewer are multiples of something may be chance
 def step_of_converter(values: Float[np.ndarray, " n"]) -> float:
     """Return the step of which all numbers are multiples, of which most occur again; 0 if none.
 
-    Parameters
-    ----------
-    values
-        Of a record, in any unit.
+    `values`: of a record, in any unit.
     """
     levels = np.unique(values)
     if not _FEWEST_VALUES <= len(levels) <= len(values) // 2:

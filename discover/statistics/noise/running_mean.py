@@ -38,10 +38,8 @@ def averaged_over(rows: Sequence[Float[np.ndarray, " _"]]) -> int | None:
     first-order correlation and a smooth misfit, whose size each row has of its own, by Whittle's
     likelihood in the cosine transform   [Whittle 1953, Ark. Mat. 2, 423].
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in any unit; those of fewer than 48 samples say nothing.
+    `rows`: residuals of each run, in order, in any unit; those of fewer than 48 samples say
+    nothing.
     """
     long = [np.asarray(row, dtype=float) for row in rows if len(row) >= 2 * FEWEST_TESTED]
     long = [row for row in long if np.any(row)]

@@ -37,10 +37,7 @@ def smooth_misfit_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma distribution is
     put through the gains drawn. Always the same lots are drawn.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in any unit.
+    `rows`: residuals of each run, in order, in any unit.
     """
     gain, rho = _gain([row[None] for row in rows])
     if gain[0] < _PLAIN:

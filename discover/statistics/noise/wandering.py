@@ -28,10 +28,7 @@ def wandering(rows: Sequence[Float[np.ndarray, " _"]]) -> float | None:
     [Whittle 1953, Ark. Mat. 2, 423]. The walk must be likelier by a factor of e² along whole rows
     and without their first third too, since what a wrong start leaves falls off like a walk.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in a unit in which runs compare.
+    `rows`: residuals of each run, in order, in a unit in which runs compare.
     """
     long = [np.asarray(row, dtype=float) for row in rows if len(row) >= 2 * FEWEST_TESTED]
     long = [row for row in long if np.any(row)]
