@@ -19,18 +19,9 @@ def write_folder(
 ) -> Path:
     """Write ``runs.csv`` and one CSV a run; return the folder.
 
-    Parameters
-    ----------
-    folder
-        Where; made if need be.
-    runs
-        By file name.
-    metadata
-        Columns of ``runs.csv`` by run; an empty cell where a run has none.
-    normal_stresses
-        Whether N1 and N2 are written, where a record has them.
-    digits
-        Significant digits.
+    `folder`: where; made if need be. `runs`: by file name. `metadata`: columns of ``runs.csv`` by
+    run; an empty cell where a run has none. `normal_stresses`: whether N1 and N2 are written, where
+    a record has them. `digits`: significant digits.
     """
     folder.mkdir(parents=True, exist_ok=True)
     metadata = metadata or {}
@@ -57,14 +48,7 @@ def with_noise(
 ) -> dict[str, Recording]:
     """Return the runs with white noise of a share of each one's root-mean-square stress.
 
-    Parameters
-    ----------
-    runs
-        By file name.
-    noise
-        The share.
-    generator
-        Of the noise, drawn run by run.
+    `runs`: by file name. `noise`: the share. `generator`: of the noise, drawn run by run.
     """
     return {
         name: replace(
@@ -111,10 +95,7 @@ def write_study(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Path:
 def toml(value: Any) -> str:
     """Return a value as TOML spells it.
 
-    Raises
-    ------
-    TypeError
-        If TOML has no such value here.
+    Raises TypeError if TOML has no such value here.
     """
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -50,14 +50,8 @@ def material(
 ) -> RateLaw:
     """Return the independent material of a law with a name.
 
-    Parameters
-    ----------
-    law
-        As studies spell it.
-    constants
-        By the names of studies; times are over the relaxation time.
-    modulus, relaxation_time
-        In Pa and s.
+    `law`: as studies spell it. `constants`: by the names of studies; times are over the relaxation
+    time. `modulus`, `relaxation_time` in Pa and s.
     """
     scale = {"modulus": modulus, "relaxation_time": relaxation_time}
     c, time = constants, relaxation_time

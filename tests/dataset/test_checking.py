@@ -298,10 +298,6 @@ def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
         assert ("sampling" in subjects(check_folder(folder(table)))) is doubted
 
 
-def test_a_folder_without_flow_is_an_error(folder):
-    assert "signal" in subjects(check_folder(folder(start_up(0.0))), "error")
-
-
 def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
     def check(root, *options):
         return CliRunner().invoke(app, ["data", "check", str(root), *options])

@@ -79,10 +79,7 @@ def test_what_says_nothing_is_found():
     def vague(values: "Float[np.ndarray, ' n']"):  # noqa: F821
         """Return nothing.
 
-        Parameters
-        ----------
-        values
-            Some values.
+        `values`: some values.
         """
 
     assert silent_about(mute) == ["first", "second", "third"]
