@@ -1,7 +1,6 @@
 """Data folders and study files, written by hand: text alone, none of the software under test."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -41,23 +40,6 @@ def write_folder(
         write_table(folder / name, columns, digits)
     (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return folder
-
-
-def with_noise(
-    runs: Mapping[str, Recording], noise: float, generator: np.random.Generator
-) -> dict[str, Recording]:
-    """Return the runs with white noise of a share of each one's root-mean-square stress.
-
-    `runs`: by file name. `noise`: the share. `generator`: of the noise, drawn run by run.
-    """
-    return {
-        name: replace(
-            run,
-            stress=run.stress
-            + noise * np.sqrt(np.mean(run.stress**2)) * generator.standard_normal(run.stress.size),
-        )
-        for name, run in runs.items()
-    }
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray | None], digits: int = 9) -> None:

@@ -4,7 +4,6 @@ Friction and inertia follow the rate of the tool; slip and compliance come betwe
 fluid, so that with them the fluid feels another rate than the tool has.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -299,19 +298,3 @@ FLOWS = {
 def as_it_is(run: Recording, flow: Flow) -> np.ndarray:
     """Return the stress as it is recorded."""
     return run.stress
-
-
-def curve_records(
-    material: Material,
-    instrument: Instrument | None = None,
-    read: Callable[[Recording, Flow], np.ndarray] = as_it_is,
-    seed: int = 0,
-) -> dict[str, Recording]:
-    """Return runs of 120 samples with white noise, of which `read` makes the stress in a flow."""
-    generator, runs = np.random.default_rng(seed), {}
-    for name, (flow, end) in FLOWS.items():
-        run = (instrument or Instrument()).record(material, flow, np.linspace(0.02, end, 120))
-        stress = read(run, flow)
-        size = NOISE * np.sqrt(np.mean(stress**2))
-        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
-    return runs

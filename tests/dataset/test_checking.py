@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from made_exports import csv
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -36,11 +37,6 @@ def sweep_table():
         "Gp_Pa": MODULUS * x**2 / (1 + x**2),
         "Gpp_Pa": MODULUS * x / (1 + x**2),
     }
-
-
-def csv(table):
-    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
 
 
 @pytest.fixture
