@@ -79,7 +79,10 @@ def test_what_says_nothing_is_found():
     def vague(values: "Float[np.ndarray, ' n']"):  # noqa: F821
         """Return nothing.
 
-        `values`: some values.
+        Parameters
+        ----------
+        values
+            Some values.
         """
 
     assert silent_about(mute) == ["first", "second", "third"]
