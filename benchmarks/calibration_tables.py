@@ -36,14 +36,8 @@ def is_right(members: Sequence[Sequence[str]], effects: Sequence[Sequence[str]] 
 def calibration_error(said: np.ndarray, so: np.ndarray, bins: int = 10) -> tuple[float, list[str]]:
     """Return the expected calibration error, and the lines of a reliability diagram.
 
-    Parameters
-    ----------
-    said
-        Probabilities, shape (n,).
-    so
-        Whether each was so, shape (n,).
-    bins
-        Of equal width.
+    `said`: probabilities, shape (n,). `so`: whether each was so, shape (n,). `bins`: of equal
+    width.
     """
     place = np.minimum((said * bins).astype(int), bins - 1)
     error, lines = 0.0, []

@@ -125,25 +125,16 @@ def bound(text: str) -> Callable:
 class Case:
     """One data set, what is declared of it, and what is true.
 
-    Attributes
-    ----------
-    truth
-        In words.
-    records, noise, tables, export
-        Make the runs without noise, put it on what is observed, make tables beside them, and say
-        what becomes of the runs once they have their noise.
-    planted
-        Effects that are there, with constants that are known.
-    same_as
-        Names that are no falsehood: they come to the same here, or describe the same thing.
-    terms
-        Of the library, that are all that is missing; None where the library does not hold it.
-    outside, fluid
-        Whether no effect describes what is there, and whether there is a fluid.
-    model, compare_model, loop, compare, told
-        Sections of the studies; `compare` is False where no comparison is asked.
-    exact_tables
-        Whether tables have no noise.
+    `truth` in words.
+    `records`, `noise`, `tables`, `export`: make the runs without noise, put it on what is observed,
+        make tables beside them, and say what becomes of the runs once they have their noise.
+    `planted`: effects that are there, with constants that are known.
+    `same_as`: names that are no falsehood: they come to the same here, or describe the same thing.
+    `terms`: of the library, that are all that is missing; None where the library does not hold it.
+    `outside`, `fluid`: whether no effect describes what is there, and whether there is a fluid.
+    `model`, `compare_model`, `loop`, `compare`, `told`: sections of the studies; `compare` is False
+        where no comparison is asked.
+    `exact_tables`: whether tables have no noise.
     """
 
     truth: str

@@ -21,14 +21,9 @@ FOLDER, STUDY, COMPARISON, RESULTS, EXPORTS = (
 class Case:
     """One call of the command line, or of Python, on a malformed input.
 
-    Attributes
-    ----------
-    call
-        Words after ``discover``, or a function of nothing.
-    names
-        Words of which the message must hold one: files, folders, keys, options.
-    nonsense
-        What in it no sane program takes without a word.
+    `call`: words after ``discover``, or a function of nothing.
+    `names`: words of which the message must hold one: files, folders, keys, options.
+    `nonsense`: what in it no sane program takes without a word.
     """
 
     call: list[str] | Callable[[], object]

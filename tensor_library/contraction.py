@@ -16,12 +16,8 @@ def contracted(
 ) -> Float[Array, "..."]:
     """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
 
-    Parameters
-    ----------
-    first, second
-        The last axis of the one and the first of the other are as long.
-    in_one_piece
-        Whether no product of matrices is to stand in the loop.
+    `first`, `second`: the last axis of the one and the first of the other are as long.
+    `in_one_piece`: whether no product of matrices is to stand in the loop.
     """
     if not in_one_piece:
         return jnp.tensordot(first, second, axes=1)

@@ -34,22 +34,14 @@ def scalars(*names: str) -> Any:
 class IsotropicFunction:
     """h = Σ gₙ Tₙ(σ, γ̇), with each gₙ an expression in the invariants and in constants.
 
-    Attributes
-    ----------
-    coefficients
-        gₙ by the name of the tensor in `TENSOR_NAMES`, SymPy expressions over `scalars`.
-    where
-        Scalars defined on the way, in order, each over what stands before it.
-    letters
-        LaTeX of those constants and scalars whose names are no letters.
-    rates
-        Of each structure variable of the law by its name, in the order of the law's state: its rate
-        of change over 1/λ, over `scalars`, the variables and what is defined on the way.
+    `coefficients`: gₙ by the name of the tensor in `TENSOR_NAMES`, SymPy expressions over
+        `scalars`.
+    `where`: scalars defined on the way, in order, each over what stands before it.
+    `letters`: LaTeX of those constants and scalars whose names are no letters.
+    `rates`: of each structure variable of the law by its name, in the order of the law's state: its
+        rate of change over 1/λ, over `scalars`, the variables and what is defined on the way.
 
-    Raises
-    ------
-    ValueError
-        If there is no such tensor, or a name is none that a program could have.
+    Raises ValueError if there is no such tensor, or a name is none that a program could have.
 
     Examples
     --------
@@ -87,13 +79,8 @@ class IsotropicFunction:
     ) -> tuple[list[tuple[str, T]], list[T]]:
         """Return what is defined on the way, by name, and the summands of h, in a notation.
 
-        Parameters
-        ----------
-        notation
-            How to write it.
-        letters
-            How the constants, the structure variables and the scalars defined on the way are
-            written.
+        `notation`: how to write it. `letters`: how the constants, the structure variables and the
+        scalars defined on the way are written.
         """
         known = _with_invariants(notation, letters)
         defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]

@@ -76,20 +76,9 @@ def printed(
 ) -> tuple[str, bool]:
     """Return an expression as a printer of SymPy writes it, with given texts for its symbols.
 
-    Parameters
-    ----------
-    expression
-        Over symbols.
-    letters
-        What stands for them, by their names.
-    printer
-        Takes an expression and returns text.
-    placeholder
-        How the printer writes a symbol, with ``{}`` for its name.
-
-    Returns
-    -------
-    The text, and whether it needs brackets to be a factor.
+    `expression`: over symbols. `letters`: what stands for them, by their names. `printer`: takes an
+    expression and returns text. `placeholder`: how the printer writes a symbol, with ``{}`` for its
+    name. Returns the text, and whether it needs brackets to be a factor.
     """
     import sympy
 

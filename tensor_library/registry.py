@@ -21,14 +21,8 @@ class ExtensionWarning(UserWarning):
 class Registry(MutableMapping[str, T]):
     """Things of one kind by name, in the order in which they became known.
 
-    Parameters
-    ----------
-    kind
-        What they are, in the singular, for messages.
-    group
-        Group of entry points that bring more of them, such as ``"discover.laws"``.
-    built_in
-        Makes those that are always there.
+    `kind`: what they are, in the singular, for messages. `group`: group of entry points that bring
+    more of them, such as ``"discover.laws"``. `built_in`: makes those that are always there.
     """
 
     def __init__(self, kind: str, group: str, built_in: Callable[[], Mapping[str, T]]):

@@ -17,16 +17,11 @@ _UNIT = {"shear": np.eye(3, k=1) * [[1], [0], [0]], "uniaxial": np.diag([1.0, -0
 class Flow:
     """A homogeneous flow from rest at t = 0, of rate `amplitude` · cos(`frequency` · t).
 
-    Attributes
-    ----------
-    name
-        Of the flow.
-    amplitude, frequency
-        Of the shear rate, or of the Hencky rate, in 1/s and rad/s; frequency 0 is a start-up.
-    times
-        Sampling times in s, shape (n,), from 0 on.
-    kind
-        Simple shear or uniaxial extension.
+    `name`: of the flow.
+    `amplitude`, `frequency`: of the shear rate, or of the Hencky rate, in 1/s and rad/s; frequency
+        0 is a start-up.
+    `times`: sampling times in s, shape (n,), from 0 on.
+    `kind`: simple shear or uniaxial extension.
     """
 
     name: str
@@ -48,15 +43,10 @@ class Flow:
 class Record:
     """One training run in shear.
 
-    Attributes
-    ----------
-    flow
-        What was imposed.
-    sigma12
-        Shear stress in Pa, shape (n,), with noise.
-    stress
-        The stress tensor in Pa, shape (n, 3, 3), with noise; only for a contestant that says that
-        it sees it, None for the others.
+    `flow`: what was imposed.
+    `sigma12`: shear stress in Pa, shape (n,), with noise.
+    `stress`: the stress tensor in Pa, shape (n, 3, 3), with noise; only for a contestant that says
+        that it sees it, None for the others.
     """
 
     flow: Flow
@@ -78,17 +68,12 @@ class Training:
 class Answer:
     """What a contestant makes of the records.
 
-    Attributes
-    ----------
-    predict
-        From a flow to what is predicted in it, each of shape (n,) in Pa: ``sigma12``, ``N1`` and
-        ``N2`` in shear, ``tensile`` (σ11 − σ22) in extension. A quantity that it says nothing of is
-        left out; it raises ArithmeticError, or returns values that are not finite, where its
+    `predict`: from a flow to what is predicted in it, each of shape (n,) in Pa: ``sigma12``, ``N1``
+        and ``N2`` in shear, ``tensile`` (σ11 − σ22) in extension. A quantity that it says nothing
+        of is left out; it raises ArithmeticError, or returns values that are not finite, where its
         equation runs away.
-    law
-        One of `LAW_NAMES`, or None if it names none.
-    words
-        The equation, as short as it can be said.
+    `law`: one of `LAW_NAMES`, or None if it names none.
+    `words`: the equation, as short as it can be said.
     """
 
     predict: Callable[[Flow], Mapping[str, np.ndarray]]

@@ -49,12 +49,8 @@ def worst_errors(answer: Answer, fluid: str) -> dict[str, float | None]:
 def tables(results: Mapping[tuple[str, str], dict], titles: Mapping[str, str]) -> str:
     """Return the table of all contestants and one of each by fluid, as Markdown.
 
-    Parameters
-    ----------
-    results
-        By contestant and fluid.
-    titles
-        Of the contestants by file name, in the order of the lines.
+    `results`: by contestant and fluid. `titles`: of the contestants by file name, in the order of
+    the lines.
     """
     lines = [
         "| | " + " | ".join(QUANTITIES.values()) + " | right | wrong | seconds |",

@@ -14,10 +14,7 @@ TensorLaw = Callable[[np.ndarray, np.ndarray], np.ndarray]
 def predict(law: TensorLaw, training: Training, flow: Flow, rtol: float = 1e-6) -> dict:
     """Return the stresses of a law in a flow from rest, in Pa.
 
-    Raises
-    ------
-    ArithmeticError
-        If its stress runs away.
+    Raises ArithmeticError if its stress runs away.
     """
     unit = training.relaxation_time
 

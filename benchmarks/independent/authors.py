@@ -89,14 +89,9 @@ def stress(law, constants, gradient, times, relaxation_time=1.0):
 class ByAuthors(RateLaw):
     """A▽ = f(A, λL)/λ, σ = G (A − I), times Cohen's spring where chains end.
 
-    Attributes
-    ----------
-    law
-        One of the functions of `authors`.
-    constants
-        Of the law, by name.
-    modulus, relaxation_time
-        In Pa and s.
+    `law`: one of the functions of `authors`.
+    `constants`: of the law, by name.
+    `modulus`, `relaxation_time` in Pa and s.
     """
 
     law: Callable[..., np.ndarray]

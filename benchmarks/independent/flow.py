@@ -13,13 +13,9 @@ Function = Callable[[ArrayLike], np.ndarray]
 class Flow:
     """Simple shear from rest at t = 0.
 
-    Attributes
-    ----------
-    rate, strain
-        γ̇ in 1/s and γ = ∫γ̇ dt since t = 0, of time in s; both take arrays. At a jump the rate is
-        that after it.
-    jumps
-        Times at which the rate jumps, in s.
+    `rate`, `strain`: γ̇ in 1/s and γ = ∫γ̇ dt since t = 0, of time in s; both take arrays. At a
+        jump the rate is that after it.
+    `jumps`: times at which the rate jumps, in s.
     """
 
     rate: Function

@@ -1,7 +1,6 @@
 """Data folders and study files, written by hand: text alone, none of the software under test."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +18,9 @@ def write_folder(
 ) -> Path:
     """Write ``runs.csv`` and one CSV a run; return the folder.
 
-    Parameters
-    ----------
-    folder
-        Where; made if need be.
-    runs
-        By file name.
-    metadata
-        Columns of ``runs.csv`` by run; an empty cell where a run has none.
-    normal_stresses
-        Whether N1 and N2 are written, where a record has them.
-    digits
-        Significant digits.
+    `folder`: where; made if need be. `runs`: by file name. `metadata`: columns of ``runs.csv`` by
+    run; an empty cell where a run has none. `normal_stresses`: whether N1 and N2 are written, where
+    a record has them. `digits`: significant digits.
     """
     folder.mkdir(parents=True, exist_ok=True)
     metadata = metadata or {}
@@ -50,30 +40,6 @@ def write_folder(
         write_table(folder / name, columns, digits)
     (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return folder
-
-
-def with_noise(
-    runs: Mapping[str, Recording], noise: float, generator: np.random.Generator
-) -> dict[str, Recording]:
-    """Return the runs with white noise of a share of each one's root-mean-square stress.
-
-    Parameters
-    ----------
-    runs
-        By file name.
-    noise
-        The share.
-    generator
-        Of the noise, drawn run by run.
-    """
-    return {
-        name: replace(
-            run,
-            stress=run.stress
-            + noise * np.sqrt(np.mean(run.stress**2)) * generator.standard_normal(run.stress.size),
-        )
-        for name, run in runs.items()
-    }
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray | None], digits: int = 9) -> None:
@@ -111,10 +77,7 @@ def write_study(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Path:
 def toml(value: Any) -> str:
     """Return a value as TOML spells it.
 
-    Raises
-    ------
-    TypeError
-        If TOML has no such value here.
+    Raises TypeError if TOML has no such value here.
     """
     if isinstance(value, bool):
         return "true" if value else "false"

@@ -22,14 +22,9 @@ UNIT = {
 class GiesekusFluid:
     """Giesekus modes with one mobility, and a solvent   [Giesekus 1982, JNNFM 11, 69].
 
-    Attributes
-    ----------
-    modulus, relaxation_time
-        Of each mode, in Pa and s.
-    mobility
-        α of every mode; 0 is upper convected Maxwell.
-    solvent_viscosity
-        In Pa s.
+    `modulus`, `relaxation_time`: of each mode, in Pa and s.
+    `mobility`: α of every mode; 0 is upper convected Maxwell.
+    `solvent_viscosity` in Pa s.
     """
 
     modulus: tuple[float, ...]
@@ -59,16 +54,8 @@ class GiesekusFluid:
     ) -> np.ndarray:
         """Return the extra stress in Pa, shape (n, 3, 3).
 
-        Parameters
-        ----------
-        kind
-            One of `UNIT`.
-        rate
-            In 1/s, of time in s.
-        times
-            Increasing, after `begins`, when the fluid is at rest.
-        jumps
-            Times at which the rate jumps.
+        `kind`: one of `UNIT`. `rate` in 1/s, of time in s. `times`: increasing, after `begins`,
+        when the fluid is at rest. `jumps`: times at which the rate jumps.
         """
         modes = len(self.modulus)
 

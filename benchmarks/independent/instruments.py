@@ -4,7 +4,6 @@ Friction and inertia follow the rate of the tool; slip and compliance come betwe
 fluid, so that with them the fluid feels another rate than the tool has.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -20,18 +19,11 @@ _STEP = 1e-6  # of a finite difference, relative
 class Recording:
     """One run as a rheometer hands it out.
 
-    Attributes
-    ----------
-    time, rate, stress
-        In s, 1/s (commanded) and Pa, shape (n,).
-    true
-        What the fluid did: stresses at the same times, without the faults of the record.
-    felt_rate, tool_rate
-        Rate of the fluid and of the tool, in 1/s.
-    N1, N2
-        Recorded normal stress differences in Pa, or None.
-    strain
-        Recorded strain, or None.
+    `time`, `rate`, `stress` in s, 1/s (commanded) and Pa, shape (n,).
+    `true`: what the fluid did: stresses at the same times, without the faults of the record.
+    `felt_rate`, `tool_rate`: rate of the fluid and of the tool, in 1/s.
+    `N1`, `N2`: recorded normal stress differences in Pa, or None.
+    `strain`: recorded strain, or None.
     """
 
     time: np.ndarray
@@ -49,41 +41,26 @@ class Recording:
 class Instrument:
     """Faults of a rheometer; by default it has none.
 
-    Attributes
-    ----------
-    slip
-        s in 1/(Pa s): γ̇_felt = γ̇_tool − s σ   [Yoshimura & Prud'homme 1988, J. Rheol. 32, 53].
-    slip_power
-        γ̇_felt = γ̇_tool − s |σ|^(m−1) σ instead, with m this; slip then in 1/(Pa^m s)
+    `slip`: s in 1/(Pa s): γ̇_felt = γ̇_tool − s σ [Yoshimura & Prud'homme 1988, J. Rheol. 32, 53].
+    `slip_power`: γ̇_felt = γ̇_tool − s |σ|^(m−1) σ instead, with m this; slip then in 1/(Pa^m s)
         [Hatzikiriakos & Dealy 1991, J. Rheol. 35, 497].
-    compliance
-        C in 1/Pa: γ_felt = γ_tool − C σ   [Gottlieb & Macosko 1982, Rheol. Acta 21, 90].
-    rise_time
-        τ in s: τ γ̇_tool' + γ̇_tool = γ̇_commanded, from rest.
-    inertia
-        I in Pa s²: I dγ̇_tool/dt is recorded with the stress   [Krieger 1990, J. Rheol. 34, 471].
-    friction
-        In Pa: friction · sign(γ̇_tool) is recorded with the stress.
-    rate_gain
-        γ̇_tool is 1 + this times the command.
-    gain, offset, drift
-        Of the stress: relative, Pa, Pa/s.
-    settling_time
-        In s: the drift dies out, so that drift · τ (1 − exp(−t/τ)) is recorded with the stress.
-    lag, delay
-        Of the stress, first-order and pure, in s.
-    resonance, damping
-        ω in rad/s and ζ of a transducer of second order, y''/ω² + 2 ζ y'/ω + y = stress.
-    adc_step
-        Smallest step of the recorded stress, in Pa; 0: none.
-    limit
-        Largest stress that is recorded, in Pa, of either sign: a saturated transducer.
-    fastest
-        Largest rate that the motor reaches, in 1/s: a clipped range.
-    clock_slip
-        Recorded time is 1 + this times the true one.
-    dead
-        The transducer records the offset alone.
+    `compliance`: C in 1/Pa: γ_felt = γ_tool − C σ [Gottlieb & Macosko 1982, Rheol. Acta 21, 90].
+    `rise_time`: τ in s: τ γ̇_tool' + γ̇_tool = γ̇_commanded, from rest.
+    `inertia`: I in Pa s²: I dγ̇_tool/dt is recorded with the stress [Krieger 1990, J. Rheol. 34,
+        471].
+    `friction` in Pa: friction · sign(γ̇_tool) is recorded with the stress.
+    `rate_gain`: γ̇_tool is 1 + this times the command.
+    `gain`, `offset`, `drift`: of the stress: relative, Pa, Pa/s.
+    `settling_time` in s: the drift dies out, so that drift · τ (1 − exp(−t/τ)) is recorded with the
+        stress.
+    `lag`, `delay`: of the stress, first-order and pure, in s.
+    `resonance`, `damping`: ω in rad/s and ζ of a transducer of second order, y''/ω² + 2 ζ y'/ω + y
+        = stress.
+    `adc_step`: smallest step of the recorded stress, in Pa; 0: none.
+    `limit`: largest stress that is recorded, in Pa, of either sign: a saturated transducer.
+    `fastest`: largest rate that the motor reaches, in 1/s: a clipped range.
+    `clock_slip`: recorded time is 1 + this times the true one.
+    `dead`: the transducer records the offset alone.
     """
 
     slip: float = 0.0
@@ -110,10 +87,7 @@ class Instrument:
     def record(self, material: Material, flow: Flow, times: np.ndarray) -> Recording:
         """Return the record of a material in a commanded flow from rest.
 
-        Raises
-        ------
-        ValueError
-            If slip or compliance are asked for a material that is no rate law.
+        Raises ValueError if slip or compliance are asked for a material that is no rate law.
         """
         times = np.asarray(times, float)
         told = self._told(flow)
@@ -324,19 +298,3 @@ FLOWS = {
 def as_it_is(run: Recording, flow: Flow) -> np.ndarray:
     """Return the stress as it is recorded."""
     return run.stress
-
-
-def curve_records(
-    material: Material,
-    instrument: Instrument | None = None,
-    read: Callable[[Recording, Flow], np.ndarray] = as_it_is,
-    seed: int = 0,
-) -> dict[str, Recording]:
-    """Return runs of 120 samples with white noise, of which `read` makes the stress in a flow."""
-    generator, runs = np.random.default_rng(seed), {}
-    for name, (flow, end) in FLOWS.items():
-        run = (instrument or Instrument()).record(material, flow, np.linspace(0.02, end, 120))
-        stress = read(run, flow)
-        size = NOISE * np.sqrt(np.mean(stress**2))
-        runs[name] = replace(run, stress=stress + size * generator.standard_normal(stress.size))
-    return runs

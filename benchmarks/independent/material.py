@@ -90,10 +90,7 @@ def integrate(
 ) -> np.ndarray:
     """Return the states at the times, shape (n, m), from a start at t = 0.
 
-    Raises
-    ------
-    ValueError
-        If the integrator gives up: the state runs away.
+    Raises ValueError if the integrator gives up: the state runs away.
     """
     from scipy.integrate import solve_ivp
 

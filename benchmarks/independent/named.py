@@ -50,14 +50,8 @@ def material(
 ) -> RateLaw:
     """Return the independent material of a law with a name.
 
-    Parameters
-    ----------
-    law
-        As studies spell it.
-    constants
-        By the names of studies; times are over the relaxation time.
-    modulus, relaxation_time
-        In Pa and s.
+    `law`: as studies spell it. `constants`: by the names of studies; times are over the relaxation
+    time. `modulus`, `relaxation_time` in Pa and s.
     """
     scale = {"modulus": modulus, "relaxation_time": relaxation_time}
     c, time = constants, relaxation_time
@@ -86,17 +80,3 @@ def material(
     if law.startswith("ptt_"):
         return PhanThienTanner(c["epsilon"], kind, c.get("xi", 0.0), **scale)
     return ByAuthors(getattr(authors, law), dict(c), **scale)
-
-
-def linear_modes(
-    law: str, constants: Mapping[str, float], modulus: float = 1.0, relaxation_time: float = 1.0
-) -> tuple[list[float], list[float]]:
-    """Return moduli in Pa and relaxation times in s of the law at small strain."""
-    if law != "rolie_poly_blend":
-        return [modulus], [relaxation_time]
-    # each pair of lengths relaxes at the mean of their rates
-    phi, short = constants["long_fraction"], constants["short_time_ratio"]
-    between = 2.0 / (1.0 + 1.0 / short)
-    shares = [phi**2, 2 * phi * (1 - phi), (1 - phi) ** 2]
-    times = [1.0, between, short]
-    return [modulus * one for one in shares], [relaxation_time * one for one in times]

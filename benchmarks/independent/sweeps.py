@@ -32,12 +32,8 @@ def first_harmonic(times: np.ndarray, stress: np.ndarray, frequency: float) -> c
 def modulus_of(law: RateLaw, strain: float, frequency: float, cycles: int) -> complex:
     """Return G′ + iG″ in Pa of a law after so many cycles of a strain γ₀ sin ωt.
 
-    Parameters
-    ----------
-    law
-        Of the modes.
-    strain, frequency, cycles
-        γ₀, ω in rad/s, and how many cycles are waited for.
+    `law`: of the modes. `strain`, `frequency`, `cycles`: γ₀, ω in rad/s, and how many cycles are
+    waited for.
     """
     scale = law.scale()
 
@@ -64,14 +60,8 @@ def giesekus_modulus(
 ) -> complex:
     """Return G′ + iG″ in Pa of a Giesekus fluid   [Giesekus 1982, JNNFM 11, 69].
 
-    Parameters
-    ----------
-    mobility, modulus, relaxation_time
-        α, G in Pa and λ in s.
-    strain, frequency
-        Of the tool: γ₀ sin ωt.
-    slip
-        In 1/(Pa s): the fluid feels the rate less this times its stress.
+    `mobility`, `modulus`, `relaxation_time`: α, G in Pa and λ in s. `strain`, `frequency`: of the
+    tool: γ₀ sin ωt. `slip` in 1/(Pa s): the fluid feels the rate less this times its stress.
     """
 
     def change(t, y):
@@ -98,17 +88,9 @@ def strain_at(
 ) -> np.ndarray:
     """Return the strain at times in s, of levels of stress that begin at times of their own.
 
-    Parameters
-    ----------
-    law
-        Of the modes.
-    levels
-        Pairs of the time in s from which, and of the stress in Pa, a number or a function of
-        time; the first from 0.
-    solvent_viscosity
-        In Pa s, positive: by it the rate follows from what of the stress the modes do not carry.
-    times
-        Increasing, in s.
+    `law`: of the modes. `levels`: pairs of the time in s from which, and of the stress in Pa, a
+    number or a function of time; the first from 0. `solvent_viscosity` in Pa s, positive: by it the
+    rate follows from what of the stress the modes do not carry. `times`: increasing, in s.
     """
     scale = np.append(law.scale(), 1.0)
     state = np.append(law.rest(), 0.0)

@@ -204,16 +204,11 @@ NOISES: dict[str, Callable[[np.ndarray, np.random.Generator], np.ndarray]] = {
 class World:
     """One experiment.
 
-    Attributes
-    ----------
-    law, flaw, protocol, noise
-        In words; the flaw is ``"sound"`` if the instrument has none.
-    material, instrument
-        What makes the records.
-    effects
-        For each effect that is there, the names that are right; None if one of them has no name.
-    constants
-        Of effects that are there, by name of effect and parameter.
+    `law`, `flaw`, `protocol`, `noise` in words; the flaw is ``"sound"`` if the instrument has none.
+    `material`, `instrument`: what makes the records.
+    `effects`: for each effect that is there, the names that are right; None if one of them has no
+        name.
+    `constants`: of effects that are there, by name of effect and parameter.
     """
 
     law: str

@@ -93,25 +93,11 @@ def run_compare(
 ) -> TaskResult:
     """Run both learners of a study and write the comparison report.
 
-    Parameters
-    ----------
-    out
-        Folder for the results; goes on there if it holds unfinished ones.
-    seed
-        Overrides the study's seeds.
-    overwrite
-        Start afresh.
-    progress
-        Called with what is going on and the fraction done.
-    note
-        Called with the study once it was read.
-    tolerance
-        Overrides the relative discrepancy that the study calls good enough.
-
-    Raises
-    ------
-    InputError
-        If the study, its data or the folder is wrong.
+    `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides the
+    study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and the
+    fraction done. `note`: called with the study once it was read. `tolerance`: overrides the
+    relative discrepancy that the study calls good enough. Raises InputError if the study, its data
+    or the folder is wrong.
     """
     study, folder, there = _begin("compare", path, out, seed, overwrite, note, tolerance)
     if there is not None:

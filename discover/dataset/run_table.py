@@ -42,12 +42,6 @@ def run_line(run: Run) -> dict[str, Any]:
     }
 
 
-def kind_of_record(run: Run) -> str:
-    """Return the kind of test and, of a normal stress difference, which one was recorded."""
-    kind = run_line(run)["flow"]
-    return f"{kind}, {run.quantity}" if run.quantity in ("N1", "N2") else kind
-
-
 def _flow(run: Run) -> str:
     if run.protocol.control == "steady":
         return "flow curve"

@@ -12,6 +12,7 @@ from discover.effects.base import (
     SeriesElement,
     SignalEffect,
     StateEffect,
+    WrittenState,
 )
 from discover.effects.known import KnownEffect, known_effects
 from discover.effects.library_term import (
@@ -26,7 +27,6 @@ from discover.effects.registry import (
     make_effect,
     named_effects,
 )
-from discover.effects.written_state import WrittenState
 
 __all__ = [
     "AbstractEffect",

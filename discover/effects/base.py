@@ -3,14 +3,31 @@
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import jax.numpy as jnp
 from jaxtyping import Array, Complex, Float
 
-from discover.effects.written_state import WrittenState
 from tensor_library.algebra import Symmetric
 from tensor_library.law_terms import LawTerm
+
+
+@dataclass(frozen=True)
+class WrittenState:
+    """A state as SymPy expressions over `tensor_library.isotropic_function.scalars`.
+
+    The scalars are the names of the effect's parameters and of its levels, ``shear_rate`` and
+    ``shear_stress``: the size of the rate √(½ γ̇:γ̇) in 1/s, and the stress in Pa of a shear of that
+    size that does the same work.
+
+    `rates`: of change of each level, in 1/s, in their order.
+    `modulus_factor`, `time_factor`: on the stress and on the relaxation time of every mode.
+    """
+
+    rates: tuple[Any, ...]
+    modulus_factor: Any = 1
+    time_factor: Any = 1
+
 
 Kind = Literal["constitutive", "kinematic", "signal"]
 
@@ -38,31 +55,22 @@ class EffectParameter:
     A value outside of the range is not fitted, and one that a fit drives to the end of it is no
     finding: what the data ask for is then another effect.
 
-    Attributes
-    ----------
-    name
-        Name in JSON and reports.
-    symbol
-        LaTeX.
-    unit
-        SI unit; empty for a pure number.
-    low, high
-        Physical range, in the unit or, where `range_scale` names one, in a property of the data.
-    range_source
-        Where the range comes from: literature, or the argument in a sentence.
-    range_scale
-        Data property in which `low` and `high` are measured; ``one`` where they are in `unit`.
-    ends
-        Those of `low` and `high` that something real can have, such as no recovery at all.
-    scale
-        Data property in which `first_trial` is measured.
-    first_trial
-        Size of the first trial value, in that scale; for an inner parameter its starting value.
-    endless
-        Of a time: what the effect cannot be told from where no record lasts as long; empty if its
-        name says nothing of that time.
-    absent
-        Of a constant that may be `low`: what the effect is there, where its name says otherwise.
+    `name`: name in JSON and reports.
+    `symbol`: LaTeX.
+    `unit`: SI unit; empty for a pure number.
+    `low`, `high`: physical range, in the unit or, where `range_scale` names one, in a property of
+        the data.
+    `range_source`: where the range comes from: literature, or the argument in a sentence.
+    `range_scale`: data property in which `low` and `high` are measured; ``one`` where they are in
+        `unit`.
+    `ends`: those of `low` and `high` that something real can have, such as no recovery at all.
+    `scale`: data property in which `first_trial` is measured.
+    `first_trial`: size of the first trial value, in that scale; for an inner parameter its starting
+        value.
+    `endless`: of a time: what the effect cannot be told from where no record lasts as long; empty
+        if its name says nothing of that time.
+    `absent`: of a constant that may be `low`: what the effect is there, where its name says
+        otherwise.
     """
 
     name: str
@@ -83,23 +91,14 @@ class EffectParameter:
 class AbstractEffect(ABC):
     """An effect. Its first parameter is the amplitude: at zero it changes nothing.
 
-    Attributes
-    ----------
-    name
-        Name in studies, JSON and reports.
-    parameters
-        The amplitude first, then any inner parameters.
-    equation
-        LaTeX of what the effect adds or changes.
-    source
-        Literature.
-    check
-        What a user should do in the laboratory to confirm it.
-    visible
-        Size from which it shows, in words: the amplitude that changes the stress by about 5 % in
-        a flow that it affects.
-    complexity
-        Used to prefer the simpler of two explanations that the data cannot separate.
+    `name`: name in studies, JSON and reports.
+    `parameters`: the amplitude first, then any inner parameters.
+    `equation`: LaTeX of what the effect adds or changes.
+    `source`: literature.
+    `check`: what a user should do in the laboratory to confirm it.
+    `visible`: size from which it shows, in words: the amplitude that changes the stress by about 5
+        % in a flow that it affects.
+    `complexity`: used to prefer the simpler of two explanations that the data cannot separate.
     """
 
     name: str
@@ -121,12 +120,9 @@ class AbstractEffect(ABC):
 class ConstitutiveEffect(AbstractEffect):
     """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes.
 
-    Attributes
-    ----------
-    explicit_rate
-        Whether the term names the rate of deformation. Such laws can lose their well-posedness in
-        fast deformation, which laws with an upper convected derivative and a term in the stress
-        alone keep   [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58, 25].
+    `explicit_rate`: whether the term names the rate of deformation. Such laws can lose their
+        well-posedness in fast deformation, which laws with an upper convected derivative and a term
+        in the stress alone keep [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58, 25].
     """
 
     explicit_rate: bool = False
@@ -140,12 +136,8 @@ class ConstitutiveEffect(AbstractEffect):
     def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
         """Return what the effect adds to h, dimensionless, for one mode.
 
-        Parameters
-        ----------
-        values
-            Parameters in their order.
-        stress, rate
-            σ_k/G_k and λ_k γ̇, both (3, 3) or both (4,).
+        `values`: parameters in their order. `stress`, `rate`: σ_k/G_k and λ_k γ̇, both (3, 3) or
+        both (4,).
         """
         del values, rate
         return jnp.zeros_like(stress)
@@ -199,12 +191,7 @@ class StateEffect(ConstitutiveEffect):
     ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
         """Return source and decay in 1/s.
 
-        Parameters
-        ----------
-        values
-            Parameters in their order.
-        shear_rate, stress
-            In 1/s and Pa.
+        `values`: parameters in their order. `shear_rate`, `stress` in 1/s and Pa.
         """
 
     @property
@@ -237,21 +224,14 @@ class StateEffect(ConstitutiveEffect):
 class Record:
     """A signal of one run on a grid of times.
 
-    Attributes
-    ----------
-    times
-        In s, shape (n,), increasing; from 0, or from before where a steady flow came before.
-    rate
-        Felt by the fluid, in 1/s, shape (n,).
-    stress
-        Shear stress in Pa, shape (n,).
-    clock_factor
-        Time on the instrument's clock is ``times / clock_factor``.
-    strain_before
-        Strain, added up without regard to its sign, that the sample had seen in earlier runs.
-    tool_rate
-        Of the driven tool, as a nominal shear rate in 1/s, shape (n,); by default that of the
-        fluid. The two differ where the fluid slips, where something between them gives way, and
+    `times` in s, shape (n,), increasing; from 0, or from before where a steady flow came before.
+    `rate`: felt by the fluid, in 1/s, shape (n,).
+    `stress`: shear stress in Pa, shape (n,).
+    `clock_factor`: time on the instrument's clock is ``times / clock_factor``.
+    `strain_before`: strain, added up without regard to its sign, that the sample had seen in
+        earlier runs.
+    `tool_rate`: of the driven tool, as a nominal shear rate in 1/s, shape (n,); by default that of
+        the fluid. The two differ where the fluid slips, where something between them gives way, and
         where the gap is not what the nominal rate is computed with.
     """
 
@@ -287,13 +267,10 @@ class Record:
 class KinematicEffect(AbstractEffect):
     """Changes the deformation that the fluid really felt.
 
-    Attributes
-    ----------
-    shapes_command
-        Whether it acts on the way from the command to the tool. A rate that was measured at the
-        tool contains it already, so it is then no candidate; what lies between the tool and the
-        fluid, such as slip or a wrong gap, still is. The tool's own rate, which its inertia and
-        friction follow, is the command with these effects and without the others.
+    `shapes_command`: whether it acts on the way from the command to the tool. A rate that was
+        measured at the tool contains it already, so it is then no candidate; what lies between the
+        tool and the fluid, such as slip or a wrong gap, still is. The tool's own rate, which its
+        inertia and friction follow, is the command with these effects and without the others.
     """
 
     shapes_command: bool = False
@@ -307,15 +284,9 @@ class KinematicEffect(AbstractEffect):
     ) -> Float[Array, " n"]:
         """Return the shear rate felt, from the one that would be felt without this effect.
 
-        Parameters
-        ----------
-        values
-            Parameters in their order.
-        instrument_times
-            In s on the instrument's clock, increasing from the start of the flow; the fluid was at
-            rest before.
-        shear_rate
-            In 1/s, taken to be linear between times.
+        `values`: parameters in their order. `instrument_times` in s on the instrument's clock,
+        increasing from the start of the flow; the fluid was at rest before. `shear_rate` in 1/s,
+        taken to be linear between times.
         """
         del values, instrument_times
         return shear_rate
@@ -359,12 +330,7 @@ class SignalEffect(AbstractEffect):
     ) -> Complex[Array, ""] | Float[Array, ""]:
         """Return by what the stress of an oscillation that has gone on is multiplied.
 
-        Parameters
-        ----------
-        values
-            Parameters in their order.
-        frequency
-            In rad/s.
+        `values`: parameters in their order. `frequency` in rad/s.
         """
         del frequency
         return jnp.ones_like(values[0])

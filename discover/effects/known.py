@@ -17,10 +17,7 @@ Written = Any
 class KnownEffect:
     """An effect that is part of the declared model.
 
-    Attributes
-    ----------
-    values
-        Of its parameters, in their units and order; None where one is to be fitted.
+    `values`: of its parameters, in their units and order; None where one is to be fitted.
     """
 
     effect: AbstractEffect
@@ -53,17 +50,9 @@ class KnownEffect:
 def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
     """Return the effects that a study or a program names.
 
-    Parameters
-    ----------
-    written
-        By name of the effect: values of its parameters, ``"fit"`` for those to be fitted along.
-    where
-        The place, for messages.
-
-    Raises
-    ------
-    InputError
-        If an effect or a parameter is unknown, one is missing, or a value is outside its range.
+    `written`: by name of the effect: values of its parameters, ``"fit"`` for those to be fitted
+    along. `where`: the place, for messages. Raises InputError if an effect or a parameter is
+    unknown, one is missing, or a value is outside its range.
     """
     if not isinstance(written, Mapping):
         raise InputError(

@@ -1,6 +1,5 @@
 """Any term of the tensor library as an effect: what nobody has named yet can still be found."""
 
-from collections.abc import Container
 from dataclasses import dataclass
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
@@ -54,22 +53,19 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
     )
 
 
-def simplest_terms(beside: Container[str] = ()) -> list[LibraryTerm]:
-    """Return the sixteen simplest terms of the library, but for those of some names.
+def simplest_terms() -> list[LibraryTerm]:
+    """Return the sixteen simplest terms of the library.
 
     Together they are a law too flexible to be believed, which tells what a law may still change.
     """
     simple = (term for term in build_library(degree=1).terms if term.closed_form is None)
-    return [library_term(term) for term in simple if term.name not in beside][:_SIMPLEST]
+    return [library_term(term) for term in simple][:_SIMPLEST]
 
 
 def library_effects(degree: int = 1) -> tuple[LibraryTerm, ...]:
     """Return every term of the tensor library up to a degree that no named effect covers.
 
-    Parameters
-    ----------
-    degree
-        Highest degree of the invariant multipliers.
+    `degree`: highest degree of the invariant multipliers.
     """
     terms = build_library(degree=degree).terms
     return tuple(library_term(term) for term in terms if term.name not in _NAMED)

@@ -1,16 +1,14 @@
 """All effects by name.
 
-A file in one of the three folders is an effect that is built in. Effects of a user's own are
-registered, by a program or by an installed package (see docs/adding-an-effect.md).
+An effect that a module of the dictionary holds is built in. Effects of a user's own are registered,
+by a program or by an installed package (see docs/adding-an-effect.md).
 """
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
-from discover.effects import constitutive, kinematic, signal
+from discover.effects import kinematic, memory, network, signal, structure
 from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
 from discover.effects.library_term import library_effects, library_term
 from discover.errors import InputError
@@ -24,12 +22,9 @@ if TYPE_CHECKING:
 
 
 def _built_in() -> dict[str, AbstractEffect]:
-    effects = {}
-    for package in (constitutive, kinematic, signal):
-        for module in pkgutil.iter_modules(package.__path__):
-            effect = importlib.import_module(f"{package.__name__}.{module.name}").EFFECT
-            effects[effect.name] = effect
-    return effects
+    modules = (network, memory, structure, kinematic, signal)
+    found = [e for m in modules for e in vars(m).values() if isinstance(e, AbstractEffect)]
+    return {effect.name: effect for effect in sorted(found, key=lambda e: (e.kind, e.name))}
 
 
 EFFECTS: Registry[AbstractEffect] = Registry("effect", "discover.effects", _built_in)

@@ -5,8 +5,7 @@ from abc import abstractmethod
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.effects.base import EffectParameter, StateEffect
-from discover.effects.written_state import WrittenState
+from discover.effects.base import EffectParameter, StateEffect, WrittenState
 from tensor_library.isotropic_function import scalars
 
 CROSS = 2.0 / 3.0
@@ -167,4 +166,122 @@ SLOW_SHARE = EffectParameter(
     high=0.99,
     first_trial=0.1,
     range_source="with less than one part in a hundred of either there is only one structure",
+)
+
+
+class ThixotropicModulus(BrokenByRate):
+    """Stress in proportion to a structure s; `thixotropy` is the case n = 1."""
+
+    def modulus_factor(self, values, state):
+        """Return s."""
+        return self.whole(values, state)
+
+
+THIXOTROPIC_MODULUS = ThixotropicModulus(
+    name="thixotropic_modulus",
+    parameters=(INVERSE_RATE, BUILD_UP_TIME, EXPONENT),
+    equation=(
+        r"\sigma = s\sum_k\sigma_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^n s"
+    ),
+    source="Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214; Dullaert & Mewis 2006, "
+    "J. Non-Newtonian Fluid Mech. 139, 21",
+    check="Oscillate gently after flow at several rates: the moduli should grow at rest.",
+    visible="largest rate over the critical one, to the power n, of about 0.05, over t_b.",
+    complexity=3,
+)
+
+
+class ThixotropicModulusByStress(BrokenByStress):
+    """Stress in proportion to a structure s, which the stress breaks."""
+
+    def modulus_factor(self, values, state):
+        """Return s."""
+        return self.whole(values, state)
+
+
+THIXOTROPIC_MODULUS_BY_STRESS = ThixotropicModulusByStress(
+    name="thixotropic_modulus_by_stress",
+    parameters=(INVERSE_STRESS, BUILD_UP_TIME, EXPONENT),
+    equation=(
+        r"\sigma = s\sum_k\sigma_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r" - \left(\frac{|\sigma|}{\sigma_\mathrm{c}}\right)^n s"
+    ),
+    source="de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673; Mewis & Wagner 2009, Adv. "
+    "Colloid Interface Sci. 147-148, 214",
+    check="Oscillate gently after creep at several stresses: the moduli should grow at rest.",
+    visible="largest stress over the critical one, to the power n, of about 0.05, over t_b.",
+    complexity=3,
+)
+
+
+class ThixotropicRelaxation(BrokenByRate):
+    """Relaxation times in proportion to a structure s: less of it flows more easily."""
+
+    def time_factor(self, values, state):
+        """Return s."""
+        return self.whole(values, state)
+
+
+THIXOTROPIC_RELAXATION = ThixotropicRelaxation(
+    name="thixotropic_relaxation",
+    parameters=(INVERSE_RATE, BUILD_UP_TIME, EXPONENT),
+    equation=(
+        r"\lambda_k \to s\,\lambda_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^n s"
+    ),
+    source="de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673, for a viscosity that a structure "
+    "makes; Dullaert & Mewis 2006, J. Non-Newtonian Fluid Mech. 139, 21, and Cross 1965, J. "
+    "Colloid Sci. 20, 417, for its kinetics",
+    check="Stop flows of several rates: the stress relaxes faster after the faster ones.",
+    visible="largest rate over the critical one, to the power n, of about 0.05, over t_b.",
+    complexity=3,
+)
+
+
+class ThixotropicRelaxationByStress(BrokenByStress):
+    """Relaxation times in proportion to a structure s, which the stress breaks."""
+
+    def time_factor(self, values, state):
+        """Return s."""
+        return self.whole(values, state)
+
+
+THIXOTROPIC_RELAXATION_BY_STRESS = ThixotropicRelaxationByStress(
+    name="thixotropic_relaxation_by_stress",
+    parameters=(INVERSE_STRESS, BUILD_UP_TIME, EXPONENT),
+    equation=(
+        r"\lambda_k \to s\,\lambda_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r" - \left(\frac{|\sigma|}{\sigma_\mathrm{c}}\right)^n s"
+    ),
+    source="de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673; Larson & Wei 2019, J. Rheol. "
+    "63, 477",
+    check="Creep: below the critical stress the rate falls with time, above it rises.",
+    visible="largest stress over the critical one, to the power n, of about 0.05, over t_b.",
+    complexity=3,
+)
+
+
+class ThixotropicRelaxationTwoTimes(BrokenByRate):
+    """Relaxation times in proportion to s = (1 − w) s₁ + w s₂, with two structure times."""
+
+    levels = 2
+
+    def time_factor(self, values, state):
+        """Return s."""
+        return self.whole(values, state)
+
+
+THIXOTROPIC_RELAXATION_TWO_TIMES = ThixotropicRelaxationTwoTimes(
+    name="thixotropic_relaxation_two_times",
+    parameters=(INVERSE_RATE, BUILD_UP_TIME, SLOWNESS, SLOW_SHARE),
+    equation=(
+        r"\lambda_k \to [(1 - w) s_1 + w s_2]\,\lambda_k,\quad t_i\frac{ds_i}{dt} = 1 - s_i"
+        r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^{2/3} s_i,"
+        r"\quad t_1 = t_\mathrm{b},\ t_2 = R\,t_\mathrm{b}"
+    ),
+    source="Wei, Solomon & Larson 2018, J. Rheol. 62, 321, for several times with one steady state",
+    check="Rest for different lengths before a start: recovery in two steps.",
+    visible="as thixotropic_relaxation.",
+    complexity=4,
 )

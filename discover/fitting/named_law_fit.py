@@ -30,17 +30,11 @@ _LABELS = {"modulus_Pa": "G", "relaxation_time_s": "λ"}
 class Constant:
     """A fitted constant.
 
-    Attributes
-    ----------
-    name, unit
-        As a study spells it; ``"1"`` for a dimensionless one.
-    value, standard_error
-        In that unit. The error of a modulus or a relaxation time is that of its logarithm, times
-        the value.
-    low, high
-        Range in which it was fitted.
-    logarithmic
-        Whether its logarithm was fitted, so that its interval is one of a factor.
+    `name`, `unit`: as a study spells it; ``"1"`` for a dimensionless one.
+    `value`, `standard_error` in that unit. The error of a modulus or a relaxation time is that of
+        its logarithm, times the value.
+    `low`, `high`: range in which it was fitted.
+    `logarithmic`: whether its logarithm was fitted, so that its interval is one of a factor.
     """
 
     name: str

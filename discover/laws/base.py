@@ -153,10 +153,7 @@ class AbstractConstitutiveLaw(eqx.Module):
 class AbstractExtendedLaw(AbstractConstitutiveLaw):
     """A law that adds to h of another, whose states it carries along.
 
-    Attributes
-    ----------
-    base
-        The other law, or None.
+    `base`: the other law, or None.
     """
 
     base: eqx.AbstractVar[AbstractConstitutiveLaw | None]

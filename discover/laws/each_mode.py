@@ -25,12 +25,8 @@ class LawOfEachMode(AbstractConstitutiveLaw):
     follows the modes of a fluid takes it apart by `over_modes` or `law_of_mode`; in there it is the
     law of that one mode.
 
-    Attributes
-    ----------
-    law
-        The law, with a leading axis of modes on every array.
-    linear_relaxation
-        As in the law.
+    `law`: the law, with a leading axis of modes on every array.
+    `linear_relaxation`: as in the law.
     """
 
     law: AbstractConstitutiveLaw
@@ -83,15 +79,9 @@ class LawOfEachMode(AbstractConstitutiveLaw):
 def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:
     """Return the law of a fluid with one law for each of its modes.
 
-    Parameters
-    ----------
-    laws
-        In the order of the modes, of one kind: they may differ in numbers alone.
-
-    Raises
-    ------
-    InputError
-        If they are of several kinds, or a further tensor of a mode has its own share of the stress.
+    `laws` in the order of the modes, of one kind: they may differ in numbers alone. Raises
+    InputError if they are of several kinds, or a further tensor of a mode has its own share of the
+    stress.
     """
     parts = [eqx.partition(law, eqx.is_array) for law in laws]
     kinds = {jax.tree.structure(arrays) for arrays, _ in parts}
@@ -115,14 +105,9 @@ def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
 def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callable[..., Any]:
     """Return a function of one mode, with its law, as one of all modes.
 
-    Parameters
-    ----------
-    function
-        Of a tree that holds the law, and of numbers of one mode.
-    tree
-        A law, or what holds one; what of it differs from mode to mode is taken apart.
-    axis
-        Along which the modes lie, in the numbers and in what is returned.
+    `function`: of a tree that holds the law, and of numbers of one mode. `tree`: a law, or what
+    holds one; what of it differs from mode to mode is taken apart. `axis`: along which the modes
+    lie, in the numbers and in what is returned.
     """
     own, shared = apart(tree)
 
@@ -164,12 +149,7 @@ def with_modes(
     A mode has constants between those of its neighbours, evenly in log λ, and beyond the ends those
     of the end.
 
-    Parameters
-    ----------
-    law
-        The law.
-    before, after
-        Relaxation times in s.
+    `law`: the law. `before`, `after`: relaxation times in s.
     """
 
     def of_times(part):
@@ -194,10 +174,7 @@ def with_modes(
 def require_modes(law: AbstractConstitutiveLaw, count: int) -> None:
     """Refuse a law with constants of other than so many modes.
 
-    Raises
-    ------
-    InputError
-        If it has them.
+    Raises InputError if it has them.
     """
     for part in _parts(law):
         if isinstance(part, LawOfEachMode):

@@ -25,14 +25,9 @@ from tensor_library.terms import parse_term
 class LibraryExpansion(AbstractExtendedLaw):
     """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
 
-    Attributes
-    ----------
-    coefficients
-        cₙ, one for each term; a zero leaves the term out without recompiling anything.
-    inner
-        Inner parameters in the order of ``library.inner_names``.
-    base
-        A known law whose extra term is added, or None.
+    `coefficients`: cₙ, one for each term; a zero leaves the term out without recompiling anything.
+    `inner`: inner parameters in the order of ``library.inner_names``.
+    `base`: a known law whose extra term is added, or None.
     """
 
     coefficients: Float[Array, " n"]
@@ -73,17 +68,8 @@ def law_of_terms(
 ) -> LibraryExpansion:
     """Return the law h = Σ c term.
 
-    Parameters
-    ----------
-    linear_relaxation
-        Whether −σ is part of the known law.
-    base
-        A known law whose extra term is added.
-
-    Raises
-    ------
-    ValueError
-        If a spelling is not canonical.
+    `linear_relaxation`: whether −σ is part of the known law. `base`: a known law whose extra term
+    is added. Raises ValueError if a spelling is not canonical.
     """
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
     coefficients, inner = terms.over(library)

@@ -11,27 +11,19 @@ from tensor_library.isotropic_function import IsotropicFunction
 class NamedLaw:
     """A law that can be asked for by name.
 
-    Attributes
-    ----------
-    title
-        Name as a rheologist writes it.
-    build
-        Makes the law from its parameters, in the order of `parameters`.
-    parameters
-        Name and physical range of each parameter; laws are dimensionless, and so are these.
-    range_sources
-        Where each range comes from: literature, or the argument in a sentence.
-    source
-        Literature on the law.
-    written
-        Returns h with its constants as letters, by the names of `parameters`, so that the law can
-        be written out; None where nobody said.
-    is_one_mode
-        Whether at small strain the law is one Maxwell mode. One that is not brings a spectrum of
-        its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it out.
-    contains
-        Laws that this one is, exactly or in the limit, with some of its constants at these values
-        and the others as those of the law of that name.
+    `title`: name as a rheologist writes it.
+    `build`: makes the law from its parameters, in the order of `parameters`.
+    `parameters`: name and physical range of each parameter; laws are dimensionless, and so are
+        these.
+    `range_sources`: where each range comes from: literature, or the argument in a sentence.
+    `source`: literature on the law.
+    `written`: returns h with its constants as letters, by the names of `parameters`, so that the
+        law can be written out; None where nobody said.
+    `is_one_mode`: whether at small strain the law is one Maxwell mode. One that is not brings a
+        spectrum of its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it
+        out.
+    `contains`: laws that this one is, exactly or in the limit, with some of its constants at these
+        values and the others as those of the law of that name.
     """
 
     title: str

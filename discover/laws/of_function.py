@@ -16,14 +16,9 @@ from tensor_library.algebra import Symmetric
 class LawOfFunction(AbstractConstitutiveLaw):
     """A law with h(σ, γ̇) as a function.
 
-    Attributes
-    ----------
-    values
-        Of the parameters, in the order of `names`.
-    function
-        h of stress, rate and the parameters by name.
-    names
-        Names of the parameters.
+    `values`: of the parameters, in the order of `names`.
+    `function`: h of stress, rate and the parameters by name.
+    `names`: names of the parameters.
     """
 
     values: tuple[Float[Array, ""], ...]
@@ -41,10 +36,7 @@ def law_of_function(
 ) -> Callable[..., LawOfFunction]:
     """Return what makes the law from the values of its parameters, in their order.
 
-    Raises
-    ------
-    InputError
-        If the function does not take stress, rate and exactly these parameters.
+    Raises InputError if the function does not take stress, rate and exactly these parameters.
     """
     wanted = f"def {name}(stress, rate{''.join(f', {one}' for one in names)})"
     if not callable(function):

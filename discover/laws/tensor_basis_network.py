@@ -38,19 +38,13 @@ class TensorBasisNetwork(AbstractExtendedLaw):
     The coefficients are gₙ = cₙ + mₙ MLPₙ(invariants): a constant, and a network for what varies.
     The network of the paper has cₙ = 0 and takes the invariants as they are.
 
-    Attributes
-    ----------
-    network
-        Eight invariants in, eight numbers out; None where all coefficients are constant.
-    constants
-        cₙ, shape (8,).
-    network_mask
-        mₙ, 0 or 1, shape (8,): which coefficients may vary.
-    invariant_scale
-        Typical size of each invariant, shape (8,); the network sees asinh(invariant/scale), which
-        is linear for small ones and tame for large ones. None for the bare invariants.
-    base
-        A known law whose extra term is added, or None.
+    `network`: eight invariants in, eight numbers out; None where all coefficients are constant.
+    `constants`: cₙ, shape (8,).
+    `network_mask`: mₙ, 0 or 1, shape (8,): which coefficients may vary.
+    `invariant_scale`: typical size of each invariant, shape (8,); the network sees
+        asinh(invariant/scale), which is linear for small ones and tame for large ones. None for the
+        bare invariants.
+    `base`: a known law whose extra term is added, or None.
     """
 
     network: eqx.nn.MLP | None
@@ -96,10 +90,7 @@ class TensorBasisNetwork(AbstractExtendedLaw):
     def as_terms(self) -> tuple[LawTerm, ...] | None:
         """Return the constants as coefficients, behind the terms of the base law.
 
-        Raises
-        ------
-        InputError
-            If a coefficient varies with the invariants.
+        Raises InputError if a coefficient varies with the invariants.
         """
         if np.any(np.asarray(self.network_mask) != 0):
             raise InputError(

@@ -51,16 +51,10 @@ def compiled(
     cache folder, or with arguments that cannot be described exactly (a law from a notebook, say),
     it is `equinox.filter_jit` and no more.
 
-    Parameters
-    ----------
-    function
-        Pure, as any function to be compiled. What it encloses becomes part of the program.
-    made_from
-        What tells a function made inside of another from others made there, in place of everything
-        that it encloses.
-    runs_long
-        Whether to let the compiler take its time: a program that a fit calls for many seconds on
-        large matrices is worth it.
+    `function`: pure, as any function to be compiled. What it encloses becomes part of the program.
+    `made_from`: what tells a function made inside of another from others made there, in place of
+    everything that it encloses. `runs_long`: whether to let the compiler take its time: a program
+    that a fit calls for many seconds on large matrices is worth it.
     """
     return Compiled(function, made_from, runs_long)
 

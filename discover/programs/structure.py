@@ -15,11 +15,8 @@ _PLAIN = (type(None), bool, int, float, str)
 def take_apart(value: Any, leaves: list[Any]) -> Any:
     """Return the nesting of a value as JSON-able lists, and append its arrays to `leaves`.
 
-    Raises
-    ------
-    NotDescribable
-        If it holds something other than arrays, plain values, tuples, lists, dictionaries and
-        the named tuples and modules of this project.
+    Raises NotDescribable if it holds something other than arrays, plain values, tuples, lists,
+    dictionaries and the named tuples and modules of this project.
     """
     if eqx.is_array(value):
         leaves.append(value)

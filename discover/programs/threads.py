@@ -28,15 +28,9 @@ def in_threads(
 ) -> list[Result]:
     """Return what a function makes of each job, in their order.
 
-    Parameters
-    ----------
-    function
-        Calls a compiled program, which leaves Python to the others, and not this function.
-    jobs
-        What it is called with.
-    is_compiled
-        Whether the program has met jobs of this shape. If not, the first runs alone, so that it is
-        compiled once.
+    `function`: calls a compiled program, which leaves Python to the others, and not this function.
+    `jobs`: what it is called with. `is_compiled`: whether the program has met jobs of this shape.
+    If not, the first runs alone, so that it is compiled once.
     """
     waiting = list(jobs)
     done = [] if is_compiled else [function(job) for job in waiting[:1]]

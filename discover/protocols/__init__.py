@@ -4,7 +4,6 @@ from discover import first_use as first_use  # double precision, before any arra
 from discover.protocols.between_samples import (
     another_between_samples,
     sampled_rate,
-    unknown_between_samples,
 )
 from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import (
@@ -52,5 +51,4 @@ __all__ = [
     "steady_rates",
     "step_rates",
     "strains",
-    "unknown_between_samples",
 ]

@@ -130,22 +130,6 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
     )
 
 
-def unknown_between_samples(protocol: FlowProtocol, times: Samples) -> float:
-    """Return by how much another curve through the samples differs, over the size of the rate.
-
-    Root mean square of both; 0 where the rate was commanded. Arguments as in
-    `another_between_samples`.
-    """
-    other = another_between_samples(protocol, times)
-    if other is None:
-        return 0.0
-    knots, rates = np.asarray(other.table_times), np.asarray(other.table_rates)
-    inside = knots >= 0.0
-    own = np.interp(knots, np.asarray(protocol.table_times), np.asarray(protocol.table_rates))
-    change, size = (float(np.sum(v[inside] ** 2)) for v in (rates - own, own))
-    return float(np.sqrt(change / size)) if size > 0.0 else 0.0
-
-
 def samples_of(
     protocol: FlowProtocol, times: Samples
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:

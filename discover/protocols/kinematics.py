@@ -165,12 +165,8 @@ def kinematics_recording(
 ) -> Kinematics:
     """Return the kinematics of so many runs as if another stress of theirs were recorded.
 
-    Parameters
-    ----------
-    kinematics
-        Those of the runs; None where all are simple shear.
-    quantity
-        ``"N1"`` or ``"N2"``, of any flow.
+    `kinematics`: those of the runs; None where all are simple shear. `quantity`: ``"N1"`` or
+    ``"N2"``, of any flow.
     """
     every = kinematics or stack_kinematics([kinematics_of("shear")] * count)
     assert every is not None
@@ -186,13 +182,9 @@ def normal_stress_differences(
 ) -> Float[np.ndarray, "trials runs n 2"]:
     """Return N1 and N2 of runs.
 
-    Parameters
-    ----------
-    kinematics
-        Those of the runs; None where all are simple shear.
-    recorded, of_modes
-        The recorded stress, and σ11, σ22, σ33, σ12 of the modes alone: what else stands in the
-        recorded one is that of a generalised Newtonian fluid, which in shear has neither.
+    `kinematics`: those of the runs; None where all are simple shear. `recorded`, `of_modes`: the
+    recorded stress, and σ11, σ22, σ33, σ12 of the modes alone: what else stands in the recorded one
+    is that of a generalised Newtonian fluid, which in shear has neither.
     """
     weights = np.array([_RECORDED["N1"], _RECORDED["N2"]])
     found = of_modes @ weights.T

@@ -5,20 +5,16 @@ from discover.statistics.noise.covariance import HALF_BAND, least_squares_covari
 from discover.statistics.noise.dead_records import holds_signal
 from discover.statistics.noise.independent_samples import independent_samples
 from discover.statistics.noise.noise_model import NoiseModel, noise_model
-from discover.statistics.told_by_tests import Sized, Told, told_by_tests
 
 __all__ = [
     "HALF_BAND",
     "FitVerdict",
     "LackOfFit",
     "NoiseModel",
-    "Sized",
-    "Told",
     "holds_signal",
     "independent_samples",
     "lack_of_fit",
     "least_squares_covariance",
     "noise_model",
     "root_of",
-    "told_by_tests",
 ]

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.likeness import Likeness, likeness
 from discover.statistics.noise.dead_records import holds_signal
 from discover.statistics.noise.outliers import stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
@@ -23,7 +22,7 @@ ONLY_NOISE = 0.9
 """A model that misses a record by more of it than this says nothing of it."""
 
 
-PATTERN = "a pattern that noise has not"
+_PATTERN = "a pattern that noise has not"
 
 _CORRELATED = 0.6
 """Correlation from sample to sample from which on no test tells noise from a smooth misfit that is
@@ -43,40 +42,15 @@ _PATTERN_OF_SHORT = (
 class LackOfFit:
     """What a model leaves of the records that it was fitted to.
 
-    Attributes
-    ----------
-    verdict
-        ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if the
-        records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
-    misfit
-        Root-mean-square residual over rms measurement, mean over runs.
-    noise
-        Relative noise of the records, mean over runs.
-    lag_one_correlation
-        Of neighbouring residuals, mean over runs.
-    probability
-        Of residuals as structured as these, if they are noise; None where all runs together are
-        too short to look for a pattern.
-    outliers
-        Number of samples that are far outside the noise and do not vote.
-    outlier_samples
-        Which these are, of each run.
-    reason
-        The verdict in one sentence.
-    expected
-        Relative error that noise and the error of the linear data explain together.
-    pattern
-        What speaks against noise where `probability` is small, in words.
-    changing
-        Relative size of what changes from sample to sample; None where the noise is given.
-    rest
-        Of a model that explains the records: what is left, as a predicate.
-    likeness
-        Of one that does not: what of the instrument's what is left looks like, as a clause; empty
-        where it looks like nothing that has a word.
-    advice
-        Of one that something else refutes, or leaves what looks like something: what to do about
-        that, as a clause.
+    `verdict`: ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if
+        the records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
+    `misfit`: root-mean-square residual over rms measurement, mean over runs.
+    `noise`: relative noise of the records, mean over runs.
+    `lag_one_correlation`: of neighbouring residuals, mean over runs.
+    `probability`: of residuals as structured as these, if they are noise; None where all runs
+        together are too short to look for a pattern.
+    `outliers`: number of samples that are far outside the noise and do not vote.
+    `reason`: the verdict in one sentence.
     """
 
     verdict: FitVerdict
@@ -86,13 +60,6 @@ class LackOfFit:
     probability: float | None
     outliers: int = 0
     reason: str = ""
-    expected: float = 0.0
-    outlier_samples: tuple[tuple[int, ...], ...] = ()
-    pattern: str = PATTERN
-    changing: float | None = None
-    rest: str = "is noise"
-    likeness: str = ""
-    advice: str = ""
 
     @property
     def described(self) -> str:
@@ -108,21 +75,6 @@ class LackOfFit:
             f"(noise: {percent_of(self.noise)})."
         )
 
-    @property
-    def random(self) -> bool:
-        """Whether it is noise, as far as its samples tell: no pattern that other errors excuse."""
-        seen = self.probability is not None and self.probability <= SIGNIFICANCE
-        return self.verdict == "explained" and not seen
-
-    def refuted(self, reason: str, advice: str = "") -> "LackOfFit":
-        """Return the same of a model that other runs refute.
-
-        What looked like correlated noise may be its misfit, so only what changes from sample to
-        sample is still called noise.
-        """
-        noise = self.noise if self.changing is None else min(self.noise, self.changing)
-        return replace(self, verdict="unexplained", reason=reason, noise=noise, advice=advice)
-
 
 def lack_of_fit(
     residuals: Sequence[Float[np.ndarray, " _"]],
@@ -136,21 +88,11 @@ def lack_of_fit(
 
     Samples that are outliers (`stray`) are counted and left out.
 
-    Parameters
-    ----------
-    residuals
-        Prediction minus measurement of each fitted run, in any unit.
-    measured
-        The measurements, in the same unit.
-    expectation
-        What a complete model may leave; by default noise of unknown size.
-    rates
-        What was imposed, at the samples; with them a record that never follows it is told.
-    even
-        By what records and residuals are multiplied so that their noise has one size; by default
-        by nothing.
-    intervals
-        As in `what_is_left`.
+    `residuals`: prediction minus measurement of each fitted run, in any unit. `measured`: the
+    measurements, in the same unit. `expectation`: what a complete model may leave; by default noise
+    of unknown size. `rates`: what was imposed, at the samples; with them a record that never
+    follows it is told. `even`: by what records and residuals are multiplied so that their noise has
+    one size; by default by nothing.
     """
     factors = [np.ones(len(record)) for record in measured] if even is None else even
     residuals, records = (
@@ -175,14 +117,10 @@ def what_is_left(
 ) -> LackOfFit:
     """Return the same of records that are known to hold a signal; see `lack_of_fit`.
 
-    Parameters
-    ----------
-    residuals, measured, expectation
-        As there.
-    intervals
-        Time between neighbouring samples of each run, by which the correlations of their noise are
-        held against one another (`same_correlation_probability`); not a number of what is recorded
-        otherwise. Without them they are not.
+    `residuals`, `measured`, `expectation`: as there. `intervals`: time between neighbouring samples
+    of each run, by which the correlations of their noise are held against one another
+    (`same_correlation_probability`); not a number of what is recorded otherwise. Without them they
+    are not.
     """
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)
@@ -195,7 +133,7 @@ def what_is_left(
     explained = known and expectation.explains(residual, weight, record, further)
     probability = noise_probability(residual, weight, record, further)
     long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
-    pattern = PATTERN if long else _PATTERN_OF_SHORT
+    pattern = _PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"
     summary = summarise(residual, weight)
     correlation = float(np.mean(summary.autocorrelation))
@@ -223,26 +161,9 @@ def what_is_left(
         reason = f"the residual ({percent_of(misfit)}) is more than noise ({percent_of(expected)})"
     else:
         reason = f"the residual ({percent_of(misfit)}) has {pattern}"
-    like = likeness(residuals, measured) if verdict == "unexplained" else Likeness()
-    count = sum(len(where) for where in outliers)
-    if count:
-        reason += f"; outliers that do not count: {count}"
-    return LackOfFit(
-        verdict,
-        misfit,
-        floor,
-        correlation,
-        probability,
-        count,
-        reason,
-        expected,
-        outliers,
-        pattern,
-        float(np.mean(summary.noise[rows])) if expectation.noise is None else None,
-        rest,
-        str(like),
-        like.remedy,
-    )
+    if outliers:
+        reason += f"; outliers that do not count: {outliers}"
+    return LackOfFit(verdict, misfit, floor, correlation, probability, outliers, reason)
 
 
 def _further(residual, weight, intervals: Sequence[float] | None) -> tuple[float, ...]:
@@ -263,8 +184,8 @@ _PATTERNED = {
 
 
 def _without_outliers(residuals, measured):
-    """Return weighted residuals, weights and records, padded, and which samples are outliers."""
-    kept, outliers = [], []
+    """Return weighted residuals, weights and records, padded, and the number of outliers."""
+    kept, outliers = [], 0
     sizes = [rms(record) or 1.0 for record in measured]
     again = repeated([np.asarray(row) / size for row, size in zip(residuals, sizes, strict=True)])
     for row, record in zip(residuals, measured, strict=True):
@@ -273,7 +194,7 @@ def _without_outliers(residuals, measured):
         # no knock comes at the same place of several runs
         off[[at for at in again if at < len(off)]] = False
         kept.append((values[~off], record[~off]))
-        outliers.append(tuple(int(i) for i in np.flatnonzero(off)))
+        outliers += int(np.count_nonzero(off))
     longest = max(len(row) for row, _ in kept)
     residual, weight, padded = np.zeros((3, len(kept), longest))
     for i, (row, record) in enumerate(kept):
@@ -282,4 +203,4 @@ def _without_outliers(residuals, measured):
         weight[i, :n] = 1.0 / (size * np.sqrt(n))
         residual[i, :n] = row * weight[i, :n]
         padded[i, :n] = record
-    return residual, weight, padded, tuple(outliers)
+    return residual, weight, padded, outliers

@@ -21,14 +21,9 @@ from discover.statistics.noise.whiteness import (
 class ResidualSummary:
     """Noise and structure in the residuals of some runs.
 
-    Attributes
-    ----------
-    noise
-        Relative noise of each run, from third differences of its residual.
-    autocorrelation
-        Correlation of neighbouring residuals of each run.
-    effective_samples
-        Number of independent samples that the residuals of all runs are worth.
+    `noise`: relative noise of each run, from third differences of its residual.
+    `autocorrelation`: correlation of neighbouring residuals of each run.
+    `effective_samples`: number of independent samples that the residuals of all runs are worth.
     """
 
     noise: Float[np.ndarray, " runs"]
@@ -43,12 +38,7 @@ def summarise(
 
     For the noise see `fast_part`, for the number of samples `independent_samples`.
 
-    Parameters
-    ----------
-    residual
-        Weighted residuals, padded.
-    weight
-        Their weights, zero at padding.
+    `residual`: weighted residuals, padded. `weight`: their weights, zero at padding.
     """
     noise, correlation, effective = [], [], 0.0
     for row, w in zip(residual, weight, strict=True):
@@ -69,10 +59,7 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
     From third differences, which a smooth sequence hardly has, through their median, which a few
     jumps hardly move   [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73, 625, for the idea].
 
-    Parameters
-    ----------
-    values
-        In order; of fewer than `FEWEST_FAST` nothing is said.
+    `values` in order; of fewer than `FEWEST_FAST` nothing is said.
     """
     if len(values) < FEWEST_FAST:
         return 0.0
@@ -85,10 +72,7 @@ def slow_part(values: Float[np.ndarray, " n"]) -> float:
     It is at least what is left of the means over a few samples, an eighth of the noise's power: the
     difference to `fast_part` alone is zero where that came out too large, by a tenth of 80 samples.
 
-    Parameters
-    ----------
-    values
-        In order.
+    `values` in order.
     """
     values = np.asarray(values, dtype=float)
     fast = fast_part(values)
@@ -216,14 +200,10 @@ STRUCTURE = 1.5
 class Expectation:
     """What a complete model may leave of the data.
 
-    Attributes
-    ----------
-    noise
-        Relative noise, where it is known.
-    linear_error
-        Relative error of the linear data that the declared modes come from.
-    repeat_error
-        Relative error of a run as its repeats tell it, noise and loading together; 0 without any.
+    `noise`: relative noise, where it is known.
+    `linear_error`: relative error of the linear data that the declared modes come from.
+    `repeat_error`: relative error of a run as its repeats tell it, noise and loading together; 0
+        without any.
     """
 
     noise: float | None = None

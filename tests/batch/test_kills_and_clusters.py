@@ -1,8 +1,7 @@
 """Batches that are killed, batches side by side, and on a real dask cluster on this machine.
 
 The studies run a stand-in that writes real parts into real result folders, so that what is tested
-is the machinery of the batch and not the learners. ``benchmarks/batch_kills.py`` does the same with
-real studies and ten kills.
+is the machinery of the batch and not the learners.
 """
 
 import contextlib
@@ -277,19 +276,41 @@ def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
     assert results(tmp_path / "out") == calm
 
 
+def listening(psutil, process):
+    everybody = [process, *process.children(recursive=True)]
+    return [
+        connection
+        for one in everybody
+        for connection in one.net_connections("inet")
+        if connection.status == psutil.CONN_LISTEN
+    ]
+
+
 @pytest.mark.parametrize("n_workers", [1, 2])
-def test_a_name_that_is_no_utf_8_costs_no_study_its_place(studies, tmp_path, n_workers):
+def test_workers_open_no_port_and_a_name_that_is_no_utf_8_costs_no_study_its_place(
+    studies, tmp_path, n_workers
+):
+    psutil = pytest.importorskip("psutil")
+    seen = []
+
+    def look(label, fraction):
+        seen.append((len(psutil.Process().children()), listening(psutil, psutil.Process())))
+
     odd = tmp_path / os.fsdecode(b"m\xe9lange.toml")
     odd.write_text(STUDY.format(0.04))
     broken = tmp_path / os.fsdecode(b"\xff.toml")
     broken.write_text("[data")
     out = tmp_path / "out"
-    result = batch.run_batch([*studies[:1], odd, broken], out, workers=n_workers)
+    result = batch.run_batch([*studies[:1], odd, broken], out, workers=n_workers, progress=look)
     assert [s.status for s in result.studies] == ["done", "done", "failed"]
     assert result.failed[0].input_error
     assert "m\\udce9lange" in (out / "index.html").read_text("utf-8")
     assert len((out / "table.csv").read_text("utf-8").splitlines()) == 4
     assert len(json.loads((out / "batch.json").read_text("utf-8"))["studies"]) == 3
+    assert max(count for count, _ in seen) == (2 if n_workers == 2 else 0)
+    assert all(ports == [] for _, ports in seen)
+    with socket.create_server(("127.0.0.1", 0)):  # the control: a port would be seen
+        assert len(listening(psutil, psutil.Process())) == 1
 
 
 @pytest.mark.parametrize("deaths", [1, 99])
@@ -328,30 +349,6 @@ def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
     assert [s.status for s in result.studies] == ["done", "failed"]
     assert result.studies[1].text.startswith("Several workers died")
     assert not result.studies[1].input_error
-
-
-def listening(psutil, process):
-    everybody = [process, *process.children(recursive=True)]
-    return [
-        connection
-        for one in everybody
-        for connection in one.net_connections("inet")
-        if connection.status == psutil.CONN_LISTEN
-    ]
-
-
-def test_workers_open_no_port(studies, tmp_path):
-    psutil = pytest.importorskip("psutil")
-    seen = []
-
-    def look(label, fraction):
-        seen.append((len(psutil.Process().children()), listening(psutil, psutil.Process())))
-
-    batch.run_batch(studies, tmp_path / "out", workers=2, progress=look)
-    assert max(count for count, _ in seen) == 2
-    assert all(ports == [] for _, ports in seen)
-    with socket.create_server(("127.0.0.1", 0)):  # the control: a port would be seen
-        assert len(listening(psutil, psutil.Process())) == 1
 
 
 def test_nothing_that_lies_in_the_working_directory_is_run_by_a_worker(tmp_path, monkeypatch):

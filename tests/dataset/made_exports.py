@@ -3,8 +3,6 @@
 What is compared went through text and units.
 """
 
-import csv
-
 import numpy as np
 from typer.testing import CliRunner
 
@@ -49,10 +47,21 @@ def run(tmp_path, *arguments, code=0):
     return out, result
 
 
+def csv(table):
+    """Return columns of numbers as text."""
+    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
+    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
+
+
+def columns(text):
+    """Return the columns of such text."""
+    head, *rows = text.splitlines()
+    values = np.array([row.split(",") for row in rows], dtype=float)
+    return dict(zip(head.split(","), values.T, strict=True))
+
+
 def table(path):
-    with path.open() as stream:
-        rows = list(csv.reader(stream))
-    return {name: np.array([row[i] for row in rows[1:]], float) for i, name in enumerate(rows[0])}
+    return columns(path.read_text())
 
 
 def assert_sweep(path, omega=OMEGA, shift=1.0):

@@ -210,11 +210,6 @@ def test_harmless_habits_of_editors_change_nothing(tmp_path, content):
     np.testing.assert_array_equal(run.time, wanted.time)
 
 
-def test_minutes_in_the_header_are_minutes(tmp_path):
-    write(tmp_path, {"a.csv": RUN.replace("time_s", "time_min")})
-    assert load_dataset(tmp_path)["a.csv"].time[1] == pytest.approx(6.0, rel=1e-12)
-
-
 def test_labels_stay_labels_and_numbers_become_numbers(tmp_path):
     write(tmp_path, {"runs.csv": "file,a,b,c,d\na.csv,1_2,nan,-1.5e3,\n"})
     metadata = load_dataset(tmp_path)["a.csv"].metadata

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from made_exports import csv
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -36,11 +37,6 @@ def sweep_table():
         "Gp_Pa": MODULUS * x**2 / (1 + x**2),
         "Gpp_Pa": MODULUS * x / (1 + x**2),
     }
-
-
-def csv(table):
-    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
 
 
 @pytest.fixture
@@ -296,10 +292,6 @@ def test_sparse_cycles_are_doubted_and_dense_ones_are_not(folder):
         t = np.linspace(0, 20, samples)
         table = {"time_s": t, "shear_rate_1_s": np.cos(2 * t), "stress_Pa": np.cos(2 * t - 0.5)}
         assert ("sampling" in subjects(check_folder(folder(table)))) is doubted
-
-
-def test_a_folder_without_flow_is_an_error(folder):
-    assert "signal" in subjects(check_folder(folder(start_up(0.0))), "error")
 
 
 def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):

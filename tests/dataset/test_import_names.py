@@ -7,6 +7,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from made_exports import columns
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -67,12 +68,6 @@ def read(folder, text, encoding="utf-8", name="a.txt", **known):
     file = folder / name
     file.write_bytes(text.encode(encoding))
     return import_files([file], Mapping(**known))
-
-
-def columns(text):
-    head, *rows = text.splitlines()
-    values = np.array([row.split(",") for row in rows], dtype=float)
-    return dict(zip(head.split(","), values.T, strict=True))
 
 
 @pytest.mark.parametrize("language", LANGUAGES)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from made_exports import columns, csv
 
 from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping
@@ -20,14 +21,7 @@ def read(folder, text, **known):
 
 
 def table(**columns):
-    rows = zip(*columns.values(), strict=True)
-    return "\n".join([",".join(columns), *(",".join(map(repr, map(float, r))) for r in rows)])
-
-
-def columns(text):
-    head, *rows = text.splitlines()
-    values = np.array([row.split(",") for row in rows], dtype=float)
-    return dict(zip(head.split(","), values.T, strict=True))
+    return csv({name: np.asarray(values, float) for name, values in columns.items()})
 
 
 def start_up(time="Time", rate="Shear Rate", stress="Shear Stress", **more):

@@ -1,4 +1,4 @@
-"""What repeated tests say of their error; records by scipy, in shares of a known loading error."""
+"""Repeated tests and copies of one record; records by scipy, and in closed form."""
 
 from dataclasses import replace
 
@@ -7,7 +7,15 @@ import pytest
 from independent import Giesekus, oscillation, start_up
 
 import discover as dc
-from discover.dataset.records.repeats import count_flows, repeated_tests, repeats_among
+from discover.dataset import Run
+from discover.dataset.records.repeats import (
+    count_flows,
+    is_copy,
+    repeated_tests,
+    repeats_among,
+    require_no_copies,
+)
+from discover.errors import InputError
 
 TIMES = np.linspace(0.05, 8.0, 60)
 
@@ -84,3 +92,48 @@ def test_a_run_that_ends_early_is_the_same_flow_and_tells_little():
     early = record("b", factor=1.03, times=np.linspace(0.05, 1.0, 20))
     assert repeated_tests([record("a"), early]) == (("a", "b"),)
     assert repeats_among([record("a"), early]) is None
+
+
+COPIED = np.linspace(0.1, 8.0, 80)
+
+
+def run(name, stress, times=COPIED, rate=2.0):
+    return Run(name, times, dc.start_up(rate), np.full(len(times), rate), stress)
+
+
+def grown(seed, rate=2.0, times=COPIED):
+    """A start-up with 1 % of noise, of a fluid of 100 Pa and 1 s."""
+    exact = 100.0 * rate * -np.expm1(-times)
+    noise = np.random.default_rng(seed).standard_normal(len(times))
+    return exact + 0.01 * np.sqrt(np.mean(exact**2)) * noise
+
+
+def rounded(stress, digits):
+    return np.array([float(f"{value:.{digits}g}") for value in stress])
+
+
+def test_a_record_is_a_copy_whatever_its_name_digits_and_samples():
+    first = run("a.csv", grown(0))
+    assert is_copy(first, run("b.csv", grown(0)))
+    assert is_copy(first, run("b.csv", rounded(grown(0), 4)))
+    assert is_copy(first, run("b.csv", grown(0)[::3], COPIED[::3]))
+    assert is_copy(run("b.csv", grown(0), rate=2.2), first)  # told at another rate
+
+
+def test_a_second_measurement_is_none():
+    first = run("a.csv", grown(0))
+    assert not is_copy(first, run("b.csv", grown(1)))
+    assert not is_copy(first, run("b.csv", grown(1)[::3], COPIED[::3]))
+    assert not is_copy(first, run("b.csv", grown(0, 2.1), rate=2.1))
+
+
+def test_exact_records_of_two_rates_are_none():
+    exact = {rate: 100.0 * rate * -np.expm1(-COPIED) for rate in (2.0, 2.001)}
+    assert not is_copy(*(run(str(r), stress, rate=r) for r, stress in exact.items()))
+
+
+def test_a_record_that_is_fitted_judges_nothing():
+    first, again, other = run("a.csv", grown(0)), run("b.csv", grown(0)), run("c.csv", grown(1))
+    with pytest.raises(InputError, match=r"held-out run 'b.csv'.*'a.csv'.*proves nothing"):
+        require_no_copies([first, other], [again])
+    require_no_copies([first], [other])

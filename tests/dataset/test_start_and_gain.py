@@ -5,17 +5,13 @@ Data: scipy's integration of a Giesekus fluid, and closed forms of a Maxwell flu
 
 import numpy as np
 import pytest
+from made_exports import csv
 from scipy.integrate import solve_ivp
 
 from discover.dataset import check_folder
 
 MODULUS, TIME, MOBILITY = 100.0, 2.0, 0.3
 OMEGA = 1.5
-
-
-def csv(table):
-    rows = zip(*(np.asarray(v).tolist() for v in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
 
 
 def sweep():

@@ -20,7 +20,7 @@ from discover.effects import (
     make_effect,
     named_effects,
 )
-from discover.effects.filters import first_order_lag
+from discover.effects.kinematic import first_order_lag
 from discover.effects.reference import reference_page
 from discover.errors import InputError
 from discover.forward import data_scales

@@ -37,6 +37,7 @@ def test_where_no_flow_turns_damping_by_strain_is_wagners_law(protocol, flow):
     np.testing.assert_allclose(ours, stress, atol=2e-4 * np.max(stress))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("material", "name"),
     [(INTEGRAL, "strain_damping"), (Giesekus(0.3, **SCALE), "giesekus_mobility")],

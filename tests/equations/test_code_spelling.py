@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 import sympy
+from readers import in_ufl, module_of, product_of, ufl_number
 from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
 
 from discover.equations import Equation, equation_from_json, write_equation
@@ -20,8 +21,7 @@ every_law = pytest.mark.parametrize("name", BOTH_SIGNS)
 @every_law
 def test_the_python_text_of_every_term_law_and_effect_says_it(name):
     spelled = BOTH_SIGNS[name]
-    module = {}
-    exec(write_equation(spelled.equation, "python"), module)
+    module = module_of(write_equation(spelled.equation, "python"))
     assert agree([module["extra_term"](*state) for state in STATES], spelled.extra)
 
 
@@ -48,16 +48,12 @@ SPELLED_IN_UFL = [
 
 @pytest.mark.parametrize("name", SPELLED_IN_UFL)
 def test_the_ufl_text_of_terms_laws_and_effects_says_them(name):
-    ufl = pytest.importorskip("ufl")
-    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-    from ufl.utils.stacks import StackDict
-
-    spelled, module = (LIBRARY_LAWS | NAMED_LAWS)[name], {}
-    exec(write_equation(spelled.equation, "ufl"), module)
+    pytest.importorskip("ufl")
+    spelled = (LIBRARY_LAWS | NAMED_LAWS)[name]
+    module = module_of(write_equation(spelled.equation, "ufl"))
     stress, rate = STATES[1]
-    extra = module["extra_term"](*(ufl.as_matrix(x.tolist()) for x in (stress, rate)))
-    extra = apply_algebra_lowering(extra)
-    found = [[extra.evaluate((), {}, (i, j), StackDict()) for j in range(3)] for i in range(3)]
+    extra = module["extra_term"](in_ufl(stress), in_ufl(rate))
+    found = [[ufl_number(extra, (i, j)) for j in range(3)] for i in range(3)]
     assert agree(found, spelled.extra[1])
 
 
@@ -81,10 +77,7 @@ def _value(expression, letters):
     if expression.is_Add:
         return sum(parts)
     if expression.is_Mul:
-        product = parts[0]
-        for part in parts[1:]:
-            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
-        return product
+        return product_of(parts)
     if expression.is_Pow:
         base, exponent = parts
         return np.linalg.matrix_power(base, int(exponent)) if np.ndim(base) else base**exponent

@@ -11,6 +11,7 @@ import pytest
 import sympy
 from independent import Giesekus, Structured, Thixotropic
 from independent.homogeneous import UNIT
+from readers import in_ufl, module_of, ufl_number
 from scipy.integrate import solve_ivp
 
 from discover.effects import StateEffect, make_effect, named_effects
@@ -62,10 +63,8 @@ def equation_of(name, values):
     return Equation(terms, (MODULUS,), (TIME,), states=(StatePart(name, values),))
 
 
-def module_of(name, form):
-    module = {}
-    exec(write_equation(equation_of(name, CASES[name][0]), form), module)
-    return module
+def written(name, form):
+    return module_of(write_equation(equation_of(name, CASES[name][0]), form))
 
 
 def reference(name, gradient):
@@ -98,13 +97,13 @@ def test_the_text_in_python_flows_as_the_fluid(name, kind):
     if name == "thixotropy" and kind == "extension":
         pytest.skip("the reference has a shear rate alone")
     wanted = reference(name, GRADIENTS[kind])
-    found = integrated(module_of(name, "python"), GRADIENTS[kind])
+    found = integrated(written(name, "python"), GRADIENTS[kind])
     np.testing.assert_allclose(found, wanted, atol=1e-7 * np.max(np.abs(wanted)))
 
 
 def test_a_structure_with_another_time_would_show():
     """Negative control of the test above."""
-    module, wanted = module_of("thixotropy", "python"), reference("thixotropy", GRADIENTS["shear"])
+    module, wanted = written("thixotropy", "python"), reference("thixotropy", GRADIENTS["shear"])
     module["STRUCTURE"]["thixotropy"]["build_up_time"] = 5.0
     found = integrated(module, GRADIENTS["shear"])
     assert np.max(np.abs(found - wanted)) > 1e-3 * np.max(np.abs(wanted))
@@ -113,7 +112,7 @@ def test_a_structure_with_another_time_would_show():
 @named
 def test_the_integrator_in_the_text_carries_the_structure_along(name):
     times = np.concatenate([[0.0], TIMES])
-    found = np.transpose(module_of(name, "python")["simulate_shear"](lambda t: 2.0, times))[1:]
+    found = np.transpose(written(name, "python")["simulate_shear"](lambda t: 2.0, times))[1:]
     s = reference(name, GRADIENTS["shear"])
     wanted = np.stack([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]], axis=1)
     # steps of a fiftieth of the shortest time, of fourth order
@@ -133,7 +132,7 @@ def states(levels, number=4):
 
 
 def by_python(name, stress, gradient, structure):
-    module = module_of(name, "python")
+    module = written(name, "python")
     asked = stress[None], gradient, structure
     return (
         module["stress_rate"](*asked)[0],
@@ -144,7 +143,7 @@ def by_python(name, stress, gradient, structure):
 
 @named
 def test_sympy_says_what_python_says(name):
-    module = module_of(name, "sympy")
+    module = written(name, "sympy")
     (modulus, time), structure = module["modes"][0], module["structure"]
     for stress, gradient, levels in states(len(structure)):
         at = dict(zip(structure, levels, strict=True))
@@ -167,23 +166,17 @@ def test_sympy_says_what_python_says(name):
 @named
 def test_ufl_says_what_python_says(name):
     ufl = pytest.importorskip("ufl")
-    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-    from ufl.utils.stacks import StackDict
-
-    def number(expression, place=()):
-        return float(apply_algebra_lowering(expression).evaluate((), {}, place, StackDict()))
-
-    module = module_of(name, "ufl")
+    module = written(name, "ufl")
     for stress, gradient, levels in states(len(module["STRUCTURE_AT_REST"]), 2):
-        s, flow = ufl.as_matrix(stress.tolist()), ufl.as_matrix(gradient.tolist())
+        s, flow = in_ufl(stress), in_ufl(gradient)
         structure = [ufl.as_ufl(float(level)) for level in levels]
         wanted, structured, total = by_python(name, stress, gradient, levels)
         rate, sum_ = module["stress_rate"](s, flow, 0, structure), None
         sum_ = module["total_stress"]([s], flow, structure)
         for place in ((0, 0), (0, 1), (1, 2), (2, 2)):
-            assert number(rate, place) == pytest.approx(wanted[place], rel=1e-9, abs=1e-7)
-            assert number(sum_, place) == pytest.approx(total[place], rel=1e-9, abs=1e-7)
-        found = [number(one) for one in module["structure_rate"]([s], flow, structure)]
+            assert ufl_number(rate, place) == pytest.approx(wanted[place], rel=1e-9, abs=1e-7)
+            assert ufl_number(sum_, place) == pytest.approx(total[place], rel=1e-9, abs=1e-7)
+        found = [ufl_number(one) for one in module["structure_rate"]([s], flow, structure)]
         np.testing.assert_allclose(found, structured, rtol=1e-10)
 
 
@@ -233,8 +226,7 @@ def test_what_is_written_is_what_is_integrated(name):
 
 def test_two_states_at_once_multiply():
     both = (StatePart("thixotropy", CASES["thixotropy"][0]), StatePart("viscous_heating", HEAT))
-    module = {}
-    exec(write_equation(Equation((), (MODULUS,), (TIME,), states=both), "python"), module)
+    module = module_of(write_equation(Equation((), (MODULUS,), (TIME,), states=both), "python"))
     assert module["structure_factors"](np.array([0.5, 0.2])) == pytest.approx((0.5, np.exp(-0.2)))
     stress, gradient = MODULUS * np.ones((1, 3, 3)), UNIT["shear"]
     (_, warming) = module["structure_rate"](stress, gradient, np.array([0.5, 0.2]))

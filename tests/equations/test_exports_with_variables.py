@@ -10,8 +10,8 @@ import pytest
 import sympy
 from independent import PomPom
 from independent.homogeneous import UNIT
+from readers import in_ufl, module_of, read_latex, ufl_number, value
 from scipy.integrate import solve_ivp
-from test_named_exports import read_latex, value
 
 from discover.equations import Equation, NamedPart, write_equation
 from discover.errors import InputError
@@ -27,12 +27,6 @@ both = pytest.mark.parametrize("name", ["pom_pom", "pom_pom_drag_strain"])
 
 def text(name, form, constants=CONSTANTS):
     return write_equation(Equation((), MODULUS, TIME, named=NamedPart(name, constants)), form)
-
-
-def module_of(written):
-    module = {}
-    exec(written, module)
-    return module
 
 
 def reference(name, gradient):
@@ -150,25 +144,19 @@ def own(name, constants, stress, y, rate):
 @both
 def test_ufl_says_stress_and_variable(name):
     ufl = pytest.importorskip("ufl")
-    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-    from ufl.utils.stacks import StackDict
-
-    def number(expression, place=()):
-        return float(apply_algebra_lowering(expression).evaluate((), {}, place, StackDict()))
-
     module = module_of(text(name, "ufl"))
     for stress, y, gradient in _states():
         stress, d = in_flow_plane(stress), in_flow_plane(gradient + gradient.T)
-        s, variables = ufl.as_matrix(stress.tolist()), [ufl.as_ufl(y)]
-        extra = module["extra_term"](s, ufl.as_matrix(d.tolist()), 1, variables)
+        s, variables = in_ufl(stress), [ufl.as_ufl(y)]
+        extra = module["extra_term"](s, in_ufl(d), 1, variables)
         wanted, changing = own(name, CONSTANTS[1], stress, y, d)
         places = [(0, 0), (1, 1), (2, 2), (0, 1)]
-        found = [number(extra, place) for place in places]
+        found = [ufl_number(extra, place) for place in places]
         np.testing.assert_allclose(found, wanted, atol=1e-12 * np.max(np.abs(wanted)))
-        asked = ufl.as_matrix((MODULUS[1] * stress).tolist()), ufl.as_matrix((d / 2).tolist())
+        asked = in_ufl(MODULUS[1] * stress), in_ufl(d / 2)
         (rate,) = module["variables_rate"](*asked, 1, variables)
         _, changing = own(name, CONSTANTS[1], stress, y, TIME[1] * d)
-        assert number(rate) == pytest.approx(changing / TIME[1], rel=1e-12)
+        assert ufl_number(rate) == pytest.approx(changing / TIME[1], rel=1e-12)
 
 
 @both

@@ -1,62 +1,18 @@
 """What LaTeX says, by SymPy's reader of LaTeX: its brackets, its precedence."""
 
-import functools
 from types import SimpleNamespace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import sympy
+from readers import read_latex, value
 from spelled_laws import EFFECTS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
-from sympy.parsing.latex import parse_latex
 
 from discover.comparison.comparison import Comparison
 from discover.equations import Equation, NamedPart, write_equation
 from discover.report.comparison.report import equations_tex
 from tensor_library import LawTerm
 from tensor_library.terms import CandidateTerm, parse_term
-
-# The reader knows letters and functions of one letter; \left and \right only size a bracket.
-_WORDS = (
-    (r"\dot{\boldsymbol{\gamma}}", r"\gamma"),
-    (r"\boldsymbol{\sigma}", r"\sigma"),
-    (r"\boldsymbol{I}", "I"),
-    (r"\operatorname{tr}", "T"),
-    (r"\left", ""),
-    (r"\right", ""),
-)
-
-
-@functools.cache
-def read(latex):
-    """Return the tree that SymPy reads; the arguments of its products stand as written."""
-    for old, new in _WORDS:
-        latex = latex.replace(old, new)
-    return parse_latex(latex, strict=True)
-
-
-def value(tree, letters):
-    """Evaluate a tree, with matrices for the tensors."""
-    if tree.is_Symbol:
-        return letters[tree.name]
-    if tree.is_number:
-        return float(tree)
-    parts = [value(part, letters) for part in tree.args]
-    if tree.is_Add:
-        assert len({np.shape(part) for part in parts}) == 1, f"scalar plus tensor in {tree}"
-        return sum(parts)
-    if tree.is_Mul:
-        product = parts[0]
-        for part in parts[1:]:
-            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
-        return product
-    if tree.is_Pow:
-        assert np.ndim(parts[0]) == np.ndim(parts[1]) == 0, f"power of a tensor in {tree}"
-        return parts[0] ** parts[1]
-    if isinstance(tree, sympy.Abs):
-        return abs(parts[0])
-    assert tree.func.__name__ == "T", f"unknown function {tree}"
-    return np.trace(parts[0])
 
 
 def extra_by_latex(law, letters=()):
@@ -67,11 +23,11 @@ def extra_by_latex(law, letters=()):
     head = r"\overset{\nabla}{\boldsymbol{\sigma}} + "
     assert left.startswith(head)
     left = left.removeprefix(head)
-    inner = {e.lhs.name: float(e.rhs) for e in map(read, assigned)} | dict(letters)
+    inner = {e.lhs.name: float(e.rhs) for e in map(read_latex, assigned)} | dict(letters)
     found = []
     for stress, rate in STATES:
         letters = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **inner}
-        found.append(value(read(left), letters) - stress)
+        found.append(value(read_latex(left), letters) - stress)
     return np.array(found)
 
 
@@ -181,4 +137,4 @@ def test_the_equation_of_an_effect_in_the_reference_says_what_it_adds(effect):
     for stress, rate in STATES:
         known = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **letters}
         wanted = effect.extra_term(jnp.array(values), jnp.asarray(stress), jnp.asarray(rate))
-        assert agree(value(read(right), known), np.asarray(wanted))
+        assert agree(value(read_latex(right), known), np.asarray(wanted))

@@ -4,7 +4,6 @@ The reference is each law as its authors write it, integrated by scipy; every te
 would run it, and integrated by scipy too.
 """
 
-import functools
 import json
 import re
 
@@ -14,8 +13,8 @@ import pytest
 import sympy
 from independent import authors
 from independent.homogeneous import UNIT
+from readers import in_ufl, module_of, read_latex, ufl_number, value
 from scipy.integrate import solve_ivp
-from sympy.parsing.latex import parse_latex
 
 from discover.equations import (
     FORMATS,
@@ -78,8 +77,7 @@ def integrated(rate, gradient):
 
 
 def by_python(text):
-    module = {}
-    exec(text, module)
+    module = module_of(text)
 
     def rate(k, stress, gradient):
         state = np.zeros((2, 3, 3))
@@ -90,8 +88,7 @@ def by_python(text):
 
 
 def by_sympy(text):
-    module = {}
-    exec(text, module)
+    module = module_of(text)
     symbols = [*module["stress_symbols"], *module["gradient_symbols"]]
     functions = [
         sympy.lambdify(symbols, [*module["stress_rate"].subs(values)], "math", cse=True)
@@ -247,20 +244,14 @@ def extra_of(name, constants, stress, rate):
 # a law with variables behind its stress is no function of the stress, and leaves as JSON alone
 @pytest.mark.parametrize("name", [n for n in LAWS if not make_law(n, starting_values(n)).variables])
 def test_ufl_says_every_law_that_has_a_name(name):
-    ufl = pytest.importorskip("ufl")
-    from ufl.algorithms.apply_algebra_lowering import apply_algebra_lowering
-    from ufl.utils.stacks import StackDict
-
-    module = {}
-    exec(write_equation(equation(name, (starting_values(name),)), "ufl"), module)
+    pytest.importorskip("ufl")
+    module = module_of(write_equation(equation(name, (starting_values(name),)), "ufl"))
     for stress, rate in states():
         gradient = 0.5 * rate + 0.3 * (UNIT["shear"] - UNIT["shear"].T)
-        arguments = (
-            ufl.as_matrix((g * x).tolist()) for g, x in ((MODULUS[1], stress), (1, gradient))
-        )
-        expression = apply_algebra_lowering(module["stress_rate"](*arguments, 1))
+        arguments = (in_ufl(g * x) for g, x in ((MODULUS[1], stress), (1, gradient)))
+        expression = module["stress_rate"](*arguments, 1)
         place = [(i, j) for i in range(3) for j in range(3)]
-        found = [float(expression.evaluate((), {}, ij, StackDict())) for ij in place]
+        found = [ufl_number(expression, ij) for ij in place]
         scaled = TIME[1] * gradient
         d = scaled + scaled.T
         wanted = d + scaled @ stress + stress @ scaled.T - stress
@@ -269,45 +260,6 @@ def test_ufl_says_every_law_that_has_a_name(name):
         np.testing.assert_allclose(
             np.reshape(found, (3, 3)), wanted, atol=1e-10 * np.max(abs(wanted))
         )
-
-
-# what SymPy's reader of LaTeX knows: letters and functions of one letter
-_WORDS = (
-    (r"\dot{\boldsymbol{\gamma}}", r"\gamma"), (r"\boldsymbol{\sigma}", r"\sigma"),
-    (r"\boldsymbol{I}", "I"), (r"\operatorname{tr}", "T"), (r"\max", "M"),
-    (r"\left|\sigma_\mathrm{d}\right|", "D"), (r"\Lambda_\mathrm{m}", r"\Omega"),
-    ("L^{2}", "N"), ("_{k}", ""), (r"\left", ""), (r"\right", ""),
-    (r" \, ", r" \cdot "),
-)  # fmt: skip
-
-
-@functools.cache
-def read_latex(text):
-    for old, new in _WORDS:
-        text = text.replace(old, new)
-    return parse_latex(text, strict=True)
-
-
-def value(tree, letters):
-    """Evaluate a tree, with matrices for the tensors."""
-    if tree.is_Symbol:
-        return letters[tree.name]
-    if tree.is_number:
-        return float(tree)
-    parts = [value(part, letters) for part in tree.args]
-    if tree.is_Add:
-        return sum(parts)
-    if tree.is_Mul:
-        product = parts[0]
-        for part in parts[1:]:
-            product = product @ part if np.ndim(product) and np.ndim(part) else product * part
-        return product
-    if tree.is_Pow:
-        return parts[0] ** parts[1]
-    name = tree.func.__name__
-    if name in ("exp", "Abs"):
-        return {"exp": np.exp, "Abs": abs}[name](parts[0])
-    return {"T": np.trace, "M": max}[name](*parts)
 
 
 @every_law
@@ -359,8 +311,7 @@ def test_terms_are_added_to_a_law_with_a_name():
     term = LawTerm("sigma.gammadot+gammadot.sigma", 0.1)
     both = Equation((term,), named=law_parts(law)[0])
     again = equation_from_json(equation_to_json(both))
-    module = {}
-    exec(write_equation(again, "python"), module)
+    module = module_of(write_equation(again, "python"))
     for stress, rate in states():
         wanted = extra_of("rolie_poly", CONSTANTS["rolie_poly"][0], stress, rate)
         wanted = wanted + 0.1 * (stress @ rate + rate @ stress)

@@ -217,7 +217,7 @@ def test_models_that_share_every_shape_have_programs_of_their_own(folder):
     times = np.linspace(0.1, 2.0, 30)
     run = Run("a", times, start_up(2.0), np.full(30, 2.0), 100.0 * (1.0 - np.exp(-times)))
     sizes = {}
-    for name in ("giesekus_mobility", "tool_compliance", "stress_offset", "tr(sigma)*sigma"):
+    for name in ("giesekus_mobility", "tr(sigma)*sigma"):
         model = AugmentedModel(declared, [make_effect(name)])
         theta = model.zero()
         theta[model.positions(name)] = 1e-3

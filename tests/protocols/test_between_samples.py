@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 from independent import Giesekus, of_rate, oscillation
 
+import discover as dc
 from discover.dataset.from_dataframe import from_dataframe
 from discover.dataset.records.thinning import thin_run
 from discover.protocols import (
@@ -15,6 +16,7 @@ from discover.protocols import (
     shear_rates,
     step_rates,
 )
+from discover.protocols.between_samples import steps_between_samples
 
 AMPLITUDE = 4.0
 
@@ -137,3 +139,50 @@ def test_a_file_of_few_samples_a_cycle_is_read_so_and_stays_so_when_it_is_thinne
     thinned = thin_run(run, 40)
     # 5 % of the largest rate is what straight lines of fewer knots may miss
     assert off(thinned.protocol, lambda t: AMPLITUDE * np.cos(t), times) < 0.07
+
+
+TIMES = np.linspace(0.0, 8.0, 81)
+STEP = np.where(TIMES < 3.95, 1.0, 3.0)
+
+
+def steps(rate, times=TIMES, protocol=None):
+    return steps_between_samples(protocol or sampled_rate(times, rate), times, rate)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_step_lies_between_the_samples_on_its_two_sides(noise):
+    rate = STEP + noise * np.random.default_rng(0).standard_normal(81)
+    (found,) = steps(rate)
+    assert (found.start, found.end) == pytest.approx((3.9, 4.0))
+    assert found.change == pytest.approx(2.0, abs=5 * noise + 1e-12)
+    assert found.place is None
+    assert found.at(0.5) == pytest.approx(3.95)
+
+
+@pytest.mark.parametrize(
+    "rate",
+    [
+        np.full(81, 2.0),
+        2.0 * np.cos(TIMES),
+        np.abs(np.mod(TIMES, 2.0) - 1.0),  # a triangle
+        np.random.default_rng(1).standard_normal(81),
+        np.clip(1.0 + 10.0 * (TIMES - 3.95), 1.0, 3.0),  # the record shows it rise
+        np.where(TIMES < 3.95, 1.0, 1.001),
+    ],
+    ids=["constant", "wave", "triangle", "noise", "rise", "last digit"],
+)
+def test_no_step_is_seen_in(rate):
+    assert steps(rate) == ()
+
+
+def test_a_step_whose_instant_is_given_is_not_in_question():
+    given = dc.step_rates([0.0, 3.93], [1.0, 3.0])
+    assert steps(STEP, protocol=given) == ()
+    assert len(steps(STEP, protocol=measured_rate(TIMES, STEP))) == 1
+
+
+def test_a_step_at_either_end_of_a_record_is_no_step():
+    """One sample beyond it tells nothing of where it happened that its own error does not hide."""
+    for edge in (1, 80):
+        rate = np.where(np.arange(81) < edge, 1.0, 3.0)
+        assert steps(rate) == ()

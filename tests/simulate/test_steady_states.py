@@ -3,19 +3,20 @@
 import jax
 import numpy as np
 import pytest
+from independent import PhanThienTanner, steps
 from independent.authors import ByAuthors, rolie_poly_fene
 from independent.homogeneous import GiesekusFluid
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from discover import Fluid, make_law
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.fluids import solve_batch, solve_on_grid
-from discover.forward.grids import lay_out
+from discover.forward.grids import lay_out, make_grid
+from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.giesekus import Giesekus
-from discover.protocols import in_flow, start_up
+from discover.protocols import after_steady_flow, in_flow, start_up
 from discover.protocols.control import steady_rates
 from discover.simulate import SimulationError, simulate
 from tensor_library.law_terms import LawTerms
@@ -136,3 +137,43 @@ def test_where_no_steady_state_of_chains_is_reached_none_is_told():
     found = np.asarray(solve_batch(fluid, flows))[0, :, 3]
     assert found[0] == pytest.approx(fene_p_shear_stress(50.0, 1.0), rel=1e-6)
     assert np.isnan(found[1]) or found[1] == pytest.approx(fene_p_shear_stress(50.0, 1e5))
+
+
+BEFORE, AFTER = 20.0, 0.1
+TIMES = np.geomspace(1e-3, 60.0, 60)
+
+
+@pytest.mark.parametrize(
+    ("time", "epsilon"),
+    [pytest.param(0.036, 5.8, marks=pytest.mark.slow), (0.014, 8.3), (0.9, 0.5)],
+)
+def test_the_stress_before_a_step_is_that_of_the_steady_flow(time, epsilon):
+    fluid = Fluid(make_law("ptt_linear", {"epsilon": epsilon}), 1.0, time)
+    flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
+    found = np.asarray(solve_batch(fluid, lay_out([flow], [TIMES], relaxation_time=time)))[0, :, 3]
+    law = PhanThienTanner(extensibility=epsilon, relaxation_time=time)
+    held = 200.0 * time
+    exact = law.respond(steps([0.0, held], [BEFORE, AFTER]), held + TIMES).sigma12
+    # in steps of a strain of one throughout, the first case is off by 35 %
+    np.testing.assert_allclose(found, exact, atol=2e-5 * exact[0])
+
+
+@pytest.mark.parametrize("time", [0.03, 0.1, 0.5])
+def test_a_law_that_thins_is_followed_through_the_flow_before_whatever_its_time(time):
+    """In steps of a strain of one it ran away where it relaxes in 0.1 s or less."""
+    law = make_law("ptt_linear", {"epsilon": 10.0})
+    flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
+    found = np.asarray(solve_batch(Fluid(law, 1.0, time), lay_out([flow], [TIMES])))[0, :, 3]
+    law = PhanThienTanner(extensibility=10.0, relaxation_time=time)
+    held = 200.0 * time
+    exact = law.respond(steps([0.0, held], [BEFORE, AFTER]), held + TIMES).sigma12
+    np.testing.assert_allclose(found, exact, atol=1e-3 * exact[0])
+
+
+@pytest.mark.parametrize(("time", "most", "strain"), [(None, 1400, 0.25), (6.0, 450, 1.0)])
+def test_steady_flow_before_a_run_takes_some_hundred_steps(time, most, strain):
+    flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
+    grid, _ = make_grid(flow, TIMES, relaxation_time=time)
+    before = np.diff(grid[grid <= 0.0])
+    assert before.size < most
+    assert np.max(before) <= strain / BEFORE + 1e-12

@@ -1,12 +1,14 @@
-"""Laws that shear stress cannot tell apart: the reason why N2 is often undetermined."""
+"""What some laws show and others cannot: laws alike in shear, ellipses at fast oscillation."""
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.special import jv
 
 import tensor_library as tl
-from discover.laws import Fluid, JohnsonSegalman, LibraryExpansion
+from discover.laws import Fluid, JohnsonSegalman, LibraryExpansion, make_law
 from discover.protocols import oscillatory_shear, start_up, step_rates
+from discover.report.plots.comparison.studies import third_harmonic
 from discover.simulate import simulate
 
 HISTORIES = {
@@ -57,3 +59,29 @@ def test_a_term_that_touches_33_only_is_invisible_to_shear_stress():
     without = simulate(Fluid.dimensionless(JohnsonSegalman(0.0)), flow, times)
     np.testing.assert_allclose(with_term.shear_stress, without.shear_stress, atol=1e-7)
     assert np.max(np.abs(with_term.components[:, 2])) > 0.1
+
+
+DEBORAH = 50.0
+
+
+def late_third_harmonic(law, strain):
+    """I₃/I₁ in one cycle after ten relaxation times."""
+    period = 2.0 * np.pi / DEBORAH
+    start = np.ceil(10.0 / period) * period
+    times = np.concatenate([[0.0], start + period * np.arange(65) / 64.0])
+    stress = simulate(Fluid(law, 1.0, 1.0), oscillatory_shear(strain * DEBORAH, DEBORAH), times)
+    return third_harmonic(stress.shear_stress[1:])
+
+
+@pytest.mark.parametrize("strain", [1.0, 3.0, 6.0])
+def test_johnson_segalman_is_no_ellipse_at_large_strain(strain):
+    """σ12 = G sin(aγ)/a, a² = ξ(2 − ξ), has harmonics J₁(aγ₀), J₃(aγ₀)."""
+    limit = 0.8 * strain
+    wanted = abs(jv(3, limit) / jv(1, limit))
+    found = late_third_harmonic(make_law("johnson_segalman", {"xi": 0.4}), strain)
+    assert found == pytest.approx(wanted, rel=0.02)
+
+
+def test_giesekus_is_an_ellipse_at_any_strain():
+    # scipy alone gives 0.7 % at a strain of 6 and De = 50
+    assert late_third_harmonic(make_law("giesekus", {"alpha": 0.2}), 6.0) < 0.01

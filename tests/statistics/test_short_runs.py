@@ -51,10 +51,10 @@ def test_six_runs_of_fifteen_samples_show_a_misfit_as_large_as_their_noise():
 
 
 def test_what_short_runs_cannot_tell_is_said():
-    generator = np.random.default_rng(0)
-    bent = 0.01 * np.cos(np.linspace(0.0, np.pi, 15))
-    residuals = list(bent + noise(generator))
-    assert "do not tell correlated noise" in what_is_left(residuals, [np.ones(15)] * 6).pattern
+    # no larger than a pattern of noise may be, and yet a pattern
+    bent = 0.008 * np.cos(np.linspace(0.0, np.pi, 15))
+    residuals = list(bent + noise(np.random.default_rng(1)))
+    assert "do not tell correlated noise" in what_is_left(residuals, [np.ones(15)] * 6).reason
     # changes from sample to sample, as noise does
     few = what_is_left([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
     assert few.probability is None

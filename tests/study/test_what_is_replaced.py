@@ -143,7 +143,6 @@ LISTED = [sys.executable, "-P", "-c", "from discover.cli import main; main()", "
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])
 def test_a_reader_who_leaves_early_changes_nothing(tmp_path, stream):
     command = LISTED if stream == "stdout" else [*LISTED[:-1], "compare", "nothing.toml"]
-    whole = subprocess.run(command, cwd=tmp_path, capture_output=True)
     read, write = os.pipe()
     os.close(read)  # as `| true` does
     other = "stderr" if stream == "stdout" else "stdout"
@@ -151,8 +150,8 @@ def test_a_reader_who_leaves_early_changes_nothing(tmp_path, stream):
         done = subprocess.run(command, cwd=tmp_path, **{stream: write, other: subprocess.PIPE})
     finally:
         os.close(write)
-    assert done.returncode == whole.returncode == (0 if stream == "stdout" else 2)
-    assert getattr(done, other) == getattr(whole, other)
+    assert done.returncode == (0 if stream == "stdout" else 2)
+    assert getattr(done, other) == b""
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no device that is always full")

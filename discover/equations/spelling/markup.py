@@ -186,10 +186,7 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
 class InUnitsNotation(MathmlNotation):
     """The same in units, for each mode: s for σ/G, and λ before γ̇.
 
-    Parameters
-    ----------
-    modes
-        How many there are; of several each symbol has the index k.
+    `modes`: how many there are; of several each symbol has the index k.
     """
 
     def __init__(self, modes: int):
@@ -219,14 +216,8 @@ def law_element(
 
     Browsers do not break a `math` element, so each summand is one of its own.
 
-    Parameters
-    ----------
-    terms, linear_relaxation, named
-        As in `law_latex`.
-    modes
-        Of a law in Pa and s how many there are; 0 for a dimensionless one.
-    solvent
-        Whether a law in Pa and s has a solvent.
+    `modes`: of a law in Pa and s how many there are; 0 for a dimensionless one. `solvent`: whether
+    a law in Pa and s has a solvent.
     """
     notation = InUnitsNotation(modes) if modes else MathmlNotation()
     stress, rate = notation.tensor("sigma"), notation.tensor("gammadot")

@@ -26,20 +26,13 @@ _WEAKEST = 5
 class Direction:
     """A change of the law's coefficients, its largest entry one.
 
-    Attributes
-    ----------
-    coefficients
-        Term → entry.
-    exact
-        Whether the observed stresses do not change at all, to first order.
-    noise_for_tenth
-        Relative noise of the data at which the standard error along the direction is 0.1, zero
-        for an exact one: with less noise the data determine it better.
-    changes
-        Relative change of σ12, N1 and N2 per unit of the direction; N2's relative to N1.
-    at_any_size
-        Whether a finite step along the direction leaves σ12 as it is too; None where not decided.
-        Where it does not, the invisible changes of the law lie on a curve (as the twins of
+    `coefficients`: term → entry.
+    `exact`: whether the observed stresses do not change at all, to first order.
+    `noise_for_tenth`: relative noise of the data at which the standard error along the direction is
+        0.1, zero for an exact one: with less noise the data determine it better.
+    `changes`: relative change of σ12, N1 and N2 per unit of the direction; N2's relative to N1.
+    `at_any_size`: whether a finite step along the direction leaves σ12 as it is too; None where not
+        decided. Where it does not, the invisible changes of the law lie on a curve (as the twins of
         Johnson–Segalman do) that has this direction as its tangent.
     """
 
@@ -79,17 +72,10 @@ def weak_directions(
 ) -> tuple[list[Direction], list[Direction]]:
     """Return the exact null directions and the weakest of the others.
 
-    Parameters
-    ----------
-    names
-        Of the coefficients.
-    observed
-        Sensitivities of what is observed, weighted so that the norm of a column is the relative
-        root-mean-square change per unit of the coefficient.
-    quantities
-        Sensitivities of each quantity, weighted alike.
-    n_observations
-        Number of values observed, each with independent noise.
+    `names`: of the coefficients. `observed`: sensitivities of what is observed, weighted so that
+    the norm of a column is the relative root-mean-square change per unit of the coefficient.
+    `quantities`: sensitivities of each quantity, weighted alike. `n_observations`: number of values
+    observed, each with independent noise.
     """
     norms = np.linalg.norm(observed, axis=0)
     scale = np.where(norms > EXACT * np.max(norms, initial=1.0), norms, 1.0)

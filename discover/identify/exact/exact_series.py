@@ -61,19 +61,10 @@ def stress_series(
 ) -> list[tuple[Any, Any, Any, Any]]:
     """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
 
-    Parameters
-    ----------
-    coefficients
-        The law dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, dimensionless: term → c. Closed forms are
-        not polynomials and raise `ValueError`.
-    rate
-        Coefficients of γ̇(t) = Σ rate[k] tᵏ.
-    order
-        Last order.
-    linear_relaxation
-        Whether −σ is part of the law.
-    modular
-        Whether to return residues modulo `PRIME` and not fractions.
+    `coefficients`: the law dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, dimensionless: term → c. Closed
+    forms are not polynomials and raise `ValueError`. `rate`: coefficients of γ̇(t) = Σ rate[k] tᵏ.
+    `order`: last order. `linear_relaxation`: whether −σ is part of the law. `modular`: whether to
+    return residues modulo `PRIME` and not fractions.
     """
     return list(islice(_growing(coefficients, rate, linear_relaxation, modular), order + 1))
 
@@ -119,12 +110,9 @@ def _growing(
 class Agreement:
     """To which order two laws agree in every shear history.
 
-    Attributes
-    ----------
-    order
-        Order to which the series were computed.
-    sigma12, N1, N2
-        First order at which the quantity differs, or None where it agrees to `order`.
+    `order`: order to which the series were computed.
+    `sigma12`, `N1`, `N2`: first order at which the quantity differs, or None where it agrees to
+        `order`.
     """
 
     order: int
@@ -141,12 +129,7 @@ def compare_series(
 ) -> Agreement:
     """Return where the Taylor series of two laws part, over random histories.
 
-    Parameters
-    ----------
-    first, second
-        The laws, as in `stress_series`.
-    order, linear_relaxation
-        As in `stress_series`.
+    `first`, `second`: the laws, as in `stress_series`.
     """
     generator = random.Random(2)
     parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
@@ -179,20 +162,8 @@ def solve_for_coefficient(
     whose real roots are the candidates. A rational root is exact, and then all later orders have to
     agree exactly; of the others only a simulation can tell.
 
-    Parameters
-    ----------
-    target
-        The law to reproduce.
-    term
-        The term sought.
-    kept
-        Other terms of the law sought, with their coefficients.
-    order, linear_relaxation
-        As in `stress_series`.
-
-    Returns
-    -------
-    Candidates with whether they are proved.
+    `target`: the law to reproduce. `term`: the term sought. `kept`: other terms of the law sought,
+    with their coefficients. Returns candidates with whether they are proved.
     """
     generator = random.Random(3)
     rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]

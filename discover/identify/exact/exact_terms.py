@@ -61,17 +61,10 @@ def exact_terms(
 ) -> list[Components]:
     """Return the components of every term at one state.
 
-    Parameters
-    ----------
-    stress
-        σ11, σ22, σ33, σ12: integers, fractions, or anything else that adds and multiplies.
-    rate
-        γ̇ of the same kind.
-    one, zero
-        Unit and zero of the ring.
-    form_values
-        Value of each closed form, by key. A transcendental function of tr σ is algebraically
-        independent of the polynomials, so any number stands for it in a search for relations.
+    `stress`: σ11, σ22, σ33, σ12: integers, fractions, or anything else that adds and multiplies.
+    `rate`: γ̇ of the same kind. `one`, `zero`: unit and zero of the ring. `form_values`: value of
+    each closed form, by key. A transcendental function of tr σ is algebraically independent of the
+    polynomials, so any number stands for it in a search for relations.
     """
     s11, s22, s33, s12 = stress
     tensors = {

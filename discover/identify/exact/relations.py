@@ -24,14 +24,10 @@ Reach = Literal["nothing", "33"]
 class TermRelation:
     """A combination of terms that vanishes in simple shear, or lives on σ33 only.
 
-    Attributes
-    ----------
-    coefficients
-        Term → whole number.
-    touches
-        ``"nothing"``: the combination is zero in every simple shear, so terms can be exchanged
-        freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets σ33 act
-        back, N2 does.
+    `coefficients`: term → whole number.
+    `touches`: ``"nothing"``: the combination is zero in every simple shear, so terms can be
+        exchanged freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets
+        σ33 act back, N2 does.
     """
 
     coefficients: Mapping[str, int]
@@ -74,10 +70,8 @@ def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
     count as independent of every polynomial.
 
-    Returns
-    -------
-    Relations that touch nothing first, then those that touch σ33 only and are not of the first
-    kind. Each is a basis vector of its null space, with as few terms as elimination gives.
+    Returns relations that touch nothing first, then those that touch σ33 only and are not of the
+    first kind. Each is a basis vector of its null space, with as few terms as elimination gives.
     """
     generator = random.Random(0)
     n = len(library)

@@ -17,17 +17,12 @@ LEVEL = 0.05
 class Evidence:
     """How well the data tell a law from the chosen one.
 
-    Attributes
-    ----------
-    told_apart
-        Whether the test rejects, at `LEVEL`, that the other law is as good.
-    test
-        ``"tie"``: the predictions agree to integration error. ``"likelihood_ratio"``: one law is
-        the other with a coefficient zero. ``"vuong"``: neither holds the other.
-    p_value
-        Probability of so large a disadvantage by chance; one for a tie.
-    effective_samples
-        Number of independent residuals, fewer than samples where residuals are correlated.
+    `told_apart`: whether the test rejects, at `LEVEL`, that the other law is as good.
+    `test`: ``"tie"``: the predictions agree to integration error. ``"likelihood_ratio"``: one law
+        is the other with a coefficient zero. ``"vuong"``: neither holds the other.
+    `p_value`: probability of so large a disadvantage by chance; one for a tie.
+    `effective_samples`: number of independent residuals, fewer than samples where residuals are
+        correlated.
     """
 
     told_apart: bool
@@ -53,15 +48,10 @@ def compare_residuals(
     with χ² of as many degrees of freedom, n_eff being the number of samples over the correlation
     time of the chosen law's residuals.
 
-    Parameters
-    ----------
-    chosen, other
-        Weighted residuals of the two fitted laws, in the order of time within a run.
-    nested
-        Number of coefficients of the chosen law that the other lacks, if it is otherwise the same;
-        0 where neither holds the other.
-    floor
-        Norm of the difference of the two predictions that integration error may cause.
+    `chosen`, `other`: weighted residuals of the two fitted laws, in the order of time within a run.
+    `nested`: number of coefficients of the chosen law that the other lacks, if it is otherwise the
+    same; 0 where neither holds the other. `floor`: norm of the difference of the two predictions
+    that integration error may cause.
     """
     n = chosen.size
     samples = _effective_samples(chosen, run_of_row)

@@ -42,20 +42,12 @@ _MOST_POLISHED = 2 * BREADTH
 class FittedRival:
     """A fitted law that the data cannot tell from the chosen one.
 
-    Attributes
-    ----------
-    law
-        Its terms, refitted.
-    misfit
-        Relative root-mean-square misfit.
-    difference
-        Relative root-mean-square difference of its predictions from the chosen law's.
-    evidence
-        The test that could not tell them apart.
-    simpler
-        Whether it comes before the chosen law in the order of simplicity.
-    fit
-        The refit itself.
+    `law`: its terms, refitted.
+    `misfit`: relative root-mean-square misfit.
+    `difference`: relative root-mean-square difference of its predictions from the chosen law's.
+    `evidence`: the test that could not tell them apart.
+    `simpler`: whether it comes before the chosen law in the order of simplicity.
+    `fit`: the refit itself.
     """
 
     law: LawTerms
@@ -108,14 +100,9 @@ class FittedRival:
 class RivalTable(SentenceAndTable):
     """Every law met that the data cannot tell from the chosen one.
 
-    Attributes
-    ----------
-    rivals
-        Closest predictions first.
-    tested
-        How many laws were tested.
-    simplest
-        Whether the chosen law is the simplest of them all.
+    `rivals`: closest predictions first.
+    `tested`: how many laws were tested.
+    `simplest`: whether the chosen law is the simplest of them all.
     """
 
     rivals: tuple[FittedRival, ...] = field(default_factory=tuple)

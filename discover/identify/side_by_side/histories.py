@@ -32,15 +32,10 @@ _START_UPS = (1.0, 3.0)
 class Histories:
     """Shear flows with the times at which they are looked at.
 
-    Attributes
-    ----------
-    protocols, grids
-        Batched, ready to simulate.
-    amplitude
-        Root-mean-square shear rate of each random history, shape (r,); these come first.
-    names
-        Of the ordinary flows that follow, for telling laws apart; the same batch serves both, so
-        that one compiled program does.
+    `protocols`, `grids`: batched, ready to simulate.
+    `amplitude`: root-mean-square shear rate of each random history, shape (r,); these come first.
+    `names`: of the ordinary flows that follow, for telling laws apart; the same batch serves both,
+        so that one compiled program does.
     """
 
     protocols: FlowProtocol
@@ -72,10 +67,7 @@ def random_histories(max_step: float = np.inf) -> Histories:
     relaxation times, at root-mean-square rates of 0.3, 1, 2 and 3: nearly linear to strongly
     nonlinear. Rates that start with a jump are among them, as cosines do not vanish at zero.
 
-    Parameters
-    ----------
-    max_step
-        Longest step, in relaxation times, as from `longest_step`.
+    `max_step`: longest step, in relaxation times, as from `longest_step`.
     """
     generator = np.random.default_rng(0)
     protocols, amplitudes = [], []
@@ -114,11 +106,9 @@ def histories_for(law: AbstractConstitutiveLaw | None) -> Histories:
 class Difference:
     """How far a law is from another over a set of histories.
 
-    Attributes
-    ----------
-    sigma12, N1, N2
-        Largest over the histories of the root-mean-square difference over the root-mean-square of
-        the reference; N2's is relative to the reference's N1. Infinite where the law runs away.
+    `sigma12`, `N1`, `N2`: largest over the histories of the root-mean-square difference over the
+        root-mean-square of the reference; N2's is relative to the reference's N1. Infinite where
+        the law runs away.
     """
 
     sigma12: float
@@ -136,12 +126,7 @@ def differences(
 
     Histories in which the reference itself runs away are left out.
 
-    Parameters
-    ----------
-    library
-        Holds every term of the laws.
-    base
-        The known part; by default UCM.
+    `library`: holds every term of the laws. `base`: the known part; by default UCM.
     """
     flows = histories_for(base)
     stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)

@@ -51,18 +51,9 @@ def stresses_of_laws(
 ) -> Float[np.ndarray, "laws runs n 4"]:
     """Return the dimensionless stresses of several laws in a batch of flows.
 
-    Parameters
-    ----------
-    library
-        Holds every term of the laws.
-    protocols, grids
-        From `stack_protocols` and `make_grids`.
-    base
-        The known part; by default UCM.
-
-    Returns
-    -------
-    σ11, σ22, σ33, σ12; not finite where a law runs away.
+    `library`: holds every term of the laws. `protocols`, `grids`: from `stack_protocols` and
+    `make_grids`. `base`: the known part; by default UCM. Returns σ11, σ22, σ33,
+    σ12, not finite where a law runs away.
     """
     base = UpperConvectedMaxwell() if base is None else base
     parts = [

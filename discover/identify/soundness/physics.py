@@ -61,16 +61,10 @@ _PER_RATE = len(_DEBORAH_FACTORS)
 class PhysicsCheck:
     """One check of a law.
 
-    Attributes
-    ----------
-    passed
-        Whether the law passes; None where the check could not be made.
-    value
-        The number that decides.
-    where
-        Where it is taken, or where the law fails, in words.
-    text
-        One sentence for a reader.
+    `passed`: whether the law passes; None where the check could not be made.
+    `value`: the number that decides.
+    `where`: where it is taken, or where the law fails, in words.
+    `text`: one sentence for a reader.
     """
 
     name: str
@@ -88,10 +82,7 @@ class PhysicsCheck:
 class PhysicsReport(SentenceAndTable):
     """All checks of a law.
 
-    Attributes
-    ----------
-    checks
-        In a fixed order.
+    `checks` in a fixed order.
     """
 
     checks: tuple[PhysicsCheck, ...]
@@ -125,13 +116,9 @@ def check_physics(
 ) -> PhysicsReport:
     """Return the checks of a fluid.
 
-    Parameters
-    ----------
-    flows
-        Flows along which stresses are looked at.
-    weissenberg, deborah
-        Largest shear rate and frequency of training, times the mean relaxation time: the corner of
-        the box beyond which the law extrapolates.
+    `flows`: flows along which stresses are looked at. `weissenberg`, `deborah`: largest shear rate
+    and frequency of training, times the mean relaxation time: the corner of the box beyond which
+    the law extrapolates.
     """
     fluid = replace(fluid, law=in_shared_form(fluid.law))
     along = trajectories(fluid, in_enough_steps(fluid, flows))

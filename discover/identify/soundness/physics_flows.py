@@ -26,14 +26,10 @@ _SAMPLES_A_CYCLE = 48
 class Trajectories:
     """What happens to each mode along a set of flows.
 
-    Attributes
-    ----------
-    smallest_conformation
-        Smallest eigenvalue of I + σ/G over modes and samples, shape (runs,); nan where the law runs
-        away.
-    dissipation
-        Least σ:d − dF/dt over modes and samples, in units of G/λ of the mode, with F the energy
-        that Hookean dumbbells store; nan where undefined.
+    `smallest_conformation`: smallest eigenvalue of I + σ/G over modes and samples, shape (runs,);
+        nan where the law runs away.
+    `dissipation`: least σ:d − dF/dt over modes and samples, in units of G/λ of the mode, with F the
+        energy that Hookean dumbbells store; nan where undefined.
     """
 
     smallest_conformation: Float[np.ndarray, " runs"]
@@ -94,13 +90,9 @@ def _energy(law, stress, rate):
 class Cycles:
     """Oscillations over a grid of Weissenberg and Deborah numbers.
 
-    Attributes
-    ----------
-    names
-        Of the flows, Weissenberg number first.
-    work
-        ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan where
-        the law runs away.
+    `names`: of the flows, Weissenberg number first.
+    `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
+        where the law runs away.
     """
 
     names: tuple[str, ...]
@@ -115,10 +107,8 @@ def time_scale(fluid: Fluid) -> float:
 def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
     """Return three cycles of every pair of numbers, simulated together.
 
-    Parameters
-    ----------
-    weissenberg, deborah
-        Amplitudes of the shear rate and frequencies, times the mean relaxation time.
+    `weissenberg`, `deborah`: amplitudes of the shear rate and frequencies, times the mean
+    relaxation time.
     """
     scale = time_scale(fluid)
     pairs = [(wi, de) for wi in weissenberg for de in deborah]

@@ -23,15 +23,10 @@ def steady_shear(
     Newton's method at each rate from the solution at the one before, starting at rest: the branch
     that a slow rise of the rate follows.
 
-    Parameters
-    ----------
-    rates
-        Dimensionless shear rates, increasing, close enough for Newton's method to follow.
+    `rates`: dimensionless shear rates, increasing, close enough for Newton's method to follow.
 
-    Returns
-    -------
-    Stress (11, 22, 33, 12) with the law's structure variables behind it, ∂(dσ/dt)/∂σ, and the size
-    of dσ/dt over that of the stress.
+    Returns stress (11, 22, 33, 12) with the law's structure variables behind it, ∂(dσ/dt)/∂σ, and
+    the size of dσ/dt over that of the stress.
     """
     return _follow(law.stress_rate, law.rest(), rates)
 
@@ -43,11 +38,6 @@ def steady_uniaxial_extension(
     """Return the steady (σ11, σ22 = σ33) in uniaxial extension, Jacobians and residuals.
 
     Behind these two stand the structure variables of the law.
-
-    Parameters
-    ----------
-    law, rates
-        As in `steady_shear`, with extension rates.
     """
 
     def slope(state, rate):

@@ -32,12 +32,8 @@ _DIFFERENCES = {"N1": np.array([1.0, -1.0, 0.0]), "N2": np.array([0.0, 1.0, -1.0
 class HiddenStresses:
     """What σ12 feels of the normal stresses in one law.
 
-    Attributes
-    ----------
-    unfelt
-        Orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
-    felt
-        For N1 and N2, whether the difference is free of every unfelt combination.
+    `unfelt`: orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
+    `felt`: for N1 and N2, whether the difference is free of every unfelt combination.
     """
 
     unfelt: Float[np.ndarray, "k 3"]
@@ -75,10 +71,7 @@ class HiddenStresses:
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random shear histories.
 
-    Parameters
-    ----------
-    law
-        Any dimensionless law. Histories in which it runs away are left out.
+    `law`: any dimensionless law. Histories in which it runs away are left out.
     """
     flows = histories_for(law)
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))

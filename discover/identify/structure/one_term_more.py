@@ -24,13 +24,9 @@ themselves, in exact arithmetic."""
 class OneTermMore:
     """The term that leaves a quantity most open if it is fitted along.
 
-    Attributes
-    ----------
-    term
-        Its name.
-    per_noise
-        Half of the 95 % interval of the quantity, root-mean-square over N1's, over the relative
-        noise of the records, white and of one size.
+    `term`: its name.
+    `per_noise`: half of the 95 % interval of the quantity, root-mean-square over N1's, over the
+        relative noise of the records, white and of one size.
     """
 
     term: str
@@ -50,17 +46,10 @@ def one_term_more(
 ) -> OneTermMore | None:
     """Return the term that leaves a quantity most open; None where none can be seen.
 
-    Parameters
-    ----------
-    names
-        Of all terms of the library.
-    support
-        Positions of those that the law has.
-    observed, quantity
-        Changes of what is observed and of the quantity per unit of each coefficient, so scaled
-        that the norm of a column is a root-mean-square over that of the records.
-    samples
-        How many samples of what is observed there are.
+    `names`: of all terms of the library. `support`: positions of those that the law has.
+    `observed`, `quantity`: changes of what is observed and of the quantity per unit of each
+    coefficient, so scaled that the norm of a column is a root-mean-square over that of the records.
+    `samples`: how many samples of what is observed there are.
     """
     worst = None
     for extra, name in enumerate(names):
@@ -88,12 +77,7 @@ def each_moved(
 ) -> dict[str, OneTermMore]:
     """Return the same of every quantity that is not observed, by its name.
 
-    Parameters
-    ----------
-    blocks
-        Changes of each quantity, observed or not.
-    observed
-        Which are.
+    `blocks`: changes of each quantity, observed or not. `observed`: which are.
     """
     stacked = np.concatenate([blocks[q] for q in observed])
     found = {

@@ -63,17 +63,12 @@ NOMINAL: Mapping[str, LawTerms] = {
 class QuantityVerdict:
     """Whether the observed stresses determine a normal stress difference.
 
-    Attributes
-    ----------
-    quantity
-        ``"N1"`` or ``"N2"``.
-    verdict
-        ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
+    `quantity`: ``"N1"`` or ``"N2"``.
+    `verdict`: ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
         experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
         of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
         form of the law; ``"determined"`` otherwise, within the library.
-    text
-        The verdict for a reader.
+    `text`: the verdict for a reader.
     """
 
     quantity: str
@@ -94,22 +89,13 @@ class QuantityVerdict:
 class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
-    Attributes
-    ----------
-    law
-        Its terms beyond the known part.
-    hidden
-        What σ12 feels of the normal stresses.
-    exact, weak
-        Directions of which the experiment sees nothing, and the weakest of the others.
-    quantities
-        Verdicts on N1 and N2 from what is observed.
-    n_exact_with_N1
-        Number of exact directions that would be left if N1 were measured as well.
-    N2_with_N1
-        Verdict on N2 if N1 were measured as well.
-    one_more
-        By quantity, the term beyond the law that leaves it most open.
+    `law`: its terms beyond the known part.
+    `hidden`: what σ12 feels of the normal stresses.
+    `exact`, `weak`: directions of which the experiment sees nothing, and the weakest of the others.
+    `quantities`: verdicts on N1 and N2 from what is observed.
+    `n_exact_with_N1`: number of exact directions that would be left if N1 were measured as well.
+    `N2_with_N1`: verdict on N2 if N1 were measured as well.
+    `one_more`: by quantity, the term beyond the law that leaves it most open.
     """
 
     name: str
@@ -161,14 +147,9 @@ class LawStructure(NotebookView):
 class Structure(SentenceAndTable):
     """What an experiment can determine of a library.
 
-    Attributes
-    ----------
-    laws
-        By nominal law; the first is the known part alone.
-    relations
-        Exact relations among terms in shear, at any law.
-    n_terms
-        Size of the library.
+    `laws`: by nominal law; the first is the known part alone.
+    `relations`: exact relations among terms in shear, at any law.
+    `n_terms`: size of the library.
     """
 
     laws: tuple[LawStructure, ...]
@@ -210,22 +191,11 @@ def analyse_structure(
 ) -> Structure:
     """Return what shear flows can determine of a library's coefficients.
 
-    Parameters
-    ----------
-    runs
-        Their protocols and sampling times; the stresses are not looked at, except that with
-        `use_normal_stresses` a run must hold N1 or N2 for it to count as measured.
-    library
-        Candidate terms.
-    base
-        Known part; by default UCM.
-    nominal
-        Laws around which to look besides the known part; by default those of `NOMINAL` whose
-        terms the library holds.
-    modulus, relaxation_time, solvent_viscosity
-        As in `make_problem`.
-    use_normal_stresses
-        Whether N1 and N2, where runs hold them, are observed too.
+    `runs`: their protocols and sampling times; the stresses are not looked at, except that with
+    `use_normal_stresses` a run must hold N1 or N2 for it to count as measured. `library`: candidate
+    terms. `base`: known part; by default UCM. `nominal`: laws around which to look besides the
+    known part; by default those of `NOMINAL` whose terms the library holds. `use_normal_stresses`:
+    whether N1 and N2, where runs hold them, are observed too.
     """
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:

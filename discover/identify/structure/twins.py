@@ -44,24 +44,15 @@ INVISIBLE_SIZE = 0.05
 class Twin(NotebookView):
     """A law that no shear stress tells from another.
 
-    Attributes
-    ----------
-    law
-        The twin, beyond the known part.
-    proof
-        ``"relation"`` or ``"series"``: exact. ``"histories"``: to integration error in random
+    `law`: the twin, beyond the known part.
+    `proof`: ``"relation"`` or ``"series"``: exact. ``"histories"``: to integration error in random
         histories.
-    keeps_N1
-        Whether N1 is the same too.
-    difference
-        Largest difference of σ12, N1 and N2 in random histories.
-    separated_by
-        Experiments that would tell the two apart.
-    order
-        Order to which the Taylor series agree exactly, where that was the proof. It is given at
-        coefficients rounded to short fractions: that the family of twins exists is exact.
-    change
-        The twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
+    `keeps_N1`: whether N1 is the same too.
+    `difference`: largest difference of σ12, N1 and N2 in random histories.
+    `separated_by`: experiments that would tell the two apart.
+    `order`: order to which the Taylor series agree exactly, where that was the proof. It is given
+        at coefficients rounded to short fractions: that the family of twins exists is exact.
+    `change`: the twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
     """
 
     law: LawTerms
@@ -120,14 +111,8 @@ def find_twins(
     polynomial law on UCM), every exchange along a relation that vanishes in shear, and
     every combination that lives on σ33 only (where nothing in the law feels σ33).
 
-    Parameters
-    ----------
-    library
-        Candidate terms.
-    law
-        The law, beyond the known part.
-    base
-        The known part; by default UCM.
+    `library`: candidate terms. `law`: the law, beyond the known part. `base`: the known part; by
+    default UCM.
     """
     base = UpperConvectedMaxwell() if base is None else base
     library = joint_library(library, [law])

@@ -40,10 +40,7 @@ class NotTranslatable(Exception):
 class Arithmetic:
     """Operations on lanes at one place of a function that is being written.
 
-    Parameters
-    ----------
-    builder
-        Writes where operations are asked for.
+    `builder`: writes where operations are asked for.
     """
 
     def __init__(self, builder: ir.IRBuilder):
@@ -142,10 +139,7 @@ class Arithmetic:
     def compare(self, how: str, x: Value, y: Value, of_nothing: bool = False) -> Value:
         """Return whether x stands so to y: ``<``, ``<=``, ``>``, ``>=``, ``==`` or ``!=``.
 
-        Parameters
-        ----------
-        of_nothing
-            What is said where one of them is not a number.
+        `of_nothing`: what is said where one of them is not a number.
         """
         if self.is_known(x, y):
             pairs = {"<": x < y, "<=": x <= y, ">": x > y, ">=": x >= y, "==": x == y}

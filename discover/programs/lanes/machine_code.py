@@ -28,11 +28,8 @@ _ALIGNED = 8
 class Writing:
     """A function of counts and of arrays while it is being written.
 
-    Parameters
-    ----------
-    counts, arrays
-        Names of its arguments: whole numbers first, then addresses. Those of `wide` hold eight
-        doubles at each place, those of `whole` whole numbers, the others a double.
+    `counts`, `arrays`: names of its arguments: whole numbers first, then addresses. Those of `wide`
+    hold eight doubles at each place, those of `whole` whole numbers, the others a double.
     """
 
     def __init__(
@@ -114,12 +111,7 @@ class Writing:
 def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
     """Return the function of a machine code, which takes whole numbers and addresses.
 
-    Parameters
-    ----------
-    code
-        From `Writing.compiled`.
-    counts, arrays
-        How many of each it takes.
+    `code`: from `Writing.compiled`. `counts`, `arrays`: how many of each it takes.
     """
     machine = _machine()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
@@ -141,12 +133,8 @@ def kept(made_from: Any, write: Callable[[], bytes]) -> bytes:
 
     It lies beside the programs, where nobody else can write; see `discover.programs.store`.
 
-    Parameters
-    ----------
-    made_from
-        What tells it from other code; what cannot be described, a user's own code, is not kept.
-    write
-        Makes it.
+    `made_from`: what tells it from other code; what cannot be described, a user's own code, is not
+    kept. `write`: makes it.
     """
     folder = program_folder()
     if folder is None:

@@ -48,17 +48,10 @@ def least_squares_covariance(
     Where a sensitivity is not finite, both are infinite. What no sample sees has no inverse: there
     (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C is far larger than any finding.
 
-    Parameters
-    ----------
-    columns
-        Sensitivities S.
-    sequences
-        Rows of each sequence of observations, in the order of time.
-    shared
-        Z of errors Z u that all rows share, u of unit variance, beside the noise; None for none.
-    sizes
-        Of the noise of each sequence, if it is taken to be the same in all, as `noise_model` takes
-        them.
+    `columns`: sensitivities S. `sequences`: rows of each sequence of observations, in the order of
+    time. `shared`: Z of errors Z u that all rows share, u of unit variance, beside the noise; None
+    for none. `sizes`: of the noise of each sequence, if it is taken to be the same in all, as
+    `noise_model` takes them.
     """
     if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
         # of a law that runs away beside its fit: nothing is known of its constants

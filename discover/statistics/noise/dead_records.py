@@ -27,12 +27,7 @@ def holds_signal(
     dead or was never connected. Records whose rates do not differ, or are not given, hold nothing
     only if that constant is zero. What is too short to tell is taken to hold something.
 
-    Parameters
-    ----------
-    measured
-        Records of all runs, in one unit.
-    rates
-        What was imposed, at the samples.
+    `measured`: records of all runs, in one unit. `rates`: what was imposed, at the samples.
     """
     rows = [np.asarray(row, dtype=float) for row in measured]
     if not rows or any(len(row) < FEWEST_TESTED for row in rows):

@@ -20,16 +20,11 @@ _CONTRADICTS = 0.01
 class NoiseModel:
     """Autoregressive noise, with one correlation for all sequences and a variance for each.
 
-    Attributes
-    ----------
-    coefficients
-        φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
-    correlation
-        Of samples k apart, from k = 0, shape (longest sequence,).
-    variance
-        Of each sequence, shape (sequences,).
-    effective_samples
-        Number of independent samples whose mean would be as uncertain as that of all sequences.
+    `coefficients`: φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
+    `correlation`: of samples k apart, from k = 0, shape (longest sequence,).
+    `variance`: of each sequence, shape (sequences,).
+    `effective_samples`: number of independent samples whose mean would be as uncertain as that of
+        all sequences.
     """
 
     coefficients: Float[np.ndarray, " order"]
@@ -56,17 +51,11 @@ def noise_model(
     the variance where nothing says that theirs is another; the Yule–Walker equations give the
     coefficients   [Brockwell & Davis 1991, Time Series, ch. 8].
 
-    Parameters
-    ----------
-    residuals
-        One sequence for each run and observed quantity, in the order of time. Where sampling is
-        uneven the correlation is one by sample, not by time.
-    n_parameters
-        Number of fitted parameters, which the variance allows for.
-    sizes
-        Of what is taken for noise of one size in each sequence: where a long run has smaller
-        weights than a short one, its residuals are smaller and its noise is not. By default the
-        residuals are.
+    `residuals`: one sequence for each run and observed quantity, in the order of time. Where
+    sampling is uneven the correlation is one by sample, not by time. `n_parameters`: number of
+    fitted parameters, which the variance allows for. `sizes`: of what is taken for noise of one
+    size in each sequence: where a long run has smaller weights than a short one, its residuals are
+    smaller and its noise is not. By default the residuals are.
     """
     sizes = [1.0] * len(residuals) if sizes is None else sizes
     alike = [r / size for r, size in zip(residuals, sizes, strict=True)]

@@ -188,12 +188,7 @@ def _is_apart(
 
 
 def _excess(values: Float[np.ndarray, " n"], width: int):
-    """Return by how much groups are off what is beside them, to one side; 0 if to neither.
-
-    Returns
-    -------
-    The first sample of each group, its excess with a sign, and the samples beside it, in order.
-    """
+    """Return by how much groups are off what is beside them, to one side; 0 if to neither."""
     start = np.arange(_BESIDE, len(values) - _BESIDE - width + 1)
     before = np.array([values[start - k] for k in range(1, _BESIDE + 1)])
     after = np.array([values[start + width - 1 + k] for k in range(1, _BESIDE + 1)])

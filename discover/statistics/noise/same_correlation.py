@@ -30,13 +30,9 @@ def same_correlation_probability(
     holds whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma
     distribution is put through the ratios drawn. Always the same lots are drawn.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in any unit.
-    intervals
-        Time between neighbouring samples of each; not a number of what is recorded otherwise than
-        the other runs, which is left out, as runs of fewer than 24 samples are.
+    `rows`: residuals of each run, in order, in any unit. `intervals`: time between neighbouring
+    samples of each; not a number of what is recorded otherwise than the other runs, which is left
+    out, as runs of fewer than 24 samples are.
     """
     told = [
         (np.asarray(row, dtype=float), float(interval))
@@ -80,15 +76,7 @@ def _by_lot(
 def _ratio(
     stacks: Sequence[Float[np.ndarray, "draws _"]], exponents: Float[np.ndarray, " runs"]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return twice the logarithm of the ratio of likelihoods of each draw, and the one correlation.
-
-    Parameters
-    ----------
-    stacks
-        For each run any number of sequences; the first of every run belong together.
-    exponents
-        Of the one correlation in each run.
-    """
+    """Return twice the log likelihood ratio of each draw, and the one correlation."""
     apart, together = 0.0, 0.0
     for rows, exponent in zip(stacks, exponents, strict=True):
         apart = apart + np.max(_likelihood(rows, _CORRELATIONS), axis=1)

@@ -21,10 +21,7 @@ def same_place_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     1]. The first and the last place, where an imperfect start or end shows, count for half of the
     places asked.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in a unit in which runs compare.
+    `rows`: residuals of each run, in order, in a unit in which runs compare.
     """
     return float(min((probability for _, probability in _places(rows)), default=1.0))
 

@@ -9,15 +9,16 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.fft import dct
 from scipy.signal import lfilter
 from scipy.stats import gamma
 
-from discover.statistics.noise.whittle import HALF_SWINGS, correlated, smooth
-
 LARGEST_CORRELATION = 0.9
 """Of neighbouring samples, up to which a sequence may be noise."""
+
+_HALF_SWINGS = np.array([1.0, 2.0, 4.0, 8.0])
+"""Of a smooth misfit along a run, as they are tried."""
 
 _CORRELATIONS = np.linspace(0.0, LARGEST_CORRELATION, 10)
 _SHARES = np.append(0.0, np.geomspace(0.3, 300.0, 10))  # of the slowest, over the noise's variance
@@ -37,10 +38,7 @@ def smooth_misfit_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma distribution is
     put through the gains drawn. Always the same lots are drawn.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each run, in order, in any unit.
+    `rows`: residuals of each run, in order, in any unit.
     """
     gain, rho = _gain([row[None] for row in rows])
     if gain[0] < _PLAIN:
@@ -65,7 +63,7 @@ def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
         power = np.square(np.asarray(dct(rows, type=2, norm="ortho")))
         level = np.maximum(power @ inverse / n, 1e-300)
         likelihood = (-0.5 * n * np.log(level) - normalised).reshape(
-            -1, len(_CORRELATIONS), len(HALF_SWINGS), len(_SHARES)
+            -1, len(_CORRELATIONS), len(_HALF_SWINGS), len(_SHARES)
         )
         alone = alone + likelihood[..., 0, 0]
         beside = beside + np.max(likelihood, axis=-1)
@@ -77,7 +75,20 @@ def _gain(stacks: Sequence[Float[np.ndarray, "draws _"]]):
 def _spectra(n: int):
     """Return one over every spectrum that is tried, shape (n, tried), and half its log, summed."""
     k = np.arange(n)
-    noise = correlated(_CORRELATIONS, np.pi * k / n)
-    both = noise[:, None, None] + _SHARES[:, None] * smooth(k)[:, None, :]
+    noise = _correlated(_CORRELATIONS, np.pi * k / n)
+    both = noise[:, None, None] + _SHARES[:, None] * _smooth(k)[:, None, :]
     spectra = both.reshape(-1, n)
     return (1.0 / spectra).T, 0.5 * np.sum(np.log(spectra), axis=1)
+
+
+def _smooth(k: Int[np.ndarray, " m"]) -> Float[np.ndarray, "swings m"]:
+    """Return the spectra of smooth misfits at so many half swings."""
+    return 1.0 / (1.0 + (k / _HALF_SWINGS[:, None]) ** 4)
+
+
+def _correlated(
+    rho: Float[np.ndarray, " q"], angle: Float[np.ndarray, " m"]
+) -> Float[np.ndarray, "q m"]:
+    """Return the spectra of noise with first-order correlations, angles of π being the fastest."""
+    rho = rho[:, None]
+    return (1.0 - rho**2) / (1.0 - 2.0 * rho * np.cos(angle) + rho**2)

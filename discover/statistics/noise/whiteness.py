@@ -71,16 +71,10 @@ def noise_probability(
     The smallest probability counts as often as there are tests. None if all runs together are too
     short.
 
-    Parameters
-    ----------
-    residual
-        Prediction minus measurement of each run, in any unit, padded.
-    weight
-        Positive where there is a sample.
-    measured
-        The measurement, by which cycles are found; without it they are not looked for.
-    further
-        Probabilities by other tests of the longer runs, which count as these do.
+    `residual`: prediction minus measurement of each run, in any unit, padded. `weight`: positive
+    where there is a sample. `measured`: the measurement, by which cycles are found; without it they
+    are not looked for. `further`: probabilities by other tests of the longer runs, which count as
+    these do.
     """
     arrays = [residual, weight] if measured is None else [residual, weight, measured]
     exact = [np.ascontiguousarray(values, dtype=float) for values in arrays]
@@ -151,10 +145,7 @@ def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
     holds whatever their size does along the series   [Liu 1988, Ann. Stat. 16, 1696]. Always the
     same lots are drawn.
 
-    Parameters
-    ----------
-    rows
-        Residuals of each series in the order of its rates, in any unit.
+    `rows`: residuals of each series in the order of its rates, in any unit.
     """
     generator = np.random.default_rng(0)
     own, drawn = 0.0, np.zeros(_LOTS)

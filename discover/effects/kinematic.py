@@ -1,0 +1,159 @@
+"""Effects that change the deformation that the fluid really felt."""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.effects.base import EffectParameter, KinematicEffect, SeriesElement
+
+
+def first_order_lag(
+    times: Float[Array, " n"], values: Float[Array, " n"], time_constant: Float[Array, ""]
+) -> Float[Array, " n"]:
+    """Return y with τ y' + y = x, y = 0 at the first time; exact for x linear between times.
+
+    `times` in s, increasing. `values`: x at those times. `time_constant`: τ in s; at zero, y = x
+    (also at the first time).
+    """
+    active = time_constant > 0.0
+    safe = jnp.where(active, time_constant, 1.0)
+    step = jnp.diff(times) / safe
+    decay = jnp.exp(-step)
+    # weights of the two ends of an interval: ∫ e^{-(h-s)} (linear) ds
+    mean = -jnp.expm1(-step) / step
+    forcing = values[1:] * (1.0 - mean) + values[:-1] * (mean - decay)
+
+    def join(first, second):
+        return first[0] * second[0], first[1] * second[0] + second[1]
+
+    _, lagged = jax.lax.associative_scan(join, (decay, forcing))
+    lagged = jnp.concatenate([jnp.zeros(1), lagged])
+    return jnp.where(active, lagged, values)
+
+
+class RateGain(KinematicEffect):
+    """The rate felt is (1 + g) times the commanded one."""
+
+    acts_on_steady_states = True
+
+    def felt_rate(self, values, instrument_times, shear_rate):
+        """Return (1 + g) γ̇."""
+        del instrument_times
+        return (1.0 + values[0]) * shear_rate
+
+
+RATE_GAIN = RateGain(
+    name="rate_gain",
+    parameters=(
+        EffectParameter(
+            "gain_error",
+            "g",
+            low=-0.5,
+            high=1.0,
+            first_trial=0.01,
+            range_source="a gap or an angle wrong by a factor of two; the zero of a gap is off by "
+            "10 to 100 µm (Davies & Stokes 2008, J. Non-Newtonian Fluid Mech. 148, 73)",
+        ),
+    ),
+    equation=r"\dot\gamma_\mathrm{felt} = (1 + g)\,\dot\gamma",
+    source="Macosko 1994, Rheology, ch. 8: errors of cone angle and gap",
+    check="Measure a Newtonian oil; measure the gap and the cone angle.",
+    visible="g of about 0.05.",
+)
+
+
+class RateRiseTime(KinematicEffect):
+    """The rate felt follows the commanded one with a first-order lag on the instrument's clock."""
+
+    def felt_rate(self, values, instrument_times, shear_rate):
+        """Return the lagged rate: τ γ̇_felt' + γ̇_felt = γ̇, from rest."""
+        return first_order_lag(instrument_times, shear_rate, values[0])
+
+
+RATE_RISE_TIME = RateRiseTime(
+    name="rate_rise_time",
+    parameters=(
+        EffectParameter(
+            "tau",
+            r"\tau",
+            "s",
+            low=0.0,
+            high=10.0,
+            scale="sampling_time",
+            first_trial=0.5,
+            range_source="motors answer in 0.01 to 0.1 s; a badly tuned loop that controls the "
+            "rate of a stress-controlled instrument needs seconds",
+        ),
+    ),
+    equation=(
+        r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} ="
+        r" \dot\gamma"
+    ),
+    source="Macosko 1994, Rheology, ch. 8: response time of the drive",
+    check="Record the angle of the motor in start-up; repeat at another rate.",
+    visible="tau of about 5 % of the time in which the stress grows.",
+    shapes_command=True,
+)
+
+
+class ToolCompliance(SeriesElement):
+    """The strain felt is the commanded one less C σ   [Gottlieb & Macosko 1982]."""
+
+    def slip_and_compliance(self, values):
+        """Return 0 and C."""
+        return jnp.zeros_like(values[0]), values[0]
+
+
+TOOL_COMPLIANCE = ToolCompliance(
+    name="tool_compliance",
+    parameters=(
+        EffectParameter(
+            "compliance",
+            "C",
+            "1/Pa",
+            low=0.0,
+            high=0.1,
+            scale="inverse_stress",
+            first_trial=0.01,
+            range_source="πR⁴/(2 H K) of a torsion bar as soft as K = 0.1 N m/rad with R = 50 mm, "
+            "H = 1 mm; other transducers are 1000 times as stiff (Gottlieb & Macosko 1982)",
+        ),
+    ),
+    equation=r"\gamma_\mathrm{felt} = \gamma - C\,\sigma",
+    source="Gottlieb & Macosko 1982, Rheol. Acta 21, 90",
+    check="Glue the tools together and twist; repeat with smaller plates, which need less torque.",
+    visible="C times the plateau modulus of about 0.05.",
+)
+
+
+class WallSlip(SeriesElement):
+    """Slip in proportion to the stress, γ̇_felt = γ̇ − s σ   [Navier 1823; Yoshimura 1988]."""
+
+    acts_on_steady_states = True
+
+    def slip_and_compliance(self, values):
+        """Return s and 0."""
+        return values[0], jnp.zeros_like(values[0])
+
+
+WALL_SLIP = WallSlip(
+    name="wall_slip",
+    parameters=(
+        EffectParameter(
+            "slip",
+            "s",
+            "1/(Pa s)",
+            low=0.0,
+            high=10.0,
+            scale="fluidity",
+            first_trial=0.01,
+            range_source="slip cannot exceed the deformation commanded, s σ = γ̇; ten times leaves "
+            "room for runs that differ",
+            range_scale="fluidity",
+        ),
+    ),
+    equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - s\,\sigma,\quad s = 2 b / H",
+    source="Yoshimura & Prud'homme 1988, J. Rheol. 32, 53 (slip velocity b sigma, gap H)",
+    check="Repeat with another gap H: slip goes as 1/H; roughen the plates.",
+    visible="s of about 5 % of the inverse zero-shear viscosity.",
+)

@@ -1,1 +1,0 @@
-"""Effects that change the deformation that the fluid really felt."""

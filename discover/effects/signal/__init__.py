@@ -1,1 +1,0 @@
-"""Effects that change what was recorded."""
