@@ -46,6 +46,7 @@ def main() -> None:
     from discover.learners.tensor_sindy.intervals import parameter_uncertainty
     from discover.learners.tensor_sindy.refit import refit
     from discover.learners.trajectories.problem import make_problem
+
     from discover.simulate import synthetic_dataset
     from tensor_library import TermLibrary, parse_term
 
