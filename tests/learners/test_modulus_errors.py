@@ -99,6 +99,7 @@ def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(l
             (term,), (exactly,) = (sparse_of(seed, known=k).terms_ for k in (True, False))
             value = term.coefficient
             half, exact = (0.5 * (one.ci95[1] - one.ci95[0]) for one in (term, exactly))
+            beside_exact = exactly.coefficient
         else:
             spectrum, runs = sweep(seed).relaxation_spectrum(), records(seed)
             declared = DeclaredModel.named(
@@ -108,14 +109,12 @@ def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(l
             model, batch = AugmentedModel(declared, [], data_scales(runs)), make_batch(runs)
             fit = fit_batch(model, batch, [model.zero()], [model.free_positions])[0]
             shifts = modulus_shifts(model, fit.theta, batch)
-            value = fit.theta[2]
+            value = beside_exact = fit.theta[2]
             half, exact = (
                 0.5 * np.ptp(intervals(model, batch, fit, moved)[2]) for moved in (shifts, None)
             )
         off.append((value - MOBILITY) / half)
-        narrow.append(
-            ((exactly.coefficient if learner == "tensor_sindy" else value) - MOBILITY) / exact
-        )
+        narrow.append((beside_exact - MOBILITY) / exact)
     # errors in half widths of 95 %: one over 1.96, from ten draws to within a half (chi-squared)
     assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.9
     assert np.sqrt(np.mean(np.square(narrow))) > 1.5

@@ -282,7 +282,7 @@ def _at(
         linear_relaxation=base.linear_relaxation,
         base=base,
     )
-    value, columns = with_sensitivities(replace(known, law=whole), flows)
+    value, columns = with_sensitivities(whole, known, flows)
     shape = samples[..., None]
     stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
     sensitivity = np.where(shape[..., None], np.asarray(columns)[:, : samples.shape[1]], 0.0)

@@ -366,6 +366,10 @@ class Fitter:
 
     def _judge(self, fit: Fit) -> None:
         """Set covariance and evidence of a fit, by Laplace's method."""
+        record = self.record(fit)
+        left = self.rows.recorded - record
+        _, grid = self.noise_of(fit).log_likelihood(left, record)
+        fit.noise = self.noise_of(fit).refined(left, record, grid)
         _, curvature = self._normal_equations(fit)
         sign, determinant = np.linalg.slogdet(curvature)
         fit.covariance = np.linalg.inv(curvature)

@@ -1,6 +1,6 @@
 """Runs and a term library as a problem of the engine, and its linearisation as a sparse problem."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.learners.known_part import KnownPart
+from discover.protocols.kinematics import RecordedQuantity
 from tensor_library.library import TermLibrary
 
 _STEP = 1e-4
@@ -21,7 +22,10 @@ _STEP = 1e-4
 _NEGLIGIBLE = 1e-6
 """Prior width below which a nuisance is nothing that a coefficient could be mistaken for."""
 
-_COLUMNS = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
+_COLUMNS: Mapping[RecordedQuantity, str] = {
+    "N1": "first_normal_stress_difference",
+    "N2": "second_normal_stress_difference",
+}
 
 
 def library_problem(
@@ -140,7 +144,7 @@ class LinearModel:
             basis = np.linalg.qr(white[:, : len(other)])[0]
             white = white[:, len(other) :]
             white = white - basis @ (basis.T @ white)
-        triangular = np.linalg.qr(white, mode="r")
+        triangular = np.asarray(np.linalg.qr(white, mode="r"))
         return cls(triangular[:, :-1], triangular[:, -1])
 
     def solved(self, support: Sequence[int]) -> Float[np.ndarray, " q"]:
