@@ -67,6 +67,22 @@ class TermTables(NotebookView):
         found = dict(self.details.get("inclusion") or {})
         return pd.DataFrame({"term": list(found), "probability": list(found.values())})
 
+    def rivals_table(self) -> pd.DataFrame:
+        """Return the other laws that the records do not rule out, the closest predictions first.
+
+        Columns: terms, coefficients, relative misfit, relative difference of predictions, log
+        evidence, and whether no record of these runs tells the two apart.
+        """
+        lines = [
+            {
+                "terms": ", ".join(row["support"]) or "no term",
+                "coefficients": ", ".join(f"{value:.4g}" for value in row["coefficients"]),
+                **{name: row[name] for name in ("misfit", "difference", "log_evidence", "exact")},
+            }
+            for row in self.details.get("rivals", ())
+        ]
+        return pd.DataFrame(lines)
+
     def _chosen(self) -> Mapping[str, Sequence[str]]:
         return (self.details.get("selectors") or {}).get("chosen") or {}
 
