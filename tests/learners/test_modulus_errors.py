@@ -9,10 +9,6 @@ from independent import Giesekus, start_up
 import discover as dc
 from discover.comparison import training
 from discover.errors import InputError
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import intervals
-from discover.inference.least_squares import fit_batch
-from discover.inference.modulus_errors import modulus_shifts
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
@@ -89,7 +85,7 @@ def sparse_of(seed, library=MOBILITY_TERM, known=True, **options):
 
 
 @pytest.mark.parametrize(
-    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "closed_loop"]
+    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "named law"]
 )
 def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(learner):
     """And by both ways to fit, without the sweep's noise several times too narrow."""
@@ -101,18 +97,17 @@ def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(l
             half, exact = (0.5 * (one.ci95[1] - one.ci95[0]) for one in (term, exactly))
             beside_exact = exactly.coefficient
         else:
-            spectrum, runs = sweep(seed).relaxation_spectrum(), records(seed)
-            declared = DeclaredModel.named(
-                "giesekus", {"alpha": 0.2}, spectrum.modulus, spectrum.relaxation_time,
-                free=["alpha"], modulus_covariance=spectrum.modulus_covariance,
-            )  # fmt: skip
-            model, batch = AugmentedModel(declared, [], data_scales(runs)), make_batch(runs)
-            fit = fit_batch(model, batch, [model.zero()], [model.free_positions])[0]
-            shifts = modulus_shifts(model, fit.theta, batch)
-            value = beside_exact = fit.theta[2]
-            half, exact = (
-                0.5 * np.ptp(intervals(model, batch, fit, moved)[2]) for moved in (shifts, None)
+            spectrum = sweep(seed).relaxation_spectrum()
+            modes = spectrum.modulus, spectrum.relaxation_time
+            own, exactly = (
+                dc.fit("giesekus", dc.Dataset("planted", tuple(records(seed)), one), base=base)
+                for one, base in (
+                    (sweep(seed), None),
+                    (None, dc.Fluid(dc.make_law("ucm"), *modes)),
+                )
             )
+            value, beside_exact = (one.constants[0].value for one in (own, exactly))
+            half, exact = (0.5 * float(np.ptp(one.conf_int())) for one in (own, exactly))
         off.append((value - MOBILITY) / half)
         narrow.append((beside_exact - MOBILITY) / exact)
     # errors in half widths of 95 %: one over 1.96, from ten draws to within a half (chi-squared)
