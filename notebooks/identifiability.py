@@ -26,7 +26,7 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.identify import analyse_structure, find_rivals, find_twins
+from discover.identify import analyse_structure, find_twins
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners.tensor_sindy import TensorSINDy
@@ -83,10 +83,10 @@ table_of(twins)
 # %% [markdown]
 # ## 4. Rivals at this noise
 #
-# Other laws that were tried and that a test on the residuals could not rule out.
+# Other laws that were fitted and that their evidence does not rule out.
 
 # %%
-find_rivals(model.search_, model.path_[model.result_.details["chosen"]])
+model.result_.rivals_table()
 
 # %% [markdown]
 # ## 5. What to measure next

@@ -30,7 +30,7 @@ from discover.precision import enable_x64
 enable_x64()
 enable_compilation_cache()
 
-from discover.identify import analyse_structure, find_rivals
+from discover.identify import analyse_structure
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
@@ -53,8 +53,8 @@ library.names
 # ## The path: the best law of every size
 #
 # Misfit on the data that were fitted can only fall as terms are added. On runs that a refit did not
-# see (`held_out`) it need not, and the criterion `bic` charges for every term and for having looked
-# at many laws. Where the misfit stops at the noise, more terms only describe the noise.
+# see (`held_out`) it need not, and the evidence charges for every term and for having looked at many
+# laws. Where the misfit stops at the noise, more terms only describe the noise.
 
 # %%
 data = measure(0.05)
@@ -69,20 +69,17 @@ axes[0].semilogy(path["size"], path["held_out"], "s--", label="runs left out")
 axes[0].axhline(0.05, color="0.6", lw=1, label="noise")
 axes[0].set(xlabel="number of terms", ylabel="relative misfit", xticks=path["size"])
 axes[0].legend()
-often = model.result_.stability_table().iloc[:6][::-1]
-axes[1].barh(often["term"], often["with_twins"], color="0.8", label="it, or one of the same effect")
-axes[1].barh(often["term"], often["frequency"], height=0.4, label="the term itself")
-axes[1].axvline(0.6, color="0.4", lw=1)
-axes[1].set(xlabel="chosen from halves of the data", xlim=(0, 1))
-axes[1].legend(loc="lower right", fontsize="small")
+likely = model.result_.inclusion_table().iloc[:6][::-1]
+axes[1].barh(likely["term"], likely["probability"], height=0.5)
+axes[1].set(xlabel="probability of the term", xlim=(0, 1))
 plt.show()
 
 # %% [markdown]
 # ## Four rules
 #
-# `bic` asks how well a law fits for its size, `held_out` how well it predicts other runs,
-# `stability` whether its terms are chosen again from halves of the data. `pysindy` is the sparse
-# optimiser on its own, at its default threshold. If they agree, the choice does not depend on the
+# `evidence` asks how probable the records are under a law, all its constants considered, `held_out`
+# how well it predicts other runs, `one_standard_error` for the simplest that predicts them nearly as
+# well. `pysindy` is the sparse optimiser on its own, at its default threshold. If they agree, the choice does not depend on the
 # rule. If they do not, trust none of them alone, and find out why they differ. Here `held_out`
 # keeps the empty law, which is four times as far off: it adds terms only if a t-test over the runs
 # supports them, and with four runs in different flows that test has next to no power.
@@ -108,12 +105,11 @@ print(model.result_.latex())
 # %% [markdown]
 # ## Rivals
 #
-# The chosen law is not the only one that fits. Every law that the search fitted is tested against
-# the chosen one on the residuals: can the data tell the two apart at 5 %?
+# The chosen law is not the only one that fits. Every law that the search fitted is weighed against
+# the chosen one: listed is what the data make less than 150 times as improbable.
 
 # %%
-chosen = model.path_[model.result_.details["chosen"]]
-find_rivals(model.search_, chosen)
+model.result_.rivals_table()
 
 # %% [markdown]
 # ## What noise does
@@ -127,8 +123,7 @@ lines = []
 for noise in (0.01, 0.05, 0.2, 0.5):
     noisy = model if noise == 0.05 else TensorSINDy(library, max_terms=3).fit(measure(noise))
     found = noisy.result_.table()
-    rivals = find_rivals(noisy.search_, noisy.path_[noisy.result_.details["chosen"]])
-    laws = [rival.law.coefficients for rival in rivals.rivals]
+    laws = [rival["support"] for rival in noisy.result_.details["rivals"]]
     lines.append(
         {
             "noise": f"{noise:.0%}",

@@ -9,10 +9,7 @@ from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
 from discover.identify import (
     Difference,
-    Evidence,
-    FittedRival,
     HiddenStresses,
-    RivalTable,
     Twin,
 )
 from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
@@ -55,7 +52,6 @@ def structure():
     return Structure((law,), (), 8)
 
 
-RIVAL = FittedRival(LAW, 0.02, 0.001, Evidence(False, "vuong", 0.4, 100.0))
 TWIN = Twin(LAW, "series", True, Difference(0.0, 0.0, 0.2), order=8)
 CHECK = PhysicsCheck("dissipation", False, -0.1, "in <start-up>", "It makes energy.")
 
@@ -63,8 +59,6 @@ CHECK = PhysicsCheck("dissipation", False, -0.1, "in <start-up>", "It makes ener
 @pytest.mark.parametrize(
     ("result", "words"),
     [
-        (RivalTable((RIVAL,), 3), ["3 other laws tried", "0.2 sigma.sigma", "vuong"]),
-        (RivalTable((), 3), ["rule out every one"]),
         (TWIN, ["0.2 sigma.sigma − 0.01 gammadot gives the same σ12 and the same N1"]),
         (structure(), ["Of the 8 coefficients", "the law found", "undetermined"]),
         (structure().laws[0], ["N2 is &lt;not&gt; determined."]),
@@ -95,10 +89,10 @@ def test_an_equation_shows_modes_and_where_it_was_tested():
 
 
 PATH = [
-    {"size": 0, "support": [], "misfit": 0.3, "held_out": 0.4, "bic": -10.0},
-    {"size": 1, "support": ["sigma.sigma"], "misfit": 0.02, "held_out": None, "bic": -90.0},
+    {"size": 0, "support": [], "misfit": 0.3, "held_out": 0.4, "log_evidence": -10.0},
+    {"size": 1, "support": ["sigma.sigma"], "misfit": 0.02, "held_out": None, "log_evidence": 90.0},
 ]
-CHOSEN = {"bic": ["sigma.sigma"], "stability": []}
+CHOSEN = {"evidence": ["sigma.sigma"], "held_out": []}
 
 
 def outcome(**details):
@@ -110,16 +104,16 @@ def outcome(**details):
 def test_the_path_says_which_rule_chooses_what():
     table = outcome(path=PATH, selectors={"chosen": CHOSEN}).path_table()
     assert table["terms"].tolist() == ["no term", "sigma.sigma"]
-    assert table["chosen_by"].tolist() == ["stability", "bic"]
+    assert table["chosen_by"].tolist() == ["held_out", "evidence"]
     rules = outcome(selectors={"chosen": CHOSEN}).selectors_table()
-    assert rules.loc["bic", "sigma.sigma"]
-    assert not rules.loc["stability", "sigma.sigma"]
-    often = outcome(selection_frequency=[{"term": "sigma.sigma", "frequency": 0.9}])
-    assert often.stability_table()["frequency"].tolist() == [0.9]
+    assert rules.loc["evidence", "sigma.sigma"]
+    assert not rules.loc["held_out", "sigma.sigma"]
+    likely = outcome(inclusion={"sigma.sigma": 0.9})
+    assert likely.inclusion_table()["probability"].tolist() == [0.9]
 
 
 def test_a_learner_without_a_path_has_empty_tables():
     without = outcome()
-    for table in (without.path_table(), without.selectors_table(), without.stability_table()):
+    for table in (without.path_table(), without.selectors_table(), without.inclusion_table()):
         assert table.empty
     assert "sigma.sigma" in without._repr_html_()

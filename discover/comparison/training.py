@@ -45,7 +45,6 @@ def train(
         "relaxation_time": model.relaxation_time,
         "known_relaxation": study.model.known_relaxation,
         "base_law": None if plain_maxwell else model.law,
-        "random_state": seed,
         "solvent_viscosity": model.solvent_viscosity,
     }
     library = study_library(study)
@@ -60,7 +59,6 @@ def train(
             use_normal_stresses=options.use_normal_stresses,
             progress=progress,
             modulus_covariance=model.modulus_covariance,
-            screening="exact" if options.recipe == "thorough" else "auto",
             **shared,
         ).fit(list(runs))
         return sparse.result_, sparse.fluid_
@@ -73,6 +71,7 @@ def train(
             quick=options.quick,
             projection_library=library,
             progress=progress,
+            random_state=seed,
             **shared,
         )
         estimator.fit(list(runs))

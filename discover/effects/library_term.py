@@ -20,16 +20,33 @@ class LibraryTerm(ConstitutiveEffect):
     term: CandidateTerm = None  # type: ignore[assignment]  # fields of the base have defaults
 
     def extra_term(self, values, stress, rate):
-        """Return c · term."""
-        return values[0] * self.term.evaluate(stress, rate)
+        """Return c · term, of a closed form with its inner parameter."""
+        return values[0] * self.term.evaluate(stress, rate, self._inner(values))
 
     def as_terms(self, values):
         """Return c · term."""
-        return (LawTerm(self.name, values[0]),)
+        return (LawTerm(self.name, values[0], self._inner(values)),)
+
+    def _inner(self, values):
+        form = self.term.form
+        return {} if form is None else {form.inner_name: values[1]}
 
 
 def library_term(term: CandidateTerm) -> LibraryTerm:
-    """Return the effect that adds this term with a free coefficient."""
+    """Return the effect that adds this term with a free coefficient, and inner parameter."""
+    form, inner = term.form, ()
+    if form is not None:
+        low, high = form.inner_bounds
+        inner = (
+            EffectParameter(
+                form.inner_name,
+                form.inner_name,
+                low=low,
+                high=high,
+                first_trial=form.inner_default,
+                range_source=form.source,
+            ),
+        )
     return LibraryTerm(
         name=term.name,
         parameters=(
@@ -43,6 +60,7 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
                 "the coefficients of known laws are of order one (Bird, Armstrong & Hassager 1987, "
                 "ch. 7); ten times leaves room",
             ),
+            *inner,
         ),
         equation=rf"h \mathrel{{+}}= c\,{term.latex()}",
         source="Smith 1971, Int. J. Eng. Sci. 9, 899: isotropic functions of two tensors",

@@ -11,10 +11,8 @@ from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import covariance_and_noise, with_moduli
-from discover.inference.least_squares import Fit
-from discover.inference.modulus_errors import modulus_shifts
-from discover.inference.problem import FitProblem
+from discover.inference.fit_uncertainty import uncertainty, what_is_left
+from discover.inference.least_squares import Fit, best_of, fit_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
 from discover.laws.registry import make_law, starting_values
@@ -121,16 +119,16 @@ def fit(
     batch = make_batch(fitted)
     model = AugmentedModel(forward, [], data_scales(fitted))
     names = _narrow(model, declared, bounds)
-    problem = FitProblem(model, batch)
     free = model.free_positions
-    best = problem.best_fit(_starts(model, names, free, start, declared), free)
-    if not best.usable:
+    starts = _starts(model, names, free, start, declared)
+    best = best_of(fit_batch(model, batch, starts, [free] * len(starts)))
+    if best is None:
         raise InputError(
             f"{LAWS[law].title} cannot be integrated through these runs with any of {_STARTS} "
             "starts. Narrow the ranges with bounds, or give a start."
         )
     expectation = Expectation(noise, forward.linear_error)
-    covariance, degrees = _uncertainty(problem, best)
+    covariance, degrees = uncertainty(model, batch, best)
     records = record_runs(fitted, model.predictions([best.theta], batch), held_out=False)
     if held:
         ahead = model.predictions([best.theta], make_batch(held))
@@ -143,7 +141,7 @@ def fit(
         degrees,
         augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
-        problem.lack_of_fit(best, fitted, expectation),
+        what_is_left(best, batch, fitted, expectation),
         tuple(records),
         model,
         best.theta,
@@ -298,15 +296,6 @@ def _starts(
             theta[position] = low + share * (high - low)
         starts.append(np.clip(theta, model.low, model.high))
     return starts
-
-
-def _uncertainty(problem: FitProblem, fit: Fit) -> tuple[Float[np.ndarray, "p p"], float]:
-    """Return covariance and degrees of freedom, errors of the modes' moduli included."""
-    if not fit.free:
-        return np.zeros((0, 0)), 1.0
-    covariance, noise = covariance_and_noise(problem.batch, fit.residual, fit.jacobian)
-    shifts = modulus_shifts(problem.model, fit.theta, problem.batch)
-    return with_moduli(covariance, fit, shifts), max(noise.effective_samples - len(fit.free), 1.0)
 
 
 def _constants(

@@ -1,7 +1,5 @@
 """Which parts of a law shear data determine, what else would fit, and whether a law is sound."""
 
-from discover.identify.rivals.evidence import Evidence
-from discover.identify.rivals.fitted_rivals import FittedRival, RivalTable, find_rivals
 from discover.identify.side_by_side.histories import Difference
 from discover.identify.soundness.physics import check_physics
 from discover.identify.structure.hidden_stresses import HiddenStresses
@@ -10,15 +8,11 @@ from discover.identify.structure.twins import Twin, find_twins
 
 __all__ = [
     "Difference",
-    "Evidence",
-    "FittedRival",
     "HiddenStresses",
     "LawStructure",
-    "RivalTable",
     "Structure",
     "Twin",
     "analyse_structure",
     "check_physics",
-    "find_rivals",
     "find_twins",
 ]

@@ -43,16 +43,6 @@ def _holds_traced(value: Any) -> bool:
     )
 
 
-def moduli_and_solvent(
-    amounts: Float[Array, " c"], n_modes: int, solvent_viscosity: ArrayLike
-) -> tuple[Float[Array, " k"], ArrayLike]:
-    """Return moduli, and the solvent viscosity where it stands behind them; else as it is given.
-
-    Errors of a sweep are of both, and laws are drawn with both.
-    """
-    return amounts[:n_modes], amounts[n_modes] if len(amounts) > n_modes else solvent_viscosity
-
-
 def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
     if value is None or isinstance(value, Array):
         return value

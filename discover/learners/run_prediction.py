@@ -13,11 +13,14 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.fluids import observed_in_batch
+from discover.forward.grids.flow_batch import lay_out
 from discover.learners.files.estimator_file import EstimatorFile, write_estimator
 from discover.learners.files.provenance import Provenance, provenance_of
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.results.term_tables import estimates_of
-from discover.learners.runs import as_runs
+from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import ARITHMETIC, check_settings
 from discover.linear_algebra_threads import in_one_thread
 from discover.protocols.between_samples import sampling_interval
@@ -35,6 +38,10 @@ if TYPE_CHECKING:
 _Learner = TypeVar(
     "_Learner", bound="RunPrediction"
 )  # not Self, which the tests' hook cannot check
+
+
+_STRAIN_STEP = 0.2
+"""Largest strain of a step."""
 
 
 class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
@@ -78,6 +85,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         known = known_part(self)
         # once, for it may be read only once
         runs = as_runs(X, known.relaxation_time, known.linear_relaxation)
+        require_signal(runs)
         require_known_rate(known, runs)
         self._left = None
         self._learn(runs, known)
@@ -215,11 +223,10 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
         """Return what the data leave open, with named dimensions, for xarray and ArviZ.
 
-        Of `TensorSINDy` 1,000 draws of the coefficients, dimensions ``chain``,
-        ``draw`` and ``term``, as `arviz.summary` takes them (96 where the linearisation does not
-        hold). Those of a sparse law are given its terms: that other terms may be right is not in
-        them. Of `TBNNUDE` what each network predicts, dimensions ``member`` and ``sample``: members
-        are no draws from a posterior.
+        Of `TensorSINDy` 1,000 draws of the coefficients, dimensions ``chain``, ``draw`` and
+        ``term``, as `arviz.summary` takes them. Those of a sparse law are given its terms: that
+        other terms may be right is not in them. Of `TBNNUDE` what each network predicts, dimensions
+        ``member`` and ``sample``: members are no draws from a posterior.
 
         Parameters
         ----------
@@ -299,6 +306,14 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def _learn(self, runs: list[Run], known: KnownPart) -> None:
         """Find the law: set the attributes of the fit but those that tell of the runs."""
 
-    @abstractmethod
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         """Return what is recorded of each run."""
+        fluid = self.fluid_
+        flows = lay_out(
+            [run.protocol for run in runs],
+            [run.time for run in runs],
+            strain_step=_STRAIN_STEP,
+            relaxation_time=fluid.settling_time,
+        )
+        observed = np.asarray(observed_in_batch(fluid, in_enough_steps(fluid, flows)))
+        return [observed[i, : len(run), 0] for i, run in enumerate(runs)]

@@ -1,6 +1,6 @@
 """The runs that a learner takes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -62,3 +62,13 @@ def waiting(run: Run, relaxation_time: float, relaxes: bool) -> Run:
     if relaxes and run.protocol.control == "rate":
         return run
     return replace(run, protocol=settled(run.protocol, relaxation_time))
+
+
+def require_signal(runs: Sequence[Run]) -> None:
+    """Refuse runs of which nothing was recorded but zeros."""
+    for run in runs:
+        if not np.any(run.recorded):
+            raise InputError(
+                f"The shear stress of the run {run.name!r} is zero throughout: it says nothing of "
+                "the law. Leave the run out."
+            )

@@ -1,7 +1,7 @@
 """What estimators take as settings, checked when they fit."""
 
 from collections.abc import Mapping, Sequence
-from numbers import Integral, Real
+from numbers import Integral
 from typing import Any
 
 import jax
@@ -15,7 +15,7 @@ from tensor_library.library import TermLibrary, build_library
 PerMode = float | int | Sequence[float] | np.ndarray | jax.Array
 """A number, or one value for each relaxation mode, shape (k,)."""
 
-_WHOLE = {"max_terms": 1, "n_members": 1, "n_folds": 0, "n_stability": 0, "random_state": 0}
+_WHOLE = {"max_terms": 1, "n_members": 1, "random_state": 0}
 """Settings that are whole numbers, with the least that each may be."""
 
 ARITHMETIC = 1e-5
@@ -24,8 +24,6 @@ ARITHMETIC = 1e-5
 DEFAULT_DEGREE = 1
 """Degree in the invariants of the terms that are searched where nobody names others."""
 
-_POSITIVE = ("misfit_floor", "strain_step")
-
 
 def check_settings(settings: Mapping[str, Any]) -> None:
     """Check settings that several estimators share.
@@ -33,8 +31,7 @@ def check_settings(settings: Mapping[str, Any]) -> None:
     Raises
     ------
     InputError
-        If a count or a seed is no whole number, a limit is not positive, or `progress` cannot be
-        called.
+        If a count or a seed is no whole number, or `progress` cannot be called.
     """
     for name, least in _WHOLE.items():
         value = settings.get(name)
@@ -42,10 +39,6 @@ def check_settings(settings: Mapping[str, Any]) -> None:
             continue  # not a setting of this one, or any seed
         if isinstance(value, bool) or not isinstance(value, Integral) or value < least:
             raise InputError(f"{name} must be a whole number, at least {least}; got {value!r}.")
-    for name in _POSITIVE:
-        value = settings.get(name, 1.0)
-        if isinstance(value, bool) or not (isinstance(value, Real) and 0.0 < float(value) < np.inf):
-            raise InputError(f"{name} must be positive and finite; got {value!r}.")
     checked(settings.get("progress"))
 
 

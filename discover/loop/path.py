@@ -38,7 +38,7 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
         nothing, shared = np.zeros(each * len(rows.runs)), 1 + each * len(problem.fitted.runs)
         linear = np.concatenate([linear[:1], nothing, linear[shared:]])
     flat = rows.flat(found[None])[0]
-    found[rows.seen] = flat + fitter.linear_columns(flat) @ linear
+    found[rows.seen] = flat + fitter.linear_columns(flat, fitter.shifts_at(fit.theta)) @ linear
     return found
 
 

@@ -103,10 +103,9 @@ def _factor(text: str) -> str:
 
 
 RULES = {
-    "bic": "BIC",
+    "evidence": "evidence",
     "held_out": "held-out runs",
     "one_standard_error": "one standard error",
-    "stability": "stability",
     "pysindy": "pysindy at its default",
 }
 """Rules for choosing a law, as readers know them."""

@@ -162,13 +162,6 @@ def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
     return told if np.any(told) else np.ones_like(told)
 
 
-def judged_cost(
-    residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
-) -> float:
-    """Return the sum over the runs that judge of the squared relative errors."""
-    return float(np.sum(residual[judging(weight)] ** 2))
-
-
 def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
     """Return whether any run is long enough to say how noisy it is."""
     return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST))

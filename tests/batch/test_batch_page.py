@@ -20,7 +20,9 @@ GOOD = {
                 "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
                 "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
             },
-            "details": {"selectors": {"chosen": {"bic": ["sigma.sigma"], "pysindy": ["sigma"]}}},
+            "details": {
+                "selectors": {"chosen": {"evidence": ["sigma.sigma"], "pysindy": ["sigma"]}}
+            },
         },
         "tbnn_ude": {
             "terms": [
@@ -68,7 +70,7 @@ def test_rows_hold_the_worst_error_and_what_each_rule_chose(rows):
     assert good.learners["tensor_sindy"].errors == {"sigma12": 0.03, "N1": 0.02}
     assert good.learners["tbnn_ude"].text.endswith("*sigma [epsilon = 0.375]")
     assert LearnerRow((), {}).text == "no term"
-    assert good.chosen == {"bic": ("sigma.sigma",), "pysindy": ("sigma",)}
+    assert good.chosen == {"evidence": ("sigma.sigma",), "pysindy": ("sigma",)}
     assert not good.agree
     assert (good.rivals, good.undetermined) == (2, ("N2",))
     assert good.verdict == "no_signal"
@@ -82,7 +84,7 @@ def test_the_page_says_what_failed_and_puts_selectors_side_by_side(rows):
     assert "2 with a result, 1 failed, 1 not run yet" in page
     assert 'href="good/report.html"' in page
     assert "script%3E" not in page  # a failed study has no link
-    for text in ("BIC", "pysindy at its default", "3 %"):
+    for text in ("evidence", "pysindy at its default", "3 %"):
         assert text in page
     loops = page.split('id="loops"')[1].split("</table>")[0]
     assert "rate gain" in loops

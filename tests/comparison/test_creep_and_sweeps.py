@@ -14,8 +14,6 @@ from discover.learners.tbnn_ude.initial_law import initial_law
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.variational import states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
-from discover.learners.trajectories.problem import make_problem
-from discover.learners.trajectories.sensitivities import linearise, predict_many
 from discover.protocols import imposed_stress, oscillations
 from discover.report.predictions import comparison_predictions
 from tensor_library.library import build_library
@@ -96,22 +94,6 @@ def few_samples():
         creep(GIESEKUS, 40.0).window(np.arange(40) % 4 == 0),
         *sweep(GIESEKUS, np.array([0.1, 2.0])).records,
     ]
-
-
-@pytest.mark.slow
-def test_sensitivities_of_creep_and_moduli_are_their_differences():
-    problem = make_problem(few_samples(), LIBRARY, MODULUS, TIME, SOLVENT)
-    place = LIBRARY.names.index("sigma.sigma")
-    at, nothing = jnp.zeros(len(LIBRARY)).at[place].set(0.2), jnp.zeros(0)
-    residual, columns = linearise(problem, at, nothing)
-    step = 1e-5  # the difference errs by its square, and by rounding over it
-    for i in (place, LIBRARY.names.index("sigma.gammadot+gammadot.sigma")):
-        ends = [linearise(problem, at.at[i].add(s), nothing)[0] for s in (step, -step)]
-        difference = (ends[0] - ends[1]) / (2.0 * step)
-        np.testing.assert_allclose(columns[:, i], difference, rtol=1e-5, atol=1e-7)
-    # the same values come without sensitivities
-    alone = predict_many(problem, jnp.arange(len(LIBRARY)), at[None], jnp.zeros((1, 0)))[0]
-    np.testing.assert_allclose(alone - problem.records.weighted_record, residual, atol=1e-12)
 
 
 @pytest.mark.slow

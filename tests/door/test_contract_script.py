@@ -36,7 +36,7 @@ def after(request, tmp_path_factory):
     write_folder(folder / "FOLDER")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
-        quick = {"library": LIBRARY, "max_terms": 1, "n_folds": 0, "n_stability": 0}
+        quick = {"library": LIBRARY, "max_terms": 1}
         said: dict = {"sindy": [], "network": [], "loop": []}
         heard = {name: lambda *news, name=name: said[name].append(news) for name in said}
         network, loop = {"quick": True}, {}

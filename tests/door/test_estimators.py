@@ -38,7 +38,7 @@ def base(data):
 
 @pytest.fixture(scope="module")
 def sindy(data, base):
-    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, base=base)
+    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, base=base)
     return made.fit(data.split(["fast.csv"])[0])
 
 
@@ -74,7 +74,7 @@ def test_a_base_is_modulus_time_and_law_at_once(data, base, sindy):
     assert term.term == "sigma.sigma"
     assert term.coefficient == pytest.approx(MOBILITY, abs=0.03)  # planted by scipy
     parts = dc.TensorSINDy(
-        library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, modulus=np.asarray(base.modulus),
+        library=LIBRARY, max_terms=1, modulus=np.asarray(base.modulus),
         relaxation_time=np.asarray(base.relaxation_time),
     ).fit(data.split(["fast.csv"])[0])  # fmt: skip
     assert parts.terms_[0].coefficient == term.coefficient
@@ -269,7 +269,7 @@ def test_cross_validation_in_two_processes_equals_that_in_one(data, base, monkey
     # workers find the programs that this process has compiled
     monkeypatch.setenv("JAX_COMPILATION_CACHE_DIR", str(jax.config.jax_compilation_cache_dir))
     folds = [([0, 1], [2]), ([1, 2], [0])]
-    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, n_folds=0, n_stability=0, base=base)
+    made = dc.TensorSINDy(library=LIBRARY, max_terms=1, base=base)
     serial, parallel = (
         cross_validate(made, data, cv=folds, n_jobs=jobs, return_estimator=True) for jobs in (1, 2)
     )

@@ -18,7 +18,7 @@ from discover.study import parse_study
 from discover.summary_view import Estimate, SummaryView
 
 COLUMNS = ["value", "standard_error", "low", "high", "unit"]
-FEW = {"n_stability": 0, "n_folds": 0, "max_terms": 3}
+FEW = {"max_terms": 3}
 
 
 def sparse_law_of(law, parameters):

@@ -7,7 +7,8 @@ from independent import Giesekus, WhiteMetzner, oscillation, start_up
 import discover as dc
 from discover.effects import library_term, make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.problem import FitProblem
+from discover.inference.fit_uncertainty import what_is_left
+from discover.inference.least_squares import fit_batch
 from discover.statistics import lack_of_fit
 from discover.statistics.residual import Expectation
 from tensor_library.terms import parse_term
@@ -23,7 +24,7 @@ STARTS = {"wall_slip": 0.006, TERMS[0]: 0.5, TERMS[1]: -0.17, "giesekus_mobility
 
 
 def fitted(fluid, names, seed):
-    """Return problem, fit and runs of some effects, fitted to a fluid by scipy, 1 % noise."""
+    """Return fit, batch and runs of some effects, fitted to a fluid by scipy, 1 % noise."""
     runs = []
     for i, (flow, protocol, times) in enumerate(FLOWS):
         stress = fluid.respond(flow, times).sigma12
@@ -35,18 +36,18 @@ def fitted(fluid, names, seed):
     effects += [library_term(parse_term(term)) for term in TERMS]
     declared = DeclaredModel.named("ucm", {}, np.array([100.0]), np.array([1.0]))
     model = AugmentedModel(declared, effects, data_scales(runs))
-    problem = FitProblem(model, make_batch(runs))
+    batch = make_batch(runs)
     start, free = model.zero(), []
     for name in names:
         at = model.positions(name)
         start[at] = STARTS[name]
         free += at
-    return problem, problem.fit(start, free), runs
+    return fit_batch(model, batch, [start], [free])[0], batch, runs
 
 
-def alone(problem, fit, runs):
+def alone(fit, batch, runs):
     """Return the verdict without the times of the samples."""
-    rows = zip(fit.residual, problem.weight, strict=True)
+    rows = zip(fit.residual, np.asarray(batch.weight), strict=True)
     residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
     return lack_of_fit(residuals, [run.recorded for run in runs]).verdict
 
@@ -54,15 +55,15 @@ def alone(problem, fit, runs):
 def test_slip_and_two_terms_do_not_explain_a_white_metzner_fluid():
     passed = 0
     for seed in range(4):
-        problem, fit, runs = fitted(WhiteMetzner(0.5, **SCALE), ("wall_slip", *TERMS), seed)
+        fit, batch, runs = fitted(WhiteMetzner(0.5, **SCALE), ("wall_slip", *TERMS), seed)
         # hardly more than the noise, and not in all runs
         assert np.mean(fit.run_errors) < 0.017
-        assert problem.lack_of_fit(fit, runs, Expectation()).verdict == "unexplained"
-        passed += alone(problem, fit, runs) == "explained"
+        assert what_is_left(fit, batch, runs, Expectation()).verdict == "unexplained"
+        passed += alone(fit, batch, runs) == "explained"
     assert passed  # so what tells it is that the noise of the other runs is white
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_law_that_made_the_runs_explains_them(seed):
-    problem, fit, runs = fitted(Giesekus(0.3, **SCALE), ("giesekus_mobility",), seed)
-    assert problem.lack_of_fit(fit, runs, Expectation()).verdict == "explained"
+    fit, batch, runs = fitted(Giesekus(0.3, **SCALE), ("giesekus_mobility",), seed)
+    assert what_is_left(fit, batch, runs, Expectation()).verdict == "explained"

@@ -217,7 +217,7 @@ def test_a_learner_told_of_it_claims_nothing_beside_it():
         stress = simulate(known, start_up(rate), TIMES).shear_stress
         noise = 1e-3 * np.std(stress) * np.random.default_rng(int(rate)).normal(size=40)
         runs.append(Run(f"{rate}", TIMES, start_up(rate), np.full(40, rate), stress + noise))
-    options = {"n_folds": 0, "n_stability": 0, "max_terms": 1}
+    options = {"max_terms": 1}
     sparse = dc.TensorSINDy(base=known, **options).fit(dc.Dataset("blend", tuple(runs)))
     assert sparse.terms_ == ()
     assert sparse.score(runs) > 0.995

@@ -12,15 +12,10 @@ from discover.learners.tbnn_ude.initial_law import initial_law
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.variational import states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
-from discover.learners.trajectories.problem import make_problem
-from discover.learners.trajectories.sensitivities import linearise
 from discover.protocols.control import steady_rates
 from tensor_library.library import build_library
 
 LIBRARY = build_library(degree=0)
-# each term is one more column of a program, and takes as long to compile
-NAMES = ("gammadot", "sigma.sigma")
-FEW = LIBRARY.subset([LIBRARY.names.index(name) for name in NAMES])
 RATES = np.geomspace(0.1, 20.0, 24)
 SLOW = RATES[RATES < 2.0]  # in faster flow the stress of a trial law bends too fast for differences
 MOBILITY, NOISE = 0.3, 0.01
@@ -39,24 +34,6 @@ def start(rate=2.0):
     times = np.linspace(0.05, 8.0, 40)
     stress = Giesekus(MOBILITY).respond(start_up(rate), times).sigma12
     return dc.Run("start.csv", times, dc.start_up(rate), np.full(times.size, rate), stress)
-
-
-@pytest.mark.slow
-def test_sensitivities_of_a_flow_curve_beside_a_transient_are_its_differences():
-    problem = make_problem([flow_curve(rates=SLOW), start()], FEW)
-    at = jnp.zeros(len(FEW)).at[FEW.names.index("sigma.sigma")].set(0.2)
-    nothing = jnp.zeros(0)
-    residual, columns = linearise(problem, at, nothing)
-    step = 1e-5  # the difference errs by its square, and by rounding over it
-    for i in range(len(FEW)):
-        moved = [linearise(problem, at.at[i].add(s), nothing)[0] for s in (step, -step)]
-        np.testing.assert_allclose(
-            columns[:, i], (moved[0] - moved[1]) / (2.0 * step), rtol=1e-5, atol=1e-7
-        )
-    # at the law that made them both are reproduced
-    right = at.at[FEW.names.index("sigma.sigma")].set(MOBILITY)
-    assert float(jnp.linalg.norm(linearise(problem, right, nothing)[0])) < 1e-5
-    assert float(jnp.linalg.norm(residual)) > 0.05
 
 
 @pytest.mark.slow

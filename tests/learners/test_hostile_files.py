@@ -115,6 +115,6 @@ def test_a_pipe_or_a_device_is_no_file(tmp_path):
 
 def test_a_file_that_was_saved_is_read(tmp_path):
     data = dc.synthetic_dataset("ucm", n_samples=21)
-    law = dc.TensorSINDy(library=dc.build_library(["sigma"], degree=0), n_stability=0).fit(data)
+    law = dc.TensorSINDy(library=dc.build_library(["sigma"], degree=0)).fit(data)
     path = law.save(tmp_path / "law.discover")
     np.testing.assert_array_equal(dc.load(path).predict(data)[0], law.predict(data)[0])

@@ -17,7 +17,7 @@ of_chains = pytest.mark.parametrize("name", [*LAWS])
 
 
 def sparse(name, **options):
-    options = {"n_folds": 0, "n_stability": 0, "max_terms": 2, **options}
+    options = {"max_terms": 2, **options}
     return dc.TensorSINDy(build_library(degree=0), base=known(name), **options)
 
 

@@ -9,15 +9,6 @@ from independent import Giesekus, start_up
 import discover as dc
 from discover.comparison import training
 from discover.errors import InputError
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import intervals
-from discover.inference.least_squares import fit_batch
-from discover.inference.modulus_errors import modulus_shifts
-from discover.learners.tensor_sindy.beside_modes import criteria_beside_modes
-from discover.learners.tensor_sindy.intervals import parameter_uncertainty
-from discover.learners.tensor_sindy.refit import refit
-from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.trajectories.problem import make_problem
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary
@@ -85,90 +76,68 @@ def test_a_sweep_without_noise_of_its_own_modes_leaves_no_doubt_of_them():
     assert dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus_covariance is None
 
 
-def problem_of(seed, noise=SWEEP_NOISE, known=True):
-    spectrum = sweep(seed, noise).relaxation_spectrum()
-    covariance = spectrum.modulus_covariance if known else None
-    modes = spectrum.modulus, spectrum.relaxation_time
-    return make_problem(
-        records(seed), MOBILITY_TERM, *modes, strain_step=0.2, modulus_covariance=covariance
-    )
-
-
-def fit_of(problem):
-    return refit(problem, [(0,)], [(np.array([0.2]), np.zeros(0))], np.ones(1), 1)[0]
+def sparse_of(seed, library=MOBILITY_TERM, known=True, **options):
+    spectrum = sweep(seed).relaxation_spectrum()
+    return dc.TensorSINDy(
+        library, modulus=spectrum.modulus, relaxation_time=spectrum.relaxation_time,
+        modulus_covariance=spectrum.modulus_covariance if known else None, **options,
+    ).fit(records(seed))  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "closed_loop"]
+    "learner", [pytest.param("tensor_sindy", marks=pytest.mark.slow), "named law"]
 )
 def test_intervals_beside_modes_of_a_noisy_sweep_are_as_wide_as_the_errors_are(learner):
     """And by both ways to fit, without the sweep's noise several times too narrow."""
     off, narrow = [], []
     for seed in SEEDS:
         if learner == "tensor_sindy":
-            problem = problem_of(seed)
-            fit = fit_of(problem)
-            value = fit.coefficients[0]
-            half, exact = (
-                parameter_uncertainty(p, fit, 1e-5).half_widths[0]
-                for p in (problem, problem_of(seed, known=False))
-            )
+            (term,), (exactly,) = (sparse_of(seed, known=k).terms_ for k in (True, False))
+            value = term.coefficient
+            half, exact = (0.5 * (one.ci95[1] - one.ci95[0]) for one in (term, exactly))
+            beside_exact = exactly.coefficient
         else:
-            spectrum, runs = sweep(seed).relaxation_spectrum(), records(seed)
-            declared = DeclaredModel.named(
-                "giesekus", {"alpha": 0.2}, spectrum.modulus, spectrum.relaxation_time,
-                free=["alpha"], modulus_covariance=spectrum.modulus_covariance,
-            )  # fmt: skip
-            model, batch = AugmentedModel(declared, [], data_scales(runs)), make_batch(runs)
-            fit = fit_batch(model, batch, [model.zero()], [model.free_positions])[0]
-            shifts = modulus_shifts(model, fit.theta, batch)
-            value = fit.theta[2]
-            half, exact = (
-                0.5 * np.ptp(intervals(model, batch, fit, moved)[2]) for moved in (shifts, None)
+            spectrum = sweep(seed).relaxation_spectrum()
+            modes = spectrum.modulus, spectrum.relaxation_time
+            own, exactly = (
+                dc.fit("giesekus", dc.Dataset("planted", tuple(records(seed)), one), base=base)
+                for one, base in (
+                    (sweep(seed), None),
+                    (None, dc.Fluid(dc.make_law("ucm"), *modes)),
+                )
             )
+            value, beside_exact = (one.constants[0].value for one in (own, exactly))
+            half, exact = (0.5 * float(np.ptp(one.conf_int())) for one in (own, exactly))
         off.append((value - MOBILITY) / half)
-        narrow.append((value - MOBILITY) / exact)
+        narrow.append((beside_exact - MOBILITY) / exact)
     # errors in half widths of 95 %: one over 1.96, from ten draws to within a half (chi-squared)
     assert 0.25 < np.sqrt(np.mean(np.square(off))) < 0.9
     assert np.sqrt(np.mean(np.square(narrow))) > 1.5
 
 
-@pytest.mark.slow
-def test_parameters_move_with_the_moduli_as_the_response_says():
-    problem = problem_of(0)
-    fit = fit_of(problem)
-    errors = parameter_uncertainty(problem, fit, 1e-5).modulus_errors
-    spectrum = sweep(0).relaxation_spectrum()
-    for direction in (-1, -2):  # those in which the moduli are least known
-        moved = spectrum.modulus + 0.3 * errors.root[:, direction]
-        other = make_problem(
-            records(0), MOBILITY_TERM, moved, spectrum.relaxation_time, strain_step=0.2
-        )
-        change = fit_of(other).coefficients[0] - fit.coefficients[0]
-        # to first order: what 0.3 standard deviations bend is some percent of what they move
-        assert change == pytest.approx(-0.3 * errors.response[0, direction], rel=0.1, abs=1e-5)
-
-
 @pytest.mark.parametrize("covariance", [np.eye(2), np.full((3, 3), np.nan), np.triu(np.ones(3))])
 def test_a_covariance_that_is_none_is_refused(covariance):
     with pytest.raises(InputError, match="symmetric matrix in Pa²"):
-        make_problem(records(0), MOBILITY_TERM, MODULUS, TIME, modulus_covariance=covariance)
+        dc.TensorSINDy(
+            MOBILITY_TERM, modulus=MODULUS, relaxation_time=TIME, modulus_covariance=covariance
+        ).fit(records(0))
 
 
 def test_a_base_from_a_sweep_brings_the_covariance_of_its_moduli(monkeypatch):
     """Of which the problem that is fitted makes the errors beside every interval, as above."""
 
-    def stopped(*_, modulus_covariance=None, **__):
-        met.append(modulus_covariance)
+    def stopped(runs, library, known, *_):
+        del runs, library
+        met.append(known.modulus_covariance)
         raise InterruptedError
 
     met: list = []
-    monkeypatch.setattr("discover.learners.tensor_sindy.estimator.make_problem", stopped)
+    monkeypatch.setattr("discover.learners.tensor_sindy.estimator.library_problem", stopped)
     base = dc.Fluid.from_sweep(sweep(0))
     exact = dc.Fluid(dc.make_law("ucm"), base.modulus, base.relaxation_time)
     for one in (base, exact):
         with pytest.raises(InterruptedError):
-            dc.TensorSINDy(base=one, library=MOBILITY_TERM, n_stability=0).fit(records(0))
+            dc.TensorSINDy(base=one, library=MOBILITY_TERM).fit(records(0))
     np.testing.assert_array_equal(met[0], base.modulus_covariance)
     assert met[1] is None
     with pytest.raises(InputError, match="base holds modulus_covariance already"):
@@ -178,8 +147,7 @@ def test_a_base_from_a_sweep_brings_the_covariance_of_its_moduli(monkeypatch):
 @pytest.mark.slow
 def test_an_interval_beside_a_base_from_a_sweep_holds_the_mobility():
     base = dc.Fluid.from_sweep(sweep(0))
-    sparse = dc.TensorSINDy(base=base, library=MOBILITY_TERM, n_stability=0).fit(records(0))
-    assert sparse.uncertainty_.modulus_errors is not None
+    sparse = dc.TensorSINDy(base=base, library=MOBILITY_TERM).fit(records(0))
     low, high = sparse.terms_[0].ci95
     assert low <= MOBILITY <= high
 
@@ -209,22 +177,11 @@ def test_a_term_that_stands_for_errors_of_the_moduli_is_left_out():
     """Beside exact moduli the larger law is the better one in most draws."""
     terms = ("sigma.sigma", "gammadot", "I", "gammadot.gammadot")
     library = TermLibrary(tuple(parse_term(name) for name in terms))
-    larger = {True: 0, False: 0}
-    for seed in SEEDS[:6]:
-        spectrum = sweep(seed).relaxation_spectrum()
-        problem = make_problem(
-            records(seed), library, spectrum.modulus, spectrum.relaxation_time, strain_step=0.2,
-            modulus_covariance=spectrum.modulus_covariance,
-        )  # fmt: skip
-        search = SupportSearch(problem, "stlsq", 3, 1e-5)
-        start = (np.array([0.2, 0.0, 0.0, 0.0]), np.zeros(0))
-        supports = [(0,), (0, 1), (0, 2), (0, 3), (0, 1, 2)]
-        path = refit(problem, supports, [start] * 5, np.ones(4), search.slots)
-        for known in larger:
-            if known:
-                criterion = criteria_beside_modes(search, path)
-            else:
-                criterion = [search.criterion(fit) for fit in path]
-            larger[known] += int(np.argmin(criterion)) > 0
+    larger = {
+        known: sum(
+            len(sparse_of(seed, library, known, max_terms=3).terms_) > 1 for seed in SEEDS[:6]
+        )
+        for known in (True, False)
+    }
     assert larger[True] <= 1  # one in six by chance, of five laws tried
     assert larger[False] >= 3

@@ -15,8 +15,6 @@ from discover.dataset.run import Loading
 from discover.forward import make_records
 from discover.forward.batches import Loadings
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
-from discover.learners.trajectories.problem import make_problem
-from discover.learners.trajectories.sensitivities import linearise
 from discover.protocols import start_up as protocol
 from tensor_library.library import build_library
 
@@ -66,19 +64,6 @@ def test_runs_of_one_loading_have_no_factor():
     whole = records.without_factors().residual(1.01 * records.recorded)
     assert left[0] == pytest.approx(whole[0], abs=1e-15)
     assert np.sum(left[1] ** 2) < 0.5 * np.sum(whole[1] ** 2)
-
-
-def test_sensitivities_are_those_with_the_factors_let_go():
-    problem = make_problem(runs_of(FACTORS), build_library(), 100.0, 1.0)
-    at, step = 0.3 * np.eye(len(problem.library))[3], 1e-5
-    _, columns = linearise(problem, jnp.asarray(at), jnp.zeros(0))
-    ends = []
-    for sign in (1.0, -1.0):
-        moved = at.copy()
-        moved[3] += sign * step
-        ends.append(np.asarray(linearise(problem, jnp.asarray(moved), jnp.zeros(0))[0]))
-    slope = (ends[0] - ends[1]) / (2.0 * step)
-    assert np.asarray(columns)[:, 3] == pytest.approx(slope, abs=1e-6 * np.max(np.abs(slope)))
 
 
 @pytest.mark.slow

@@ -8,22 +8,18 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.dataset import Run
-from discover.laws import TensorBasisNetwork, UpperConvectedMaxwell
+from discover.laws import TensorBasisNetwork
 from discover.learners.runs import as_runs
 from discover.learners.tbnn_ude.problem import make_problem as training_problem
 from discover.learners.tbnn_ude.variational import states_and_jacobian
 from discover.learners.tbnn_ude.weights import Rebuild
 from discover.learners.tensor_sindy import TensorSINDy
-from discover.learners.trajectories.problem import make_problem
-from discover.learners.trajectories.sensitivities import observe, predict_many
 from discover.protocols import after_alternation, oscillatory_shear, shear_rates, start_up
 from tensor_library.library import build_library
 
 MODULUS, TIME, MOBILITY, FREQUENCY = 100.0, 20.0, 0.3, 1.0
 PERIOD = 2.0 * np.pi / FREQUENCY
 LIBRARY = build_library(degree=0)
-# each term is one more column of a program, and takes as long to compile
-FEW = LIBRARY.subset([LIBRARY.names.index(name) for name in ("sigma", "gammadot", "sigma.sigma")])
 
 
 def giesekus(strain, times, cycles):
@@ -57,49 +53,6 @@ def up():
     return Run("up", times, start_up(1.0), np.ones(40), np.ones(40))
 
 
-# one program for every value: outside of one each of its operations is compiled by itself
-observed = eqx.filter_jit(observe)
-
-
-@pytest.mark.slow
-def test_sensitivities_are_differences_and_a_start_up_beside_is_as_alone():
-    runs = [swing(2.0), up()]
-    problem = make_problem(runs, FEW, MODULUS, TIME)
-    active = jnp.array([list(FEW.names).index(name) for name in ("sigma", "sigma.sigma")])
-    at, inner = jnp.array([0.1, MOBILITY]), jnp.zeros(0)
-    value, slope = observed(problem, active, at, inner)
-    assert np.all(np.isfinite(value))
-    step = 1e-5
-    for i in range(2):
-        ends = [
-            observed(problem, active, at + sign * step * jnp.eye(2)[i], inner)[0]
-            for sign in (1, -1)
-        ]
-        difference = (ends[0] - ends[1]) / (2.0 * step)
-        # of second order in the step
-        np.testing.assert_allclose(
-            slope[..., i], difference, atol=1e-5 * np.max(np.abs(difference))
-        )
-    alone = make_problem([up()], FEW, MODULUS, TIME)
-    assert alone.flows.parts[0][1].cycle is None
-    only, _ = observed(alone, active, at, inner)
-    np.testing.assert_allclose(value[1, :40], only[0, :40], rtol=1e-6)
-
-
-@pytest.mark.slow
-def test_what_a_law_predicts_is_what_scipy_finds_after_many_cycles():
-    run = swing(2.0)
-    problem = make_problem([run], FEW, MODULUS, TIME)
-    active = jnp.array([list(FEW.names).index("sigma.sigma")])
-    both = jnp.array([[MOBILITY], [0.5 * MOBILITY]])
-    found = np.asarray(predict_many(problem, active, both, jnp.zeros((2, 0)))).reshape(2, -1, 3)
-    weight = np.asarray(problem.records.weight)[0, : len(run), 0]
-    exact = weight * run.stress
-    np.testing.assert_allclose(found[0, : len(run), 0], exact, atol=5e-5 * np.max(np.abs(exact)))
-    # the control: another law is told apart
-    assert np.linalg.norm(found[1, : len(run), 0] - exact) > 0.05 * np.linalg.norm(exact)
-
-
 @pytest.mark.slow
 def test_weights_of_a_network_move_its_periodic_state_as_differences_do():
     problem = training_problem([swing(2.0), up()], np.array([MODULUS]), np.array([TIME]))
@@ -129,9 +82,6 @@ def test_only_what_does_not_relax_by_itself_waits():
     assert as_runs([run], 1e4)[0].protocol.begins == run.protocol.begins
     waits = as_runs([run], TIME, relaxes=False)[0].protocol
     assert waits.begins < run.protocol.begins
-    unknown = UpperConvectedMaxwell(linear_relaxation=False)
-    problem = make_problem([run], LIBRARY, MODULUS, TIME, base=unknown)
-    assert problem.flows.parts[0][1].cycle is None
 
 
 @pytest.mark.slow

@@ -11,10 +11,8 @@ from discover.dataset.run import Loading
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
-from discover.learners.trajectories.problem import make_problem
 from discover.protocols import imposed_stress, oscillations
 from discover.protocols.control import steady_rates
-from tensor_library.library import build_library
 
 TIMES = np.linspace(0.1, 4.0, 40)
 PLAIN = dc.Run("a.csv", TIMES, dc.start_up(1.0), np.ones(40), 1.0 - np.exp(-TIMES))
@@ -22,13 +20,8 @@ TWICE = replace(PLAIN, name="b.csv", weight=2.0)
 MODE = np.ones(1), np.ones(1)
 
 
-def sparse_problem(runs, **known):
-    return make_problem(runs, build_library(), *MODE, **known)
-
-
 WEIGHTS = {
     "the closed loop": lambda runs: make_batch(runs).weight,
-    "sparse regression": lambda runs: sparse_problem(runs).records.weight[..., 0],
     "the network": lambda runs: network_problem(runs, *MODE).records.weight,
 }
 
@@ -64,38 +57,29 @@ def of_every_kind(n):
     ]
 
 
-def of_both_learners(runs):
-    of_sparse = sparse_problem(runs, solvent_viscosity=5.0).records
-    of_network = network_problem(runs, *MODE, solvent_viscosity=5.0).records
-    n = of_network.weight.shape[1]
-    return of_sparse, of_network, np.asarray(of_sparse.weight)[:, :n, 0]
+def of_the_network(runs):
+    return network_problem(runs, *MODE, solvent_viscosity=5.0).records
 
 
 def test_all_judge_the_same_records_by_the_same_weights_beside_a_solvent_too():
     runs = of_every_kind(20)
-    of_sparse, of_network, weight = of_both_learners(runs)
-    np.testing.assert_allclose(of_network.weight, weight, rtol=1e-14)
+    of_network = of_the_network(runs)
     # the loop sums over runs where learners take the mean
     of_loop = np.asarray(make_batch(runs).weight)[:, :20] / np.sqrt(len(runs))
-    np.testing.assert_allclose(of_loop, weight, rtol=1e-14)
-    np.testing.assert_array_equal(of_network.recorded, of_sparse.recorded[:, :20, 0])
+    np.testing.assert_allclose(of_loop, of_network.weight, rtol=1e-14)
 
 
 def test_all_leave_the_same_of_the_same_predictions_where_runs_have_loadings_of_their_own():
     up, _, normal, curve = of_every_kind(20)[:4]
     own = Loading(0.05)
     runs = [replace(up, loading=own), replace(normal, loading=own), curve]
-    of_sparse, of_network, _ = of_both_learners(runs)
-    n = of_network.weight.shape[1]
+    of_network = of_the_network(runs)
     predicted = 1.04 * np.asarray(of_network.recorded)
     left = np.asarray(of_network.residual(jnp.asarray(predicted)))
     of_loop = make_batch(runs).records.residual(predicted[:, : max(map(len, runs))])
     np.testing.assert_allclose(
         of_loop / np.sqrt(len(runs)), left[:, : of_loop.shape[1]], rtol=1e-12
     )
-    padded = np.zeros(of_sparse.recorded.shape)
-    padded[:, :n, 0] = predicted
-    np.testing.assert_allclose(of_sparse.residual(jnp.asarray(padded))[:, :n, 0], left, rtol=1e-12)
     # negative control: without a loading of its own the first misses by far more, and the flow
     # curve by as much
     alone = np.asarray(of_network.without_factors().residual(jnp.asarray(predicted)))
@@ -103,20 +87,12 @@ def test_all_leave_the_same_of_the_same_predictions_where_runs_have_loadings_of_
     np.testing.assert_array_equal(alone[2], left[2])
 
 
-def test_a_network_counts_runs_alike_and_sparse_regression_values():
-    runs = [PLAIN, replace(PLAIN, name="b.csv").window(np.arange(40) < 10)]
-    _, of_network, weight = of_both_learners(runs)
-    share = np.asarray(of_network.weight)[:, 0] / weight[:, 0]
-    np.testing.assert_allclose(share, np.sqrt([50.0 / 80.0, 50.0 / 20.0]), rtol=1e-14)
-
-
-@pytest.mark.parametrize("who", list(WEIGHTS)[1:])
-def test_a_record_that_is_zero_throughout_is_refused(who):
+@pytest.mark.parametrize("learner", [dc.TensorSINDy(), dc.TBNNUDE()])
+def test_a_record_that_is_zero_throughout_is_refused(learner):
     with pytest.raises(InputError, match=r"b\.csv.*zero throughout"):
-        WEIGHTS[who]([PLAIN, replace(PLAIN, name="b.csv", stress=np.zeros(40))])
+        learner.fit([PLAIN, replace(PLAIN, name="b.csv", stress=np.zeros(40))])
 
 
 def test_weights_make_a_residual_the_relative_misfit():
-    runs = of_every_kind(20)[2:]  # those that weigh alike
-    for records in of_both_learners(runs)[:2]:
-        assert float(np.linalg.norm(records.residual(1.1 * records.recorded))) == pytest.approx(0.1)
+    records = of_the_network(of_every_kind(20)[2:])  # those that weigh alike
+    assert float(np.linalg.norm(records.residual(1.1 * records.recorded))) == pytest.approx(0.1)

@@ -60,7 +60,7 @@ def test_nothing_is_found_where_the_declared_law_made_the_extension(base):
 @pytest.mark.slow
 def test_the_sparse_learner_finds_the_law_in_extension_alone(base):
     data = extension("uniaxial", 0.3)
-    law = dc.TensorSINDy(dc.build_library(), base=base, n_stability=0).fit(data)
+    law = dc.TensorSINDy(dc.build_library(), base=base).fit(data)
     (term,) = law.result_.terms
     assert term.term == "sigma.sigma"
     assert term.coefficient == pytest.approx(0.3, rel=0.02)

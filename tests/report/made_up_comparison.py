@@ -17,7 +17,14 @@ from tensor_library.law_terms import LawTerms
 
 NOT_THERE = (None, float("nan"), float("inf"))
 TIMES = np.linspace(0.0, 10.0, 41)
-ROW = {"size": 1, "support": ["sigma.sigma"], "inner": {}, "misfit": 0.02, "held_out": 0.03}
+ROW = {
+    "log_evidence": 0.0,
+    "size": 1,
+    "support": ["sigma.sigma"],
+    "inner": {},
+    "misfit": 0.02,
+    "held_out": 0.03,
+}
 
 
 def flow(name, kind):
@@ -39,14 +46,14 @@ def outcome(learner, number, predicted):
     """Return an outcome in which every number that may be missing is `number`."""
     ends = None if number is None else (number, number)
     term = RecoveredTerm("sigma.sigma", 0.2, coefficient_penalised=number, ci95=ends)
-    path = [{**ROW, "size": 0, "support": [], "bic": number, "misfit": 0.4}, {**ROW, "bic": number}]
+    path = [{**ROW, "size": 0, "support": [], "misfit": 0.4}, {**ROW}]
     for row in path:
         row["held_out"] = number
         row["held_out_by_run"] = {"a": 0.01, "b": number, "c": 0.05}
     details = {
         "path": path,
-        "selectors": {"chosen": {"bic": ["sigma.sigma"], "held_out": None or []}},
-        "selection_frequency": [{"term": "sigma.sigma", "frequency": 0.5, "with_twins": 1.0}],
+        "selectors": {"chosen": {"evidence": ["sigma.sigma"], "held_out": None or []}},
+        "inclusion": {"sigma.sigma": 0.5},
         "misfit": number,
         "coefficients": {"sigma": {"mean": number, "spread": number}},
     }

@@ -156,28 +156,29 @@ def test_pictures_are_the_same_bytes_every_time(comparison):
 
 
 PATH = [
-    {"size": 0, "support": [], "inner": {}, "misfit": 0.4, "held_out": 0.4, "bic": 900.0},
+    {"size": 0, "support": [], "inner": {}, "misfit": 0.4, "held_out": 0.4, "log_evidence": 0.0},
     {
         "size": 1,
         "support": ["sigma.sigma"],
         "inner": {},
         "misfit": 0.02,
         "held_out": 0.02,
-        "bic": 0.0,
+        "log_evidence": 450.0,
     },
 ]
-SELECTORS = {"chosen": {"bic": ["sigma.sigma"], "stability": []}, "agree": False}
-FREQUENCY = [{"term": "sigma.sigma", "frequency": 0.5, "with_twins": 1.0}]
+SELECTORS = {"chosen": {"evidence": ["sigma.sigma"], "held_out": []}, "agree": False}
 
 
 def test_the_selection_path_shows_its_rules_and_their_disagreement():
-    details = {"path": PATH, "selectors": SELECTORS, "selection_frequency": FREQUENCY}
+    details = {"path": PATH, "selectors": SELECTORS, "inclusion": {"sigma.sigma": 0.9}}
     drawn = selection_picture(details)
     assert drawn is not None
-    for label in ("chosen by BIC", "chosen by stability", "σ·σ", "runs left out"):
+    for label in ("chosen by evidence", "chosen by held-out runs", "σ·σ", "runs left out"):
         assert label in drawn.svg
     outcome = LearnerOutcome("tensor_sindy", (), 1.0, (np.ones(1), np.ones(1)), details)
-    assert selection_sentence(outcome) == "The rules disagree. BIC: σ·σ; stability: no term."
+    assert (
+        selection_sentence(outcome) == "The rules disagree. evidence: σ·σ; held-out runs: no term."
+    )
     assert selection_picture({"path": PATH[:1]}) is None
 
 

@@ -1,7 +1,7 @@
 """What an experiment can determine of a library, before any fit: no data are used, only protocols.
 
-At a nominal law the sensitivities of σ12 to every coefficient of the library are computed by the
-same variational equations that fits use. Their null space holds the changes of the law that the
+At a nominal law the sensitivities of σ12 to every coefficient of the library are computed exactly.
+Their null space holds the changes of the law that the
 experiment cannot see; its image in N1 and N2 says whether those follow from σ12. Everything is to
 first order around the law; whether a direction stays invisible at finite size is decided in exact
 arithmetic where the law is a polynomial.
@@ -15,22 +15,24 @@ from typing import Any, Literal
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from discover.dataset.run import Run
-from discover.forward import Records
+from discover.forward.enough_steps import in_enough_steps
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.identify.exact.directions import Direction, weak_directions
 from discover.identify.exact.exact_series import compare_series
 from discover.identify.exact.relations import TermRelation, spell_briefly, term_relations
 from discover.identify.side_by_side.laws_side_by_side import joint_library
 from discover.identify.structure.hidden_stresses import HiddenStresses, hidden_stresses
 from discover.identify.structure.one_term_more import OneTermMore, each_moved
+from discover.identify.structure.sensitivities import with_sensitivities
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
-from discover.learners.trajectories.problem import TrajectoryProblem, make_problem
-from discover.learners.trajectories.sensitivities import linearise
+from discover.learners.runs import as_runs
 from discover.notebook_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
 from tensor_library.law_terms import LawTerms
@@ -45,7 +47,8 @@ _CHANGED = 1e-6
 _ROWS = 400
 """Samples of each quantity that enter a null space; more say nothing new of it."""
 
-_STRAIN_STEP = 0.2  # that of the fit, so that both share a compiled program
+_STRAIN_STEP = 0.2
+"""Largest strain of a step."""
 
 _FINITE_STEP = Fraction(1, 10)
 _FINITE_ORDER = 8
@@ -194,53 +197,68 @@ def analyse_structure(
     `runs`: their protocols and sampling times; the stresses are not looked at, except that with
     `use_normal_stresses` a run must hold N1 or N2 for it to count as measured. `library`: candidate
     terms. `base`: known part; by default UCM. `nominal`: laws around which to look besides the
-    known part; by default those of `NOMINAL` whose terms the library holds. `use_normal_stresses`:
-    whether N1 and N2, where runs hold them, are observed too.
+    known part; by default those of `NOMINAL` whose terms the library holds. `modulus`,
+    `relaxation_time`, `solvent_viscosity`: known linear viscoelasticity, in Pa, s and Pa s; the
+    first two numbers, or one for each mode. `use_normal_stresses`: whether N1 and N2, where runs
+    hold them, are observed too.
     """
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:
         nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
     library = joint_library(library, list(nominal.values()))
-    problem = make_problem(
-        runs,
-        library,
-        modulus,
-        relaxation_time,
-        solvent_viscosity,
-        base,
-        use_normal_stresses=use_normal_stresses,
-        strain_step=_STRAIN_STEP,
+    modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
+    runs = as_runs(runs, modes[1], base.linear_relaxation)
+    known = Fluid(base, *modes, solvent_viscosity)
+    flows = in_enough_steps(
+        known,
+        lay_out(
+            [run.protocol for run in runs],
+            [run.time for run in runs],
+            strain_step=_STRAIN_STEP,
+            relaxation_time=known.settling_time,
+        ),
     )
-    seen = np.any(problem.records.seen, axis=(0, 1))
-    known = "the known part alone"
-    laws = {known: LawTerms({}), **nominal}
-    everywhere = _unit_weights(problem)
+    normal = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
+    also = [
+        quantity
+        for quantity, column in normal.items()
+        if use_normal_stresses and any(getattr(run, column) is not None for run in runs)
+    ]
+    longest = max(map(len, runs))
+    samples = np.arange(longest) < np.array([[len(run)] for run in runs])
     found = []
-    for name, law in laws.items():
-        one = _at(everywhere, library, base, name, law, seen)
+    for name, law in {"the known part alone": LawTerms({}), **nominal}.items():
+        one = _at(known, flows, samples, library, name, law, ["sigma12", *also])
         if one is not None:
             found.append(one)
     return Structure(tuple(found), term_relations(library), len(library))
 
 
-def _unit_weights(problem: TrajectoryProblem) -> TrajectoryProblem:
-    """Return the problem with every sample of σ12, N1 and N2 observed with weight one."""
-    sampled = jnp.isfinite(problem.order_of_time)[..., None]
-    nothing = jnp.zeros_like(problem.records.recorded)
-    # what is recorded of each, whatever the loading
-    return replace(problem, records=Records(nothing, jnp.where(sampled, 1.0, nothing)))
-
-
-def _at(problem, library, base, name, law, seen) -> LawStructure | None:
+def _at(
+    known: Fluid,
+    flows: FlowBatch,
+    samples: Bool[np.ndarray, "runs n"],
+    library: TermLibrary,
+    name: str,
+    law: LawTerms,
+    observed: Sequence[str],
+) -> LawStructure | None:
     """Return the structure at one law, or None where it runs away in these flows."""
+    base = known.law
     coefficients, inner = law.over(library)
-    residual, columns = linearise(problem, jnp.asarray(coefficients), jnp.asarray(inner))
-    shape = problem.records.recorded.shape
-    stresses = np.asarray(residual).reshape(shape)
-    sensitivity = np.asarray(columns).reshape(*shape, -1)[..., : len(library)]
+    whole = LibraryExpansion(
+        coefficients=jnp.asarray(coefficients),
+        inner=jnp.asarray(inner),
+        library=library,
+        linear_relaxation=base.linear_relaxation,
+        base=base,
+    )
+    value, columns = with_sensitivities(whole, known, flows)
+    shape = samples[..., None]
+    stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
+    sensitivity = np.where(shape[..., None], np.asarray(columns)[:, : samples.shape[1]], 0.0)
     if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
         return None
-    samples = problem.records.seen[..., 0]
     # relative to the root-mean-square of each run; N2 to that of N1
     scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
     scale[:, 2] = scale[:, 1]
@@ -251,23 +269,15 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
         block = sensitivity[:, :, kind] / sizes
         rows = block[samples][:: max(1, total // _ROWS)]
         blocks[quantity] = rows / np.sqrt(len(rows))
-    observed = [q for q, is_seen in zip(blocks, seen, strict=True) if is_seen]
     exact, weak = _directions(library, blocks, observed, int(total))
     exact = [_finite(d, law, base) for d in exact]
     with_n1 = list(dict.fromkeys([*observed, "N1"]))
     left, _ = _directions(library, blocks, with_n1, int(total))
-    whole = LibraryExpansion(
-        coefficients=jnp.asarray(coefficients),
-        inner=jnp.asarray(inner),
-        library=library,
-        linear_relaxation=base.linear_relaxation,
-        base=base,
-    )
-    numbers = range(problem.modulus.shape[0]) if differs_by_mode(base) else [0]
+    numbers = range(known.n_modes) if differs_by_mode(base) else [0]
     of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
     hidden = max(of_modes, key=lambda one: len(one.unfelt))
     verdicts = tuple(
-        _verdict(q, observed, exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
+        _verdict(q, list(observed), exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
     )
     n2_with_n1: Verdict = "undetermined" if _changing(left, "N2") else "determined"
     if "N2" in observed:
@@ -276,7 +286,7 @@ def _at(problem, library, base, name, law, seen) -> LawStructure | None:
         text = verdicts[1].text + " Measuring N1 as well would not change this."
         verdicts = (verdicts[0], replace(verdicts[1], text=text))
     support = [library.names.index(term) for term in law.coefficients]
-    moved = each_moved(library.names, support, blocks, observed, int(total))
+    moved = each_moved(library.names, support, blocks, list(observed), int(total))
     return LawStructure(
         name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
     )

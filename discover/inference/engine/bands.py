@@ -93,7 +93,10 @@ class Predictions:
         own = ahead.jacobian[:, : len(fit.priors)]
         # of what is linear, only the gain and the moduli are those of the fitted runs
         runs, q = len(self.problem.fitted.runs), len(fit.linear)
-        linear, each = self.fitter.linear_columns(predicted), 2 + bool(self.problem.loading)
+        linear, each = (
+            self.fitter.linear_columns(predicted, ahead.shifts),
+            2 + bool(self.problem.loading),
+        )
         shared = np.zeros((len(self.rows), q))
         shared[:, 0] = linear[:, 0]
         shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]

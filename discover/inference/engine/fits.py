@@ -62,6 +62,8 @@ class Fit:
         Effects whose amplitude ended at zero.
     without
         A run whose rows the fit does not see; None for none.
+    shifts
+        What errors of the moduli do to `predicted`, in Pa, shape (rows, k).
     """
 
     names: tuple[str, ...]
@@ -78,6 +80,7 @@ class Fit:
     log_evidence: float = -np.inf
     at_an_end: tuple[str, ...] = ()
     without: int | None = None
+    shifts: Float[np.ndarray, "rows k"] | None = None
     damping: float = 1e-2
     memory: dict = field(default_factory=dict)
 
@@ -117,7 +120,8 @@ class Fitter:
         self.problem, self.rows = problem, rows
         self.noise = NoiseModel(rows, None, problem.noise)
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
-        self._shifts = self._modulus_shifts()
+        self._moduli = self._moved_moduli()
+        self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
         self.widths = self._widths()
 
     def noise_of(self, fit: Fit) -> NoiseModel:
@@ -128,18 +132,24 @@ class Fitter:
 
     # what is linear ---------------------------------------------------------------------------
 
-    def _modulus_shifts(self) -> Float[np.ndarray, "rows k"]:
-        """Return the change of predictions with each independent error of the moduli, in Pa."""
-        root, model, rows = self.problem.modulus_root, self.problem.model, self.rows
+    def _moved_moduli(self) -> Float[np.ndarray, "k c"]:
+        """Return the moduli, moved by each independent error of theirs, up and down."""
+        root, moduli = self.problem.modulus_root, self.problem.moduli
         if root is None:
-            return np.zeros((len(rows), 0))
-        moves = np.zeros((root.shape[1], len(self.problem.moduli)))
+            return np.zeros((0, len(moduli)))
+        moves = np.zeros((root.shape[1], len(moduli)))
         moves[:, : len(root)] = _MOVED * root.T
-        moduli = self.problem.moduli + np.concatenate([moves, -moves])
-        zero = np.tile(self.problem.zero, (len(moduli), 1))
-        found = rows.flat(model.predictions(zero, rows.batch, moduli))
-        columns = (found[: len(moves)] - found[len(moves) :]) / (2.0 * _MOVED)
-        return np.nan_to_num(columns.T)
+        return moduli + np.concatenate([moves, -moves])
+
+    def shifts_at(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "rows k"]:
+        """Return what errors of the moduli do to the predictions of a vector, in Pa."""
+        return self._shifts_of(self.predict([theta] * len(self._moduli), self._moduli))
+
+    def _shifts_of(self, found: Float[np.ndarray, "moved rows"]) -> Float[np.ndarray, "rows k"]:
+        """Return the change of predictions with each error, of predictions at `_moved_moduli`."""
+        up, down = np.split(found, 2)
+        with _running_away():
+            return np.nan_to_num((up - down).T / (2.0 * _MOVED))
 
     def _widths(self) -> Float[np.ndarray, " q"]:
         """Return the prior deviations of what is linear, all about zero."""
@@ -149,23 +159,40 @@ class Fitter:
         sound = np.full_like(sound, _NEXT_TO_NONE) if self.problem.computed else sound
         return np.array([*sound, *loadings, *[1.0] * self._shifts.shape[1]])
 
-    def linear_columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows q"]:
-        """Return what one of each does to the records, in Pa."""
-        rows = self.rows
+    def linear_columns(
+        self,
+        predicted: Float[np.ndarray, " rows"],
+        shifts: Float[np.ndarray, "rows k"] | None = None,
+    ) -> Float[np.ndarray, "rows q"]:
+        """Return what one of each does to the records, in Pa.
+
+        Parameters
+        ----------
+        predicted
+            Records as the model alone predicts them.
+        shifts
+            What errors of the moduli do to these; by default nothing.
+        """
+        rows, shifts = self.rows, self._shifts if shifts is None else shifts
         own = rows.run[:, None] == np.arange(len(rows.runs))
         level = own * rows.size[:, None]
         drift = level * (rows.time - 0.5)[:, None]
         loadings = own * predicted[:, None] if self.problem.loading else np.zeros((len(rows), 0))
-        return np.column_stack([predicted, level, drift, loadings, self._shifts])
+        return np.column_stack([predicted, level, drift, loadings, shifts])
 
     # predictions ------------------------------------------------------------------------------
 
-    def predict(self, thetas: Sequence[np.ndarray]) -> Float[np.ndarray, "trials rows"]:
+    def predict(
+        self,
+        thetas: Sequence[np.ndarray],
+        moduli: Float[np.ndarray, "trials c"] | None = None,
+    ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of the model alone; not finite where the law runs away."""
         if not len(thetas):
             return np.zeros((0, len(self.rows)))
         with np.errstate(all="ignore"):
-            moduli = np.broadcast_to(self.problem.moduli, (len(thetas), len(self.problem.moduli)))
+            if moduli is None:
+                moduli = np.tile(self.problem.moduli, (len(thetas), 1))
             model, batch = self.problem.model, self.rows.batch
             return self.rows.flat(model.predictions(np.array(thetas), batch, moduli))
 
@@ -219,7 +246,7 @@ class Fitter:
         with _running_away():
             own = (moved - fit.predicted).T / self._steps(fit)
         own = np.where(np.all(np.isfinite(own), axis=0), own, 0.0)
-        linear = self.linear_columns(fit.predicted)
+        linear = self.linear_columns(fit.predicted, fit.shifts)
         return np.column_stack([own * self.gain(fit)[:, None], linear])
 
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
@@ -231,7 +258,7 @@ class Fitter:
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the records as predicted, with what is linear."""
-        return fit.predicted + self.linear_columns(fit.predicted) @ fit.linear
+        return fit.predicted + self.linear_columns(fit.predicted, fit.shifts) @ fit.linear
 
     # fits ---------------------------------------------------------------------------------------
 
@@ -263,13 +290,26 @@ class Fitter:
         return fits
 
     def linearise(self, fits: Sequence[Fit]) -> None:
-        """Set the derivatives of fits, all of whose vectors are predicted side by side."""
+        """Set the derivatives of fits, all of whose vectors are predicted side by side.
+
+        What errors of the moduli do is taken at the constants too, for it is in proportion to the
+        stress of each mode.
+        """
         moved = [self._moved(fit) for fit in fits]
-        found = self.predict([theta for some in moved for theta in some])
+        k, declared = len(self._moduli), self.problem.moduli
+        thetas = [theta for fit, some in zip(fits, moved, strict=True)
+                  for theta in [*some, *[fit.theta] * k]]  # fmt: skip
+        moduli = [one for some in moved for one in [*[declared] * len(some), *self._moduli]]
+        found = self.predict(thetas, np.array(moduli).reshape(-1, len(declared)))
         place = 0
         for fit, some in zip(fits, moved, strict=True):
-            fit.jacobian = self._columns(fit, found[place : place + len(some)])
-            place += len(some)
+            own = found[place : place + len(some) + k]
+            place += len(own)
+            if k:
+                fit.shifts = self._shifts_of(own[len(some) :])
+            fit.jacobian = self._columns(fit, own[: len(some)])
+            if k and np.isfinite(fit.log_posterior):
+                self._set(fit, fit.predicted)
 
     def _pulls(self, fit: Fit) -> Float[np.ndarray, "free 2"]:
         """Return the derivative of the log prior of each coordinate, and its curvature."""
@@ -335,6 +375,10 @@ class Fitter:
 
     def _judge(self, fit: Fit) -> None:
         """Set covariance and evidence of a fit, by Laplace's method."""
+        record = self.record(fit)
+        left = self.rows.recorded - record
+        _, grid = self.noise_of(fit).log_likelihood(left, record)
+        fit.noise = self.noise_of(fit).refined(left, record, grid)
         _, curvature = self._normal_equations(fit)
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
         scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths)

@@ -131,10 +131,14 @@ class WithFunction(Fitter):
         self.variable = variable
         self.widths = np.append(fitter.widths, [width] * _KNOTS)
 
-    def linear_columns(self, predicted: Float[np.ndarray, " rows"]) -> Float[np.ndarray, "rows q"]:
+    def linear_columns(
+        self,
+        predicted: Float[np.ndarray, " rows"],
+        shifts: Float[np.ndarray, "rows k"] | None = None,
+    ) -> Float[np.ndarray, "rows q"]:
         """Return what one of each does to the records, in Pa; the function last."""
         own = self.variable.columns(predicted, self.rows.size)
-        return np.column_stack([super().linear_columns(predicted), own])
+        return np.column_stack([super().linear_columns(predicted, shifts), own])
 
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return by how much a record changes with the stress of the fluid."""

@@ -12,6 +12,7 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Float
+from scipy.optimize import minimize_scalar
 from scipy.special import gammaln, logsumexp
 
 from discover.inference.engine.rows import Rows
@@ -118,6 +119,39 @@ class NoiseModel:
         return float(logsumexp(values)), Noise(
             sizes, float(np.sqrt(common[best])), correlation, share
         )
+
+    def refined(
+        self,
+        residual: Float[np.ndarray, " rows"],
+        predicted: Float[np.ndarray, " rows"],
+        noise: Noise,
+    ) -> Noise:
+        """Return a noise of the grid with the likeliest correlation between its neighbours there.
+
+        A grid is fine enough to sum over, but not for an interval: at a correlation of 0.9 the
+        nearest value makes it a fifth too narrow.
+        """
+        at = CORRELATIONS.index(noise.correlation)
+        if at == 0:
+            return noise
+        scaled = residual[self.kept] / self.deviation(predicted, noise.share)[self.kept]
+
+        def of(correlation: float):
+            decay = self._decay(correlation)
+            left = (scaled - decay * scaled[self._before]) / np.sqrt(1.0 - decay**2)
+            square = LEAST**2 * self._count
+            square[self._there] += np.add.reduceat(left**2, self._starts)
+            value, common = self._marginal(square[None])
+            return value[0] - 0.5 * np.sum(np.log(1.0 - decay**2)), common[0], square
+
+        ends = CORRELATIONS[at - 1], CORRELATIONS[min(at + 1, len(CORRELATIONS) - 1)]
+        found = minimize_scalar(
+            lambda c: -of(c)[0], bounds=ends, method="bounded", options={"xatol": 1e-3}
+        )
+        correlation = float(found.x)
+        _, common, square = of(correlation)
+        sizes = np.sqrt((self._alike * common + square) / (self._alike + self._count))
+        return Noise(sizes, float(np.sqrt(common)), correlation, noise.share)
 
     def _marginal(self, square: Float[np.ndarray, "grid runs"]):
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""

@@ -1,16 +1,16 @@
 """Levenberg–Marquardt for many small problems that share one compiled model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+from jaxtyping import Float
+from scipy.optimize import lsq_linear
 
 from discover.forward import AugmentedModel, Batch, Linearised, Point, linearised
-from discover.inference.least_squares.fit import NO_PRIOR, Fit, Prior
-from discover.inference.least_squares.steps import stepped
 
 _LARGEST_DAMPING, _LEAST_DAMPING = 1e7, 1e-8
-_FAR_BEHIND, _HARDLY = 2.0, 0.05
 _FREE = 1.0
 """Damping, relative to the curvature, below which a step is the problem's own."""
 
@@ -20,6 +20,56 @@ _FORETOLD = 0.25
 """Of the gain that derivatives foretell, below which they are taken anew."""
 
 
+@dataclass
+class Fit:
+    """A fitted parameter vector.
+
+    Attributes
+    ----------
+    free
+        Positions of the fitted ones.
+    residual
+        Weighted residuals, shape (runs, n).
+    derivatives
+        Those of the residuals, as `jacobian` returns them, or what computes them.
+    """
+
+    theta: Float[np.ndarray, " p"]
+    free: tuple[int, ...]
+    residual: Float[np.ndarray, "runs n"]
+    derivatives: Float[np.ndarray, "free runs n"] | Callable[[], Float[np.ndarray, "free runs n"]]
+
+    @cached_property
+    def jacobian(self) -> Float[np.ndarray, "free runs n"]:
+        """Derivatives of the residuals in the fitted parameters, computed when first asked for.
+
+        Of rival fits most are never asked.
+        """
+        return self.derivatives() if callable(self.derivatives) else self.derivatives
+
+    @property
+    def cost(self) -> float:
+        """Sum over runs of the squared relative errors."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of what ran away
+            return float(np.sum(self.residual**2))
+
+    @property
+    def run_errors(self) -> Float[np.ndarray, " runs"]:
+        """Root-mean-square error over root-mean-square stress of each run."""
+        return np.sqrt(np.sum(self.residual**2, axis=1))
+
+    @property
+    def usable(self) -> bool:
+        """Whether residuals and derivatives are all finite."""
+        return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
+
+
+def best_of(fits: Iterable[Fit]) -> Fit | None:
+    """Return the usable fit of the least cost; None where none is usable."""
+    by_cost = sorted(fits, key=lambda fit: fit.cost if np.isfinite(fit.cost) else np.inf)
+    return next((fit for fit in by_cost if fit.usable), None)
+
+
 def fit_batch(
     model: AugmentedModel,
     batch: Batch,
@@ -27,9 +77,6 @@ def fit_batch(
     free: Sequence[Sequence[int]],
     max_steps: int = 200,
     tolerance: float = 1e-4,
-    prior: Prior = NO_PRIOR,
-    rivals: bool = False,
-    known: float = np.inf,
 ) -> list[Fit]:
     """Minimise the squared residuals from several starts, each in its own free parameters.
 
@@ -57,20 +104,13 @@ def fit_batch(
         Largest number of steps.
     tolerance
         A problem is finished when a step lowers its cost by less than this fraction.
-    prior
-        What is known of some parameters; it counts where they are free.
-    rivals
-        Whether only the best problems matter: one that is far behind and hardly gains any more is
-        left where it is.
-    known
-        Cost of the best fit that the problems compete with beside one another.
     """
     given = [
         (np.array(start, dtype=float), list(at)) for start, at in zip(starts, free, strict=True)
     ]
     begun = linearised(model, [Point(theta, at) for theta, at in given], batch)
     descents = [
-        _Descent(model, prior, at, theta, found.residual, found.jacobian)
+        _Descent(model, at, theta, found.residual, found.jacobian)
         for (theta, at), found in zip(given, begun, strict=True)
     ]
     lanes = model.vectors_at_once(batch)
@@ -80,8 +120,7 @@ def fit_batch(
             break
         asked = _asked(going, lanes)
         for one, point, found in zip(going, asked, linearised(model, asked, batch), strict=True):
-            best = min(known, *(other.cost for other in descents)) if rivals else np.inf
-            one.take(point, found, tolerance, best)
+            one.take(point, found, tolerance)
     return [one.ended(batch) for one in descents]
 
 
@@ -103,8 +142,8 @@ class _Descent:
 
     Attributes
     ----------
-    model, prior, free
-        Whose residuals they are, what is known of the parameters, and which are fitted.
+    model, free
+        Whose residuals they are, and which parameters are fitted.
     theta, residual
         Where it is.
     derivatives
@@ -118,7 +157,6 @@ class _Descent:
     """
 
     model: AugmentedModel
-    prior: Prior
     free: list[int]
     theta: np.ndarray
     residual: np.ndarray
@@ -130,7 +168,7 @@ class _Descent:
     cost: float = field(init=False)
 
     def __post_init__(self):
-        self.cost = self._cost(self.theta, self.residual)
+        self.cost = _cost(self.residual)
         self.done = not np.isfinite(self.cost) or not self.free
 
     def ended(self, batch: Batch) -> Fit:
@@ -141,29 +179,21 @@ class _Descent:
         point, model = Point(at, free, self.residual), self.model
         return Fit(at, free, self.residual, lambda: linearised(model, [point], batch)[0].jacobian)
 
-    def _cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
-        """Return the sum of squares, what is known of parameters included; else infinite."""
-        with np.errstate(over="ignore", invalid="ignore"):  # a trial that ran away
-            cost = np.sum(residual**2) + np.sum(self.prior.rows(theta, self.free)[0] ** 2)
-        return float(cost) if np.isfinite(cost) else np.inf
-
     def next_point(self) -> Point:
         """Return the parameters after one more step, or where derivatives are to be taken."""
         if self.derivatives is None:
             return Point(self.theta, self.free, self.residual)
         at, derivatives = (self.theta, self.free, self.residual), self.derivatives
-        theta = stepped(self.model, *at, derivatives, self.damping, self.prior)
+        theta = _stepped(self.model, *at, derivatives, self.damping)
         return Point(theta, limit=self.cost)
 
     def _foretold(self, step: np.ndarray) -> float:
         """Return by how much a step lowers the cost if derivatives stay what they are."""
         assert self.derivatives is not None  # the step was found with them
-        known, design = self.prior.rows(self.theta, self.free)
-        change, of_known = np.tensordot(step, self.derivatives, axes=1), design @ step
-        gain = np.sum(change * (2.0 * self.residual + change))
-        return -float(gain + np.sum(of_known * (2.0 * known + of_known)))
+        change = np.tensordot(step, self.derivatives, axes=1)
+        return -float(np.sum(change * (2.0 * self.residual + change)))
 
-    def take(self, point: Point, found: Linearised, tolerance: float, best: float) -> None:
+    def take(self, point: Point, found: Linearised, tolerance: float) -> None:
         """Take the step that was tried, or try a shorter one or other derivatives next time.
 
         Parameters
@@ -172,14 +202,12 @@ class _Descent:
             What was asked about, and the answer.
         tolerance
             Share of the cost below which a step gains hardly anything.
-        best
-            Least cost of all problems; infinite where being behind it is no reason to end.
         """
         if self.derivatives is None:
             self.derivatives, self.fresh = found.jacobian, True
             return
         theta, residual = point.theta, found.residual
-        cost = self._cost(theta, residual)
+        cost = _cost(residual)
         if not cost < self.cost:
             if self.fresh:
                 self.damping, self.growth = self.damping * self.growth, 2.0 * self.growth
@@ -189,9 +217,8 @@ class _Descent:
             return
         gain = 1.0 - cost / self.cost
         short = gain < tolerance
-        behind = self.cost > _FAR_BEHIND * best and gain < _HARDLY
         # a step that damping cut short gains little anywhere
-        self.done = self.damping < _FREE and ((short and self.fresh) or behind)
+        self.done = self.damping < _FREE and short and self.fresh
         step, change = theta[self.free] - self.theta[self.free], residual - self.residual
         # at most all of it: a model that foretells nothing says nothing
         share = min((self.cost - cost) / max(self._foretold(step), 1e-300), 1.0)
@@ -204,6 +231,39 @@ class _Descent:
             anew = self.done or short or share < _FORETOLD
             self.derivatives = None if anew else _corrected(self.derivatives, step, change)
             self.fresh = False
+
+
+def _cost(residual: Float[np.ndarray, "runs n"]) -> float:
+    """Return the sum of squares; infinite for a trial that ran away."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        cost = float(np.sum(residual**2))
+    return cost if np.isfinite(cost) else np.inf
+
+
+def _stepped(
+    model: AugmentedModel,
+    theta: Float[np.ndarray, " p"],
+    free: Sequence[int],
+    residual: Float[np.ndarray, "runs n"],
+    jacobian: Float[np.ndarray, "free runs n"],
+    damping: float,
+) -> Float[np.ndarray, " p"]:
+    """Return parameters after the best damped step that the ranges of what is free hold."""
+    at, moved = list(free), theta.copy()
+    design = jacobian.reshape(len(at), -1).T
+    if not at or not np.all(np.isfinite(design)):
+        return moved
+    scale = np.linalg.norm(design, axis=0)
+    scale = np.where(scale > 0, scale, 1.0)
+    padded = np.concatenate([design / scale, np.sqrt(damping) * np.eye(len(at))])
+    target = np.concatenate([-residual.ravel(), np.zeros(len(at))])
+    step = np.linalg.lstsq(padded, target, rcond=None)[0]
+    low, high = scale * (model.low[at] - theta[at]), scale * (model.high[at] - theta[at])
+    if np.any((step < low) | (step > high)):
+        high = np.maximum(high, np.nextafter(low, np.inf))  # a range may be one value
+        step = lsq_linear(padded, target, (low, high), method="bvls").x
+    moved[at] = np.clip(theta[at] + step / scale, model.low[at], model.high[at])
+    return moved
 
 
 def _corrected(jacobian, step, change):

@@ -9,7 +9,6 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.labelled_arrays import xarray_module
 from discover.learners.runs import as_runs
-from discover.statistics import HALF_BAND
 
 if TYPE_CHECKING:
     import xarray
@@ -23,8 +22,7 @@ def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
     Raises
     ------
     InputError
-        If the law has no term, or its constants exchange each other, so that there are no draws;
-        or xarray is missing.
+        If the law has no term, or xarray is missing.
     """
     rng = np.random.default_rng(seed)
     terms, values, inner = _of_a_sparse_law(estimator, rng)
@@ -72,23 +70,14 @@ def _of_a_sparse_law(
     estimator: Any, rng: np.random.Generator
 ) -> tuple[list[str], np.ndarray, dict[str, np.ndarray]]:
     """Return the terms, and draws of their coefficients and of inner parameters."""
-    uncertainty, draws = estimator.uncertainty_, estimator.draws_
-    if uncertainty is None:
+    if estimator.covariance_ is None:
         raise InputError("No term was chosen, so there is no coefficient to draw.")
-    if draws.method == "none":
-        raise InputError(f"There are no draws: {draws.reason}.")
-    terms = [term.term for term in estimator.terms_]
-    places = list(uncertainty.inner_positions)
-    coefficients = [term.coefficient for term in estimator.terms_]
-    centre = np.append(coefficients, estimator.inner_[places])
-    values = draws.values
-    if draws.method == "linear":
-        covariance = uncertainty.total_covariance * (uncertainty.factor / HALF_BAND) ** 2
-        values = rng.multivariate_normal(centre, covariance, N_DRAWS)
-    size = len(terms)
-    names = [estimator.library_.inner_names[i] for i in places]
-    inner = dict(zip(names, values[:, size:].T, strict=True))
-    return terms, values[:, :size], inner
+    found = [term.coefficient for term in estimator.terms_]
+    inner = {name: v for term in estimator.terms_ for name, v in term.inner.items()}
+    centre = [*found, *inner.values()]
+    values = rng.multivariate_normal(centre, estimator.covariance_, N_DRAWS)
+    size, terms = len(found), [term.term for term in estimator.terms_]
+    return terms, values[:, :size], dict(zip(inner, values[:, size:].T, strict=True))
 
 
 def _source(estimator: Any) -> dict[str, str]:

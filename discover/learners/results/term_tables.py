@@ -33,7 +33,7 @@ class TermTables(NotebookView):
         """Return the best law of each size, from no term on; empty where the learner has no path.
 
         Columns: relative misfit on all runs, relative misfit on runs left out of the refit
-        (``held_out``), extended BIC, and which rules choose the law.
+        (``held_out``), log evidence, and which rules choose the law.
         """
         lines = []
         for member in self.details.get("path", ()):
@@ -42,7 +42,7 @@ class TermTables(NotebookView):
                 {
                     "size": member["size"],
                     "terms": ", ".join(member["support"]) or "no term",
-                    **{name: member[name] for name in ("misfit", "held_out", "bic")},
+                    **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
                     "chosen_by": ", ".join(by),
                 }
             )
@@ -59,13 +59,29 @@ class TermTables(NotebookView):
         table = pd.DataFrame.from_dict(lines, orient="index", columns=terms, dtype=bool)
         return table.rename_axis("rule")
 
-    def stability_table(self) -> pd.DataFrame:
-        """Return how often each term is chosen from halves of the data, the most often first.
+    def inclusion_table(self) -> pd.DataFrame:
+        """Return the probability that each term is in the law, the likeliest first.
 
-        ``with_twins`` counts the halves in which the term, or one that these runs do not tell from
-        it, was chosen. Empty where halves were not looked at.
+        Were the law among those that were fitted. Empty where the learner weighs none.
         """
-        return pd.DataFrame(list(self.details.get("selection_frequency", ())))
+        found = dict(self.details.get("inclusion") or {})
+        return pd.DataFrame({"term": list(found), "probability": list(found.values())})
+
+    def rivals_table(self) -> pd.DataFrame:
+        """Return the other laws that the records do not rule out, the closest predictions first.
+
+        Columns: terms, coefficients, relative misfit, relative difference of predictions, log
+        evidence, and whether no record of these runs tells the two apart.
+        """
+        lines = [
+            {
+                "terms": ", ".join(row["support"]) or "no term",
+                "coefficients": ", ".join(f"{value:.4g}" for value in row["coefficients"]),
+                **{name: row[name] for name in ("misfit", "difference", "log_evidence", "exact")},
+            }
+            for row in self.details.get("rivals", ())
+        ]
+        return pd.DataFrame(lines)
 
     def _chosen(self) -> Mapping[str, Sequence[str]]:
         return (self.details.get("selectors") or {}).get("chosen") or {}

@@ -1,107 +1,209 @@
-"""What a search says of its path and of rivals, as plain JSON-able tables."""
+"""What a search found, as terms with their intervals and as plain JSON-able tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
-from discover.learners.tensor_sindy.intervals import ParameterUncertainty
-from discover.learners.tensor_sindy.refit import Fit
+from discover.inference.engine.fits import Fit
+from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.settings import ARITHMETIC
+from discover.learners.tensor_sindy.optimisers import default_support, solve_sparse
 from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.tensor_sindy.stability import Stability
+from discover.learners.tensor_sindy.selection import (
+    choose_by_held_out,
+    choose_by_one_standard_error,
+)
+from discover.statistics import HALF_BAND
 from discover.statistics.projection import rms
-from tensor_library.library import TermLibrary
 
-_CLOSE = 10.0  # difference of an information criterion beyond which evidence is very strong
+_CLOSE = 5.0
+"""Log odds beyond which evidence against a law is very strong   [Kass & Raftery 1995]."""
+
+_SEEN = 1e-3
+"""Probability from which on a term is listed."""
 
 
-def _describe(search: SupportSearch, fit: Fit) -> dict[str, Any]:
+def recovered_terms(search: SupportSearch, fit: Fit) -> tuple[RecoveredTerm, ...]:
+    """Return the terms of a fit in the order of the library; none of an empty law."""
+    if not fit.names or fit.covariance is None:
+        return ()
+    model, library, support = search.problem.model, search.library, search.support(fit)
+    penalised = _penalised(search, fit)
+    middle = fit.coordinates
+
+    def ends(value: float, variance: float, place: int) -> tuple[float, float]:
+        prior = list(fit.priors.values())[place]
+        half = HALF_BAND * float(np.sqrt(max(variance, 0.0)))
+        low, high = (prior.to_value(np.clip(value + s * half, *prior.ends)) for s in (-1.0, 1.0))
+        return low, high
+
+    terms = []
+    for index in support:
+        term = library.terms[index]
+        at, *inner_at = model.positions(term.name)
+        place = fit.free.index(at)
+        value, variance = float(middle[place]), float(fit.covariance[place, place])
+        inner, inner_ci95, at_one = {}, {}, {}
+        for position in inner_at:
+            assert term.form is not None
+            name, own = term.form.inner_name, fit.free.index(position)
+            of_own = float(fit.covariance[own, own])
+            inner[name] = float(fit.theta[position])
+            inner_ci95[name] = ends(float(middle[own]), of_own, own)
+            if abs(value - 1.0) <= HALF_BAND * np.sqrt(variance):
+                # the normal distribution of the one, given that the other is one
+                slope = float(fit.covariance[own, place]) / variance
+                known = float(middle[own]) + slope * (1.0 - value)
+                left = of_own - slope * float(fit.covariance[own, place])
+                prior = list(fit.priors.values())[own]
+                at_one[name] = (prior.to_value(known), *ends(known, left, own))
+        terms.append(
+            RecoveredTerm(
+                term=term.name,
+                coefficient=value,
+                coefficient_penalised=penalised.get(index),
+                ci95=ends(value, variance, place),
+                inner=inner,
+                inner_ci95=inner_ci95,
+                inner_at_one=at_one,
+                latex=term.latex(),
+            )
+        )
+    return tuple(terms)
+
+
+def covariance_of_terms(search: SupportSearch, fit: Fit) -> Float[np.ndarray, "p p"] | None:
+    """Return the covariance of the coefficients of a fit, then of its inner parameters."""
+    if not fit.names or fit.covariance is None:
+        return None
+    each = [search.problem.model.positions(search.library.names[i]) for i in search.support(fit)]
+    at = [own[0] for own in each] + [position for own in each for position in own[1:]]
+    places = [fit.free.index(position) for position in at]
+    # from the coordinate that is fitted to the constant
+    slope = np.array([fit.theta[p] if fit.priors[p].is_logarithm else 1.0 for p in at])
+    return fit.covariance[np.ix_(places, places)] * np.outer(slope, slope)
+
+
+def _penalised(search: SupportSearch, fit: Fit) -> dict[int, float]:
+    """Return what the optimiser makes of the terms of a fit: thresholded or penalised."""
+    model, support = search.model_at(fit), search.support(fit)
+    for solution in solve_sparse(search.optimizer, model.design, model.target, search.most):
+        if solution.support == support:
+            return {i: float(solution.coefficients[i]) for i in support}
+    # the optimiser left to itself stops elsewhere: what it says of these terms alone
+    design = model.design[:, list(support)]
+    alone = solve_sparse(search.optimizer, design, model.target, len(support))
+    if not alone:
+        return dict.fromkeys(support, 0.0)
+    densest = max(alone, key=lambda s: len(s.support)).coefficients
+    return dict(zip(support, map(float, densest), strict=True))
+
+
+def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:
+    terms = [search.library.terms[i] for i in search.support(fit)]
+    theta, model = fit.theta, search.problem.model
+    inner = {}
+    for term in terms:
+        if term.form is not None:
+            inner[term.form.inner_name] = float(theta[model.positions(term.name)[1]])
     return {
-        **fit.law(search.problem.library).to_json(),
-        "misfit": fit.misfit,
-        "bic": search.criterion(fit),
+        "support": [term.name for term in terms],
+        "coefficients": [float(theta[model.positions(term.name)[0]]) for term in terms],
+        "inner": inner,
+        "misfit": search.misfit(fit),
+        "log_evidence": search.rank(fit),
     }
 
 
 def path_table(
     search: SupportSearch,
     path: Sequence[Fit],
-    criterion: Float[np.ndarray, " path"],
-    held_out: Float[np.ndarray, "path folds"] | None,
-    by_run: Sequence[Mapping[str, float]] | None = None,
+    held_out: Float[np.ndarray, "path runs"] | None,
 ) -> list[dict[str, Any]]:
-    """Return one row for each member of the path: support, size, misfit, held-out misfit, BIC.
+    """Return one row for each member of the path: support, size, misfits, log evidence.
 
-    The held-out misfit is the mean over folds; `by_run` gives it for each run, by name.
+    The misfit in runs left out is the root mean square over them; ``held_out_by_run`` gives it for
+    each, by name.
     """
+    names = [run.name for run in search.fitter.rows.runs]
     rows = []
     for i, fit in enumerate(path):
-        row = _describe(search, fit)
-        row["size"] = len(fit.support)
-        row["bic_at_exact_moduli"] = row["bic"]
-        row["bic"] = float(criterion[i])
-        row["held_out"] = None if held_out is None else rms(held_out[i])
-        row["held_out_by_run"] = {} if by_run is None else dict(by_run[i])
+        row = _described(search, fit)
+        row["size"] = len(fit.names)
+        row["held_out"] = None if held_out is None else float(rms(held_out[i]))
+        by_run = [] if held_out is None else held_out[i].tolist()
+        row["held_out_by_run"] = dict(zip(names, by_run, strict=False))
         rows.append(row)
     return rows
 
 
 def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
-    """Return the supports met that the data do not rule out, closest first.
+    """Return the other laws that the records do not rule out, closest first.
 
     A rival is no larger than the chosen support. Its ``difference`` is the relative
-    root-mean-square difference of the two predictions; it is an ``exact`` tie where that is below
-    the floor.
+    root-mean-square difference of the two predictions; it is an ``exact`` tie where no record of
+    these runs tells the two apart.
     """
     rivals = []
-    limit = search.criterion(chosen) + _CLOSE
-    for fit in search.fits.values():
-        if fit.support == chosen.support or len(fit.support) > len(chosen.support):
+    for fit in search.alive():
+        if fit is chosen or len(fit.names) > len(chosen.names):
             continue
         exact = search.indistinguishable(fit, chosen)
-        if exact or search.criterion(fit) < limit:
-            row = _describe(search, fit)
-            row["difference"] = float(np.linalg.norm(fit.predicted - chosen.predicted))
-            row["exact"] = exact
+        if exact or search.rank(fit) > search.rank(chosen) - _CLOSE:
+            row = _described(search, fit)
+            row |= {"difference": search.difference(fit, chosen), "exact": exact}
             rivals.append(row)
     return sorted(rivals, key=lambda row: row["difference"])
 
 
-def described(uncertainty: ParameterUncertainty | None) -> dict[str, Any]:
-    """Return the covariance of a law's parameters, and the errors of moduli that it allows for."""
-    if uncertainty is None:
-        return {"covariance": None}
-    rows: dict[str, Any] = {"covariance": uncertainty.total_covariance.tolist()}
-    errors = uncertainty.modulus_errors
-    if errors is not None:
-        rows["modulus_errors"] = {name: v.tolist() for name, v in vars(errors).items()}
-    return rows
+def inclusion(search: SupportSearch) -> dict[str, float]:
+    """Return the posterior probability of each term, were the law among those fitted."""
+    fits = search.alive()
+    logs = np.array([search.rank(fit) for fit in fits])
+    weights = np.exp(logs - np.logaddexp.reduce(logs))
+    found = {
+        name: float(sum(w for fit, w in zip(fits, weights, strict=True) if name in fit.names))
+        for name in search.library.names
+    }
+    likely = {name: p for name, p in found.items() if p >= _SEEN}
+    return dict(sorted(likely.items(), key=lambda pair: -pair[1]))
 
 
-def frequency_table(library: TermLibrary, stability: Stability | None) -> list[dict[str, Any]]:
-    """Return how often each term was chosen from halves of the data, the most often first."""
-    if stability is None:
-        return []
-    rows = [
-        {"term": name, "frequency": float(alone), "with_twins": float(together)}
-        for name, alone, together in zip(
-            library.names,
-            stability.frequency,
-            stability.interchangeable,
-            strict=True,
-        )
-    ]
-    return sorted(rows, key=lambda row: (-row["with_twins"], -row["frequency"]))
-
-
-def noise_of(uncertainty: ParameterUncertainty | None) -> dict[str, Any] | None:
-    """Return what is known of the noise, as numbers; None for an empty law."""
-    if uncertainty is None:
-        return None
-    noise = uncertainty.noise
+def compare_rules(
+    search: SupportSearch,
+    path: Sequence[Fit],
+    held_out: Float[np.ndarray, "path runs"] | None,
+    chosen: Fit,
+) -> dict[str, Any]:
+    """Return what each rule chooses, as terms, and whether they agree."""
+    found = {"evidence": search.support(path[by_evidence(search, path)])}
+    if held_out is not None:
+        found["held_out"] = search.support(path[choose_by_held_out(held_out)])
+        simplest = path[choose_by_one_standard_error(held_out)]
+        found["one_standard_error"] = search.support(simplest)
+    model = search.model_at(chosen)
+    # in units of the stress, as a user of pysindy has them, and not over the noise
+    size = max(chosen.noise.common, ARITHMETIC)
+    found["pysindy"] = default_support(search.optimizer, size * model.design, size * model.target)
+    names = search.library.names
     return {
-        "autoregressive_order": int(noise.coefficients.size),
-        "lag_one_correlation": float(noise.correlation[1]) if noise.coefficients.size else 0.0,
-        "effective_samples": noise.effective_samples,
+        "chosen": {rule: [names[i] for i in support] for rule, support in found.items()},
+        "agree": len(set(found.values())) == 1,
+    }
+
+
+def by_evidence(search: SupportSearch, path: Sequence[Fit]) -> int:
+    """Return the position of the likeliest member; of equals the simplest."""
+    return int(np.argmax([search.rank(fit) for fit in path]))
+
+
+def noise_of(fit: Fit, observations: int) -> dict[str, float]:
+    """Return the noise that a fit leaves, relative to the records, and what samples are worth."""
+    share = (1.0 - fit.noise.correlation) / (1.0 + fit.noise.correlation)
+    return {
+        "size": fit.noise.common,
+        "lag_one_correlation": fit.noise.correlation,
+        "effective_samples": observations * share,
     }

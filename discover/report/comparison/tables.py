@@ -19,7 +19,6 @@ from discover.report.wording import (
     FIGURE_SYMBOLS,
     RULES,
     interval,
-    known,
     percent,
     readable,
     selection_sentence,
@@ -31,14 +30,14 @@ from discover.words import effects_title
 def selection(comparison: Comparison) -> dict[str, Any] | None:
     """Return the sparse learner's path, or None where there is none.
 
-    A misfit or a criterion is None where a law runs away in a run left out.
+    A misfit is None where a law runs away in a run left out.
     """
     sparse = comparison.outcomes.get("tensor_sindy")
     path = [] if sparse is None else sparse.details.get("path") or []
     if sparse is None or not path:
         return None
     chosen = (sparse.details.get("selectors") or {}).get("chosen") or {}
-    lowest = min((row["bic"] for row in path if known(row["bic"])), default=0.0)
+    highest = max((row["log_evidence"] for row in path), default=0.0)
     rows = [
         {
             "size": row["size"],
@@ -46,7 +45,7 @@ def selection(comparison: Comparison) -> dict[str, Any] | None:
             "misfit": row["misfit"],
             "held_out": row["held_out"],
             "range": list(_by_run(row).values()),
-            "bic": row["bic"] - lowest if known(row["bic"]) else None,
+            "behind": highest - row["log_evidence"],
             "rules": ", ".join(
                 RULES.get(rule, str(rule))
                 for rule, support in chosen.items()

@@ -22,27 +22,25 @@ from discover.report.wording import readable
 
 _MOST_BARS = 8
 _RULE_STYLES = {
-    "bic": (SPARSE, "o", "BIC"),
+    "evidence": (SPARSE, "o", "evidence"),
     "held_out": (NETWORK, "s", "held-out runs"),
-    "stability": (GREEN, "^", "stability"),
 }
-STABLE_LINE = 0.6
 
 
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
-    """Return the selection path: misfits, the criterion, and how stable each term is.
+    """Return the selection path: misfits, evidence, and how probable each term is.
 
     Parameters
     ----------
     details
-        Of the sparse learner's result: ``path``, ``selectors``, ``selection_frequency``.
+        Of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
     """
     path = details.get("path") or []
     if len(path) < 2:
         return None
     sizes = [row["size"] for row in path]
-    frequencies = (details.get("selection_frequency") or [])[:_MOST_BARS]
-    with figure(1, 3 if frequencies else 2, width=10.0, height=3.0) as (drawing, axes):
+    probable = list((details.get("inclusion") or {}).items())[:_MOST_BARS]
+    with figure(1, 3 if probable else 2, width=10.0, height=3.0) as (drawing, axes):
         left, middle = axes[0, 0], axes[0, 1]
         left.semilogy(
             sizes,
@@ -62,11 +60,10 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
             )
         left.set_ylabel("misfit (%)")
         make_percentage(left.yaxis)
-        bic = np.array([row["bic"] for row in path], dtype=float)
-        if np.any(np.isfinite(bic)):
-            middle.plot(sizes, bic - np.nanmin(bic), color=BEFORE, marker=".")
-        middle.set_yscale("symlog", linthresh=10.0)
-        middle.set_ylabel("BIC above the lowest")
+        evidence = np.array([row["log_evidence"] for row in path])
+        middle.plot(sizes, np.max(evidence) - evidence, color=BEFORE, marker=".")
+        middle.set_yscale("symlog", linthresh=5.0)
+        middle.set_ylabel("log odds behind the likeliest")
         supports = [row["support"] for row in path]
         chosen = (details.get("selectors") or {}).get("chosen", {})
         for offset, (rule, (colour, marker, label)) in enumerate(_RULE_STYLES.items()):
@@ -85,34 +82,19 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
         for panel in (left, middle):
             panel.set_xlabel("number of terms")
             panel.set_xticks(sizes)
-        if frequencies:
-            bars = axes[0, 2]
-            rows = frequencies[::-1]
-            bars.barh(
-                [readable(row["term"]) for row in rows],
-                [100.0 * row["with_twins"] for row in rows],
-                color=GREEN,
-                alpha=0.35,
-                label="term or an equivalent one",
-            )
-            bars.barh(
-                [readable(row["term"]) for row in rows],
-                [100.0 * row["frequency"] for row in rows],
-                height=0.4,
-                color=GREEN,
-                label="the term itself",
-            )
-            bars.axvline(100.0 * STABLE_LINE, color=BEFORE, linewidth=0.8)
+        if probable:
+            bars, rows = axes[0, 2], probable[::-1]
+            bars.barh([readable(name) for name, _ in rows], [100.0 * p for _, p in rows],
+                      height=0.5, color=GREEN)  # fmt: skip
             bars.set_xlim(0.0, 100.0)
-            bars.set_xlabel("chosen in halves of the data (%)")
+            bars.set_xlabel("probability of the term (%)")
         legend_above(drawing, axes, columns=4)
         return picture(
             drawing,
             "selection",
-            "The best law of each size: its misfit, and its BIC above the lowest (linear below "
-            "10). A gap: a law that diverges in a run left out. Right: how often each term is "
-            "chosen when half of the data are looked at; the line marks what counts as stable. A "
-            "pale bar beyond the full one: terms of identical signature take each other's place.",
+            "The best law of each size: its misfit, and its log odds behind the likeliest (linear "
+            "below 5). A gap: a law that diverges in a run left out. Right: the probability that "
+            "the law has each term, were it among those that were fitted.",
         )
 
 
