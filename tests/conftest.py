@@ -83,9 +83,6 @@ _COMPILED_SOON = (
 )
 _KNOWN_TO = ("0.10",)
 
-# in these the tests spend more time than it takes to optimise them
-_WORTH_OPTIMISING = ("discover.learners.tensor_sindy.refit._descend",)
-
 
 def pytest_configure(config: pytest.Config) -> None:
     """Import what tests need where they run; compile without optimising if slow ones are left out.
@@ -112,15 +109,10 @@ class _InTurn(ThreadPoolExecutor):
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Optimise the few programs that run long; all tests are imported, in a worker, by now."""
+    """Call programs in turn; all tests are imported, in a worker, by now."""
     if hasattr(session.config, "workerinput"):
         # to start threads for every call of a program takes a tenth of a fit's processor
         importlib.import_module("discover.programs.threads").ThreadPoolExecutor = _InTurn
-    if _compiles_soon(session.config):
-        for place in _WORTH_OPTIMISING:
-            module, _, name = place.rpartition(".")
-            program = getattr(importlib.import_module(module), name)
-            program.ask_for(xla_backend_optimization_level=1)
 
 
 def pytest_unconfigure() -> None:

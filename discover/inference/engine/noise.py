@@ -9,6 +9,7 @@ summed over a grid.
 
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -145,7 +146,7 @@ class NoiseModel:
             return value[0] - 0.5 * np.sum(np.log(1.0 - decay**2)), common[0], square
 
         ends = CORRELATIONS[at - 1], CORRELATIONS[min(at + 1, len(CORRELATIONS) - 1)]
-        found = minimize_scalar(
+        found: Any = minimize_scalar(
             lambda c: -of(c)[0], bounds=ends, method="bounded", options={"xatol": 1e-3}
         )
         correlation = float(found.x)
