@@ -31,7 +31,7 @@ def test_knocks_are_left_out_of_the_fitted_runs_and_told():
     left, told = without_spikes_in_fit(data(0.8))
     for one in left.fit.runs:
         np.testing.assert_array_equal(one.time, np.delete(TIMES, KNOCKS))
-    assert "2 of 0.5.csv, 2 of 2.0.csv samples" in told
+    assert "2 of 0.5.csv, 2 of 2.0.csv" in told
     # what judges is whole
     assert len(left.held_out.runs[0]) == len(TIMES)
 

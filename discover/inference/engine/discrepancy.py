@@ -41,6 +41,9 @@ _MODES = 20
 _AFTER_A_STEP = 10.0
 """Samples of a run over those that the logarithm leaves as they are."""
 
+_TRANSIENT = 0.2
+"""Prior share of discrepancies that follow steps of the rate and nothing else."""
+
 _STEP = 0.3
 """Of the largest rate, by which it changes from one sample to the next where it steps."""
 
@@ -284,7 +287,7 @@ class Discrepancy:
         if np.isfinite(limit):
             inside = np.diff(np.minimum(ends, max(limit, ends[0]))) / max(limit, 1e-9)
             share = 0.8 * inside + 0.2 * share
-        per = (2 * len(STIFFNESS) * len(GROWTHS), 2)
+        per = len(STIFFNESS) * len(GROWTHS) / (1.0 - _TRANSIENT), 1.0 / _TRANSIENT
         return np.log([share[CURVES.index(size)] / per[after] for size, _, _, after in self._grid])
 
     def sizes(self, draws: int, lot: np.random.Generator) -> Float[np.ndarray, "draws runs"]:

@@ -109,8 +109,13 @@ class _InelasticFitter(Fitter):
             for sharpness in _SHARPNESS
         ]
 
-    def predict(self, thetas: Sequence[np.ndarray]) -> Float[np.ndarray, "trials rows"]:
-        """Return the records of the law, in Pa."""
+    def predict(
+        self,
+        thetas: Sequence[np.ndarray],
+        moduli: Float[np.ndarray, "trials c"] | None = None,
+    ) -> Float[np.ndarray, "trials rows"]:
+        """Return the records of the law, in Pa; it has no moduli."""
+        del moduli
         if self.law == _NO_FLUID:
             return np.zeros((len(thetas), len(self.rows)))
         found = [viscosity(self.law, theta, self.rate) * self.rate for theta in thetas]

@@ -1,6 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -76,6 +77,8 @@ class TensorSINDy(RunPrediction):
     modulus_covariance
         Of the moduli in Pa, as a sweep leaves them, shape (k, k), in Pa squared: evidence and
         intervals allow for it. None where the moduli are exact.
+    random_state
+        Taken as every learner takes it; nothing here is random.
     use_normal_stresses
         Whether N1 and N2, where measured, join as records of their own.
     selection
@@ -152,6 +155,7 @@ class TensorSINDy(RunPrediction):
         progress: Progress | None = None,
         base: Fluid | None = None,
         modulus_covariance: Float[np.ndarray, "c c"] | None = None,
+        random_state: int = 0,
     ):
         self.library = library
         self.optimizer = optimizer
@@ -166,6 +170,7 @@ class TensorSINDy(RunPrediction):
         self.progress = progress
         self.base = base
         self.modulus_covariance = modulus_covariance
+        self.random_state = random_state
 
     def _learn(self, runs: list[Run], known: KnownPart) -> None:
         started = time.perf_counter()
@@ -233,6 +238,12 @@ class TensorSINDy(RunPrediction):
                 f"{misfit:.2g}; {len(search.found)} supports were fitted."
             ),
         )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what another process can use: programs of the search are of this one."""
+        state = dict(super().__getstate__())
+        state.pop("search_", None)
+        return state
 
     def _check_parameters(self) -> None:
         check_optimiser(self.optimizer)
