@@ -274,7 +274,7 @@ class Discrepancy:
                     size, stiff, growth, terms, which, correlation, log, float(noise), mean, root
                 )
             )
-        return members, float(total - none)
+        return members, float(total - none)  # pyright: ignore
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
         """Return the log prior of each curve.

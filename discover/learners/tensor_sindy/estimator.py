@@ -241,7 +241,7 @@ class TensorSINDy(RunPrediction):
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what another process can use: programs of the search are of this one."""
-        state = dict(super().__getstate__())
+        state: dict[str, Any] = {**super().__getstate__()}  # pyright: ignore
         state.pop("search_", None)
         return state
 
