@@ -15,6 +15,5 @@ def learn(training: Training) -> Answer:
         modulus=training.modulus,
         relaxation_time=training.relaxation_time,
         random_state=training.seed,
-        n_stability=0,  # says how stable the choice is; the choice is the same without
     ).fit(runs(training))
     return Answer(predictor(model.fluid_), *in_words(model.terms_))
