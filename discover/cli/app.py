@@ -70,8 +70,6 @@ def main() -> None:
     sys.stdout, sys.stderr = heard_or_not(sys.stdout), heard_or_not(sys.stderr)
     keep_out_of_the_working_directory()
     warnings.formatwarning = _one_line
-    # candidates may diverge, and threads do not inherit what numpy was told of that
-    warnings.filterwarnings("ignore", category=RuntimeWarning, module=r"discover\.forward")
     use_one_thread_from_the_start()
     use_the_processor_from_the_start()
     with obeying_interrupts():

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import t as student
 
 from discover.comparison.flows import MEASURED, Flow, columns_of
 from discover.dataset import Run
@@ -13,6 +12,7 @@ from discover.effects import ConstitutiveEffect
 from discover.forward import make_batch
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit
+from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.problem import NUISANCES
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import misfit, weighed_laws
@@ -28,7 +28,6 @@ _LEAST = 1e-3
 _RUNS_AWAY = 1e3
 """Times the largest stress recorded or predicted by the known part, which no sound law exceeds."""
 
-_MOST_MISSED = 1.0
 _LOST = 0.5
 """Weight of hypotheses that may run away in a flow in which the others still make a band."""
 
@@ -245,13 +244,11 @@ def _missed(found: Found, fit: Fit, run: Run) -> float:
     """Return the deviation, over its size, by which a run may be missed.
 
     It is that of runs left out of the law relied on, by more for laws that describe the runs worse.
-    As few runs tell a deviation badly, Student's quantile is the wider.
     """
     posterior = found.posterior
     best = fit if posterior.left is None else posterior.left.fit
     missed, fastest = posterior.missed(best), posterior.problem.fitted.fastest
-    runs = len(missed)
-    wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
+    wider = of_the_next_run(len(missed))
     worse = max(misfit(posterior, fit) / misfit(posterior, best), 1.0)
     beyond = max(float(np.max(np.abs(run.rate))) / float(np.max(fastest)), 1.0)
-    return float(min(wider * rms(missed) * worse * beyond, _MOST_MISSED))
+    return float(min(wider * rms(missed) * worse * beyond, MOST_MISSED))

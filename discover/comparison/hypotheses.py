@@ -55,11 +55,10 @@ def search_hypotheses(
     fit = list(data.fit.names)
     if study.compare.use_normal_stresses:
         for name in data.fit.names:
-            for quantity in ("N1", "N2"):
-                if getattr(runs[name], _COLUMNS[quantity]) is not None:
-                    also = runs[name].observing(quantity)
-                    dataset = replace(dataset, runs=(*dataset.runs, also))
-                    fit.append(also.name)
+            for quantity in runs[name].beside:
+                also = runs[name].observing(quantity)
+                dataset = replace(dataset, runs=(*dataset.runs, also))
+                fit.append(also.name)
     known = {effect.name for effect in declared.effects}
     named = [e for e in named_effects().values() if not e.on_request and e.name not in known]
     terms = [
@@ -80,9 +79,6 @@ def search_hypotheses(
         loading=study.compare.loading,
         computed=study.data.synthetic is not None,
     )
-
-
-_COLUMNS = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,6 @@ from discover.protocols.between_samples import steps_between_samples
 _MOST = 40
 """Steps whose instants are fitted, at most: each costs a constant."""
 
-_ROUNDS = 6
-_WIDTH = 1e-4
-_DAMPING = 1e-6
-
 
 def with_rate_steps(run: Run) -> Run:
     """Return a run that names the steps of its rate whose instants its samples do not tell."""

@@ -142,10 +142,8 @@ def weighed_laws(posterior: Posterior) -> list[tuple[Fit, float]]:
 
 
 def misfit(posterior: Posterior, fit: Fit) -> float:
-    """Return the root mean square of what a law leaves of the fitted runs, over their size."""
-    fitter = posterior.search.fitter
-    left = (fitter.rows.recorded - fitter.record(fit)) / fitter.rows.size
-    return max(float(np.sqrt(np.mean(left**2))), 1e-150)
+    """Return what a law leaves of the fitted runs, over their size; never zero."""
+    return max(posterior.search.fitter.misfit(fit), 1e-150)
 
 
 def _flows_inside(

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
-from scipy.special import logsumexp
 
 from discover.answer.naming import named_law
 from discover.equations import Equation, law_parts
@@ -18,7 +17,7 @@ from discover.errors import InputError
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit
-from discover.inference.engine.left_out import FEWEST_RUNS, left_out
+from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, states_of
@@ -29,8 +28,6 @@ _MOST = 8
 
 _AS_WELL = float(np.log(0.05))
 """Log of odds against the best down to which runs left out do not exclude a law."""
-
-Misses = Float[np.ndarray, "laws runs"]
 
 
 @in_one_thread
@@ -67,12 +64,6 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
         left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
         by_left_out=tuple((some[i], float(weights[i])) for i in order),
     )
-
-
-def weights_of(missed: Misses) -> Float[np.ndarray, " laws"]:
-    """Return how far to rely on each law by runs left out, as `by_left_out` weighs them."""
-    logs = -0.5 * missed.shape[1] * np.log(np.maximum(np.sum(missed**2, axis=1), 1e-300))
-    return np.exp(logs - logsumexp(logs))
 
 
 def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:

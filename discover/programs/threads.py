@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from functools import cache
 from typing import TypeVar
 
@@ -37,4 +38,6 @@ def in_threads(
     waiting = waiting[len(done) :]
     if len(waiting) < 2:
         return done + [function(job) for job in waiting]
-    return done + list(_pool().map(function, waiting))
+    # what numpy was told of overflows holds in the threads too
+    each = [copy_context() for _ in waiting]
+    return done + list(_pool().map(lambda own, job: own.run(function, job), each, waiting))

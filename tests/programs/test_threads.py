@@ -3,6 +3,7 @@
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 
 from discover.programs import in_threads, threads
@@ -41,3 +42,13 @@ def test_threads_are_started_once():
     for _ in range(5):
         in_threads(lambda job: started.add(threading.current_thread()), range(4), True)
     assert len(started) <= 2
+
+
+def test_what_numpy_is_told_of_overflows_holds_in_threads_and_nowhere_else(recwarn):
+    jobs = [np.array([1e300])] * 3
+    with np.errstate(over="ignore"):
+        assert np.all(np.isinf(in_threads(lambda job: job * job, jobs, is_compiled=True)))
+    assert not recwarn
+    # control: where it is told nothing, threads warn
+    in_threads(lambda job: job * job, jobs, is_compiled=True)
+    assert any("overflow" in str(one.message) for one in recwarn)

@@ -56,10 +56,6 @@ class Batch(eqx.Module):
         """Time of the last sample of all, in s."""
         return max(part.longest for part in self.parts)
 
-    def weighing(self, weight: Float[np.ndarray, "runs n"]) -> "Batch":
-        """Return the same runs with other weights; they share the program."""
-        return replace(self, records=replace(self.records, weight=weight))
-
     def without_factors(self) -> "Batch":
         """Return a batch whose residuals are those of predictions, without factors of loadings."""
         return replace(self, records=self.records.without_factors())

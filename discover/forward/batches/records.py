@@ -14,7 +14,7 @@ from typing import Any, Literal
 import equinox as eqx
 import jax
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
 from discover.forward.batches.loadings import Loadings, Values, loadings
@@ -174,30 +174,6 @@ class Records(eqx.Module):
     def seen(self) -> Bool[np.ndarray, "runs n *kinds"]:
         """Whether a value was recorded and is looked at."""
         return np.asarray(self.weight) > 0
-
-    @property
-    def weighted_record(self) -> Float[np.ndarray, " rows"]:
-        """What was recorded, times its weight, in one vector."""
-        return np.asarray(self.weight * self.recorded).reshape(-1)
-
-    @property
-    def n_observations(self) -> int:
-        """Number of values recorded."""
-        return int(np.sum(self.seen))
-
-    @property
-    def run_of_row(self) -> Int[np.ndarray, " rows"]:
-        """Run to which each row of the flattened records belongs."""
-        runs = len(self.recorded)
-        return np.repeat(np.arange(runs), self.recorded.size // runs)
-
-    def sequences(self) -> list[np.ndarray]:
-        """Return the rows of each run and kind, in the order of time, of records of three kinds."""
-        seen = self.seen
-        runs, _, kinds = seen.shape
-        rows = np.arange(seen.size).reshape(seen.shape)
-        sequences = [rows[i, seen[i, :, k], k] for i in range(runs) for k in range(kinds)]
-        return [sequence for sequence in sequences if sequence.size]
 
 
 def make_records(runs: Sequence[Run], n: int, mean: Mean, kinds: int = 1) -> Records:

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from scipy.special import ndtr
-from scipy.stats import t as student
 
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.left_out import MOST_MISSED
+from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.rows import Rows
 
 _RUNS_AWAY = 10.0
@@ -145,12 +144,9 @@ class Predictions:
     def missed(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the deviation, over its size, by which each run may be missed."""
         missed, fastest = self.posterior.missed(fit), self.problem.fitted.fastest
-        runs = len(missed)
-        # as few runs tell a deviation badly: of the next one Student's quantile is the wider
-        wider = student.ppf(0.975, max(runs - 1, 1)) / 1.96 * np.sqrt(1.0 + 1.0 / runs)
         # as far as the worst of them, and in proportion to the rate beyond the fastest
         size = np.max(missed) * np.maximum(self.rows.fastest / np.max(fastest), 1.0)
-        return np.minimum(wider * size, MOST_MISSED)[self.rows.run]
+        return np.minimum(of_the_next_run(len(missed)) * size, MOST_MISSED)[self.rows.run]
 
 
 def quantiles(

@@ -145,9 +145,7 @@ def design(posterior: Posterior) -> NextTests:
     share = share / np.sum(share)
     varied = [_varied(fit) for fit, _ in weighed]
     best, runs = weighed[0][0], problem.fitted.runs
-    rows = problem.fitted
-    off = (rows.recorded - posterior.search.fitter.record(best)) / rows.size
-    noise = max(best.noise.common, float(rms(off)))
+    noise = max(best.noise.common, posterior.search.fitter.misfit(best))
     fresh = (1.0 - best.noise.correlation) / (1.0 + best.noise.correlation)
     longest = float(np.max(np.asarray(problem.declared.relaxation_time)))
     tests = possible_tests(runs, longest)

@@ -259,8 +259,8 @@ class Discrepancy:
                         some.append((log, correlation, terms, which, np.sqrt(square / n)))
                     else:
                         plain.append(value)
-        none, weights = logsumexp(plain), np.array([one[0] for one in some])
-        total = logsumexp(weights)
+        weights = np.array([one[0] for one in some])
+        none, total = (float(np.asarray(logsumexp(logs))) for logs in (plain, weights))
         members = []
         for at in np.argsort(-weights)[:_MOST]:
             weight, correlation, terms, which, noise = some[at]
@@ -274,7 +274,7 @@ class Discrepancy:
                     size, stiff, growth, terms, which, correlation, log, float(noise), mean, root
                 )
             )
-        return members, float(total - none)  # pyright: ignore
+        return members, total - none
 
     def _priors(self) -> Float[np.ndarray, " grid"]:
         """Return the log prior of each curve.

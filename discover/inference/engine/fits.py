@@ -260,6 +260,11 @@ class Fitter:
         """Return the records as predicted, with what is linear."""
         return fit.predicted + self.linear_columns(fit.predicted, fit.shifts) @ fit.linear
 
+    def misfit(self, fit: Fit) -> float:
+        """Return the root mean square of what a fit leaves, over the size of each record."""
+        left = (self.rows.recorded - self.record(fit)) / self.rows.size
+        return float(np.sqrt(np.mean(left**2)))
+
     # fits ---------------------------------------------------------------------------------------
 
     def fit(self, starts: Sequence[Fit], rounds: int = 14, derivatives: bool = True) -> list[Fit]:

@@ -21,6 +21,7 @@ from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import NONE, SAME, Posterior
 from discover.inference.engine.priors import Prior
 from discover.linear_algebra_threads import in_one_thread
+from discover.statistics import HALF_BAND
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
 _NO_FLUID = ""
@@ -161,12 +162,11 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
     if odds < 0.0:
         return None
     assert fit.covariance is not None
-    ends = 1.96 * np.sqrt(np.diag(fit.covariance))[: len(fit.priors)]
+    ends = HALF_BAND * np.sqrt(np.diag(fit.covariance))[: len(fit.priors)]
     prior = list(fit.priors.values())
     spans = [
         (p.to_value(max(c - e, p.ends[0])), p.to_value(min(c + e, p.ends[1])))
         for p, c, e in zip(prior, fit.coordinates, ends, strict=True)
     ]
-    misfit = (fitter.rows.recorded - fitted.record(fit)) / fitter.rows.size
-    error = float(np.sqrt(np.mean(misfit**2)))
-    return Inelastic(law, tuple(map(float, fit.theta)), tuple(spans), error, odds)
+    values = tuple(map(float, fit.theta))
+    return Inelastic(law, values, tuple(spans), fitted.misfit(fit), odds)

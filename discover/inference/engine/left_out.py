@@ -10,8 +10,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 from scipy.special import logsumexp
+from scipy.stats import t as student
 
 from discover.inference.engine.fits import Fit, Fitter
+from discover.statistics import HALF_BAND
 
 FEWEST_RUNS = 3
 """Runs from which on those left out weigh hypotheses: of two, each fit would see a single one."""
@@ -88,14 +90,28 @@ def by_first_order(fitter: Fitter, fits: Sequence[Fit]) -> list[Fit]:
 def by_left_out(
     fitter: Fitter, fits: Sequence[Fit]
 ) -> list[tuple[Fit, float, Float[np.ndarray, " runs"]]]:
-    """Return how far to rely on the first of some hypotheses, and how they miss runs left out.
+    """Return how far to rely on the first of some hypotheses, and how they miss runs left out."""
+    some = fits[:_EXACT]
+    missed = left_out(fitter, some)
+    weights = weights_of(missed)
+    order = np.argsort(-weights, kind="stable")
+    return [(some[at], float(weights[at]), missed[at]) for at in order]
+
+
+def weights_of(missed: Float[np.ndarray, "fits runs"]) -> Float[np.ndarray, " fits"]:
+    """Return how far to rely on each of some hypotheses, by how they miss runs left out.
 
     Misses of runs are draws from one normal distribution of unknown deviation, which is integrated
     out: the density of R of them goes as the sum of their squares to the power -R/2.
     """
-    some = fits[:_EXACT]
-    missed = left_out(fitter, some)
     logs = -0.5 * missed.shape[1] * np.log(np.maximum(np.sum(missed**2, axis=1), 1e-300))
-    weights = np.exp(logs - logsumexp(logs))
-    order = np.argsort(-weights, kind="stable")
-    return [(some[at], float(weights[at]), missed[at]) for at in order]
+    return np.exp(logs - logsumexp(logs))
+
+
+def of_the_next_run(runs: int) -> float:
+    """Return the factor on the deviation of some misses that makes it that of the next.
+
+    As few runs tell a deviation badly, Student's quantile is the wider.
+    """
+    wider = student.ppf(0.975, max(runs - 1, 1)) / HALF_BAND
+    return float(wider * np.sqrt(1.0 + 1.0 / runs))

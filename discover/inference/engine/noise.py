@@ -117,7 +117,7 @@ class NoiseModel:
         best = int(np.argmax(values))
         share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
         sizes = np.sqrt((self._alike * common[best] + square[best]) / (self._alike + self._count))
-        return float(logsumexp(values)), Noise(
+        return float(np.asarray(logsumexp(values))), Noise(
             sizes, float(np.sqrt(common[best])), correlation, share
         )
 

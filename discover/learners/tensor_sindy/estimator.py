@@ -210,7 +210,7 @@ class TensorSINDy(RunPrediction):
             self.law_, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity
         )
         misfits, rows = np.array(search.history), len(problem.fitted)
-        misfit, covariance = search.misfit(chosen), self.covariance_
+        misfit, covariance = fitter.misfit(chosen), self.covariance_
         self.result_ = LearnerResult(
             learner="tensor_sindy",
             law=self.law_,

@@ -1,6 +1,6 @@
 """Runs and a term library as a problem of the engine, and its linearisation as a sparse problem."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,6 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.learners.known_part import KnownPart
-from discover.protocols.kinematics import RecordedQuantity
 from tensor_library.library import TermLibrary
 
 _STEP = 1e-4
@@ -21,11 +20,6 @@ _STEP = 1e-4
 
 _NEGLIGIBLE = 1e-6
 """Prior width below which a nuisance is nothing that a coefficient could be mistaken for."""
-
-_COLUMNS: Mapping[RecordedQuantity, str] = {
-    "N1": "first_normal_stress_difference",
-    "N2": "second_normal_stress_difference",
-}
 
 
 def library_problem(
@@ -54,18 +48,13 @@ def library_problem(
     """
     fluid, observed = known.fluid, list(runs)
     if use_normal_stresses:
-        own = [run.name for run in runs if run.quantity in _COLUMNS]
+        own = [run.name for run in runs if run.quantity in ("N1", "N2")]
         if own:
             raise InputError(
                 f"{own[0]!r} is a record of its own, which use_normal_stresses would fit once "
                 "more. Leave out one of the two."
             )
-        observed += [
-            run.observing(quantity)
-            for run in runs
-            for quantity, column in _COLUMNS.items()
-            if getattr(run, column) is not None
-        ]
+        observed += [run.observing(quantity) for run in runs for quantity in run.beside]
     loadings = [run.loading.deviation for run in runs if run.loading is not None]
     declared = DeclaredModel(
         fluid.law,

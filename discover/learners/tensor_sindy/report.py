@@ -112,7 +112,7 @@ def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:
         "support": [term.name for term in terms],
         "coefficients": [float(theta[model.positions(term.name)[0]]) for term in terms],
         "inner": inner,
-        "misfit": search.misfit(fit),
+        "misfit": search.fitter.misfit(fit),
         "log_evidence": search.rank(fit),
     }
 

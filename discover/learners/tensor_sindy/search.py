@@ -61,12 +61,6 @@ class SupportSearch(Search):
         self.history: list[float] = []
         self._models: dict[Key, LinearModel] = {}
 
-    def misfit(self, fit: Fit) -> float:
-        """Return the relative root-mean-square misfit of a fit, every run counting by its size."""
-        rows = self.fitter.rows
-        left = (rows.recorded - self.fitter.record(fit)) / rows.size
-        return float(np.sqrt(np.mean(left**2)))
-
     def support(self, fit: Fit) -> tuple[int, ...]:
         """Return the positions of the terms of a fit in the library, increasing."""
         return tuple(sorted(self.places[name] for name in fit.names))
@@ -99,7 +93,7 @@ class SupportSearch(Search):
         """Fit hypotheses side by side and keep them; of one set the likeliest."""
         require_wanted()
         fits = super().add(starts)
-        self.history += [self.misfit(fit) for fit in fits if np.isfinite(fit.log_posterior)]
+        self.history += [self.fitter.misfit(fit) for fit in fits if np.isfinite(fit.log_posterior)]
         return fits
 
     def run(self) -> "SupportSearch":

@@ -65,9 +65,6 @@ OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
 )
 """Of what a study asks to be drawn beside the rest, in its order."""
 
-BY_MODE_STYLE: dict[str, Any] = {"color": PURPLE, "linestyle": "-", "linewidth": 1.2}
-"""Of a law whose constants differ from mode to mode."""
-
 CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
 RIVAL_STYLES: tuple[dict[str, Any], ...] = (
     {"color": NETWORK, "linestyle": "--"},
