@@ -105,7 +105,7 @@ class Path:
             near = max(holding, key=search.rank) if holding else search.found[frozenset()]
             problem = self.posterior.problem
             theta = problem.without(near.theta, *(set(near.names) - key))
-            search.add([search.fitter.start(tuple(key), theta, near.linear)])
+            search.add([search.fitter.start(tuple(sorted(key)), theta, near.linear)])
         return search.found[key]
 
     @cached_property

@@ -203,7 +203,7 @@ def _elsewhere(
     """Yield what else may be changed of a run than its flow, and what that does to constants."""
     problem = posterior.problem
     model, zero = problem.model, problem.zero
-    names = {name for fit, _ in posterior.fits for name in fit.names}
+    names = sorted({name for fit, _ in posterior.fits for name in fit.names})
     by_gap = [model.positions(name)[0] for name in _BY_GAP if name in names]
     outside = [
         p for name in names if problem.effects[name].kind != "constitutive"

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
+from scipy.ndimage import uniform_filter1d
 from scipy.special import logsumexp
 
 from discover.inference.engine.fits import LOG_2PI, Fit, Fitter
@@ -43,6 +44,9 @@ _AFTER_A_STEP = 10.0
 
 _TRANSIENT = 0.2
 """Prior share of discrepancies that follow steps of the rate and nothing else."""
+
+_ALONE = 3
+"""Samples over which a transient is taken: one that is off alone is a knock, and no transient."""
 
 _STEP = 0.3
 """Of the largest rate, by which it changes from one sample to the next where it steps."""
@@ -352,5 +356,7 @@ def _cosines(rows: Rows) -> Float[np.ndarray, "rows curves"]:
         for place, x in enumerate(((np.arange(n) + 0.5) / n, after)):
             first = i * width + place * _MODES
             waves = np.cos(np.pi * np.outer(x, np.arange(_MODES)))
+            if place:
+                waves = uniform_filter1d(waves, _ALONE, axis=0)
             out[np.flatnonzero(rows.run == i), first : first + _MODES] = waves
     return out

@@ -75,13 +75,13 @@ class Search:
         for depth in range(self.most):
             usable = [fit for fit in level if np.isfinite(fit.log_posterior)]
             starts: list[Fit] = []
-            new: set[Key] = set()
+            new: dict[Key, None] = {}  # in their order: that of a set changes from run to run
             for parent in usable:
                 top = _REFITTED if depth else None  # far from the minimum a score says little
                 for start in self.scored(parent)[:top]:
                     key = frozenset(start.names)
                     if key not in self.found and key not in new:
-                        new.add(key)
+                        new[key] = None
                         starts += self.at_several_times(start)
             if not starts:
                 break
@@ -204,7 +204,8 @@ class Search:
                     if less in self.found or less in starts:
                         continue
                     theta = self.problem.without(fit.theta, name)
-                    starts[less] = self.fitter.start(tuple(less), theta, fit.linear)
+                    names = tuple(other for other in fit.names if other != name)
+                    starts[less] = self.fitter.start(names, theta, fit.linear)
             if not starts:
                 break
             self.add(starts.values())
