@@ -28,8 +28,9 @@ def creep(stress, mobility, times):
     ).y[4]
 
 
-def creep_folder(folder, mobility):
-    generator, times = np.random.default_rng(0), np.geomspace(0.02, 10.0, 60)
+def creep_folder(folder, mobility, draw=0):
+    generator, times = np.random.default_rng(draw), np.geomspace(0.02, 10.0, 60)
+    folder.mkdir(exist_ok=True)
     lines = ["file,control"]
     for stress in (20.0, 40.0, 60.0):
         strain = creep(stress, mobility, times)
@@ -59,19 +60,21 @@ def mobility_of(loop):
     return loop.stages[0].parameters["alpha"].ci95
 
 
-@pytest.mark.xfail(
-    reason="found, with its interval, but withheld at odds of 0.57 on this draw since sound runs "
-    "may differ by half a per cent in factor, zero and drift",
-    strict=False,
-)
 def test_a_mobility_is_found_in_creep_alone(tmp_path):
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME, SOLVENT)
-    loop = dc.close_loop(creep_folder(tmp_path, 0.3), base, effects=EFFECTS, explanations=1)
-    low, high = mobility_of(loop)
-    assert low <= 0.3 <= high
-    assert {record.quantity for record in loop.records} == {"strain"}
-    # the noise alone is left
-    assert loop.error_after.fit == pytest.approx(NOISE, rel=0.2)
+    named = []
+    for draw in range(4):
+        data = creep_folder(tmp_path / str(draw), 0.3, draw)
+        loop = dc.close_loop(data, base, effects=EFFECTS, explanations=1)
+        assert [stage.effect for stage in loop.stages] == ["giesekus_mobility"]
+        low, high = loop.stages[0].parameters["alpha"].ci95
+        assert low <= 0.3 <= high
+        assert {record.quantity for record in loop.records} == {"strain"}
+        # the noise alone is left
+        assert loop.error_after.fit == pytest.approx(NOISE, rel=0.2)
+        named.append(loop.verdict == "effects_added")
+    # a third of the prior is with what has no name: one draw in ten is withheld
+    assert sum(named) >= 3
 
 
 def test_nothing_is_found_in_the_creep_of_the_declared_fluid(tmp_path):

@@ -135,13 +135,15 @@ class NoiseModel:
         at = CORRELATIONS.index(noise.correlation)
         if at == 0:
             return noise
-        scaled = residual[self.kept] / self.deviation(predicted, noise.share)[self.kept]
+        deviation = self.deviation(predicted, noise.share)[self.kept]
+        scaled = residual[self.kept] / deviation
+        own = (LEAST * self.rows.size[self.kept] / deviation) ** 2
 
         def of(correlation: float):
             decay = self._decay(correlation)
-            left = (scaled - decay * scaled[self._before]) / np.sqrt(1.0 - decay**2)
-            square = LEAST**2 * self._count
-            square[self._there] += np.add.reduceat(left**2, self._starts)
+            left = (scaled - decay * scaled[self._before]) ** 2 + own + decay**2 * own[self._before]
+            square = np.zeros(len(self._count))
+            square[self._there] = np.add.reduceat(left / (1.0 - decay**2), self._starts)
             value, common = self._marginal(square[None])
             return value[0] - 0.5 * np.sum(np.log(1.0 - decay**2)), common[0], square
 
