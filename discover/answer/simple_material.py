@@ -94,14 +94,14 @@ def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
         named, others = ("newtonian", "herschel_bulkley"), ("carreau",)
     else:
         named, others = ("newtonian", "kelvin_voigt"), ("maxwell", "two_modes")
-    fits = {law: _fit(law, runs) for law in (*named, *others)}
+    fits = {law: _fit(law, runs) for law in named}
     best = min(named, key=lambda law: fits[law].criterion)
-    rival = min(fits[law].criterion for law in others)
     chosen = fits[best]
-    # Newtonian and Kelvin-Voigt are limits of a Maxwell mode, so that a lower criterion is enough
-    if chosen.criterion > rival - (_AHEAD if best == "herschel_bulkley" else 0.0):
-        return None
     if chosen.error > _MISFIT[control] or not _stands_out(best, chosen, runs):
+        return None
+    # Newtonian and Kelvin-Voigt are limits of a Maxwell mode, so that a lower criterion is enough
+    rival = min(_fit(law, runs).criterion for law in others)
+    if chosen.criterion > rival - (_AHEAD if best == "herschel_bulkley" else 0.0):
         return None
     return _material(best, chosen)
 

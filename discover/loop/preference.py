@@ -7,6 +7,7 @@ they do by more than so few runs can scatter.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
@@ -45,7 +46,8 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if law_of(posterior, known[0][0]):
         return posterior
     leading = [fit for fit, _ in known]
-    named = [fit for fit in posterior.search.alive() if law_of(posterior, fit)][:_MOST]
+    alive = posterior.search.alive()
+    named = list(islice((fit for fit in alive if law_of(posterior, fit)), _MOST))
     some = [*leading, *(fit for fit in named if fit not in leading)]
     asked = [fit for fit in some if "missed" not in fit.memory]
     for fit, missed in zip(asked, left_out(fitter, asked), strict=True):

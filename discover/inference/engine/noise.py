@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from scipy.optimize import minimize_scalar
-from scipy.special import gammaln, logsumexp
+from scipy.special import gammaln
 
 from discover.inference.engine.rows import Rows
 
@@ -40,6 +40,9 @@ _GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
 def _prior(count: int) -> np.ndarray:
     """Return the log probability of each value: the first, which is none, as that of the others."""
     return np.log(np.where(np.arange(count) == 0, 0.5, 0.5 / (count - 1)))
+
+
+_PRIORS = (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
 
 
 @dataclass(frozen=True)
@@ -71,13 +74,18 @@ class NoiseModel:
         self.kept = np.flatnonzero(rows.run != without)
         self._run, self._gap = rows.run[self.kept], rows.gap[self.kept]
         self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
-        decay = np.array([self._decay(c) for c in CORRELATIONS])
-        self._decays, self._left = decay, np.sqrt(1.0 - decay**2)
-        self._determinants = -np.sum(np.log(self._left), axis=1)
-        self._floor = LEAST**2 / self._left**2, (LEAST * decay / self._left) ** 2
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
         self._there = np.flatnonzero(self._count)
         self._starts = np.searchsorted(self._run, self._there)
+        # samples of one run as far from the one before decay alike
+        self._order = np.lexsort((self._gap, self._run))
+        run, gap = self._run[self._order], self._gap[self._order]
+        new = np.append(True, (np.diff(run) != 0) | (np.diff(gap) != 0)) if len(run) else []
+        self._groups = np.flatnonzero(new)
+        self._group_starts = np.searchsorted(run[self._groups], self._there)
+        decay = np.array([self._decay(c) for c in CORRELATIONS])
+        self._determinants = -0.5 * np.sum(np.log(1.0 - decay**2), axis=1)
+        self._decays = decay[:, self._order[self._groups]]
 
     def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
         return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
@@ -103,21 +111,23 @@ class NoiseModel:
         relative = (predicted[self.kept] / size) ** 2
         spread = size * np.sqrt(1.0 + _SHARES[:, None] * (relative - 1.0))
         scaled = residual[self.kept] / spread
-        left = (scaled[:, None] - self._decays * scaled[:, None, self._before]) / self._left
+        before, decay = scaled[:, self._before], self._decays
         # independent noise is a large one where it is taken for correlated or in proportion
-        own = ((size / spread) ** 2)[:, None]
-        least = self._floor[0] * own + self._floor[1] * own[..., self._before]
-        square = np.full((len(SHARES), len(CORRELATIONS), len(self._count)), 0.0)
-        square[..., self._there] = np.add.reduceat(left**2 + least, self._starts, axis=-1)
+        least = (LEAST * size / spread) ** 2
+        sums = np.stack([scaled**2 + least, before**2 + least[:, self._before], scaled * before])
+        sums = np.add.reduceat(sums[..., self._order], self._groups, axis=-1)[:, :, None]
+        left = (sums[0] + decay**2 * sums[1] - 2.0 * decay * sums[2]) / (1.0 - decay**2)
+        square = np.zeros((len(SHARES), len(CORRELATIONS), len(self._count)))
+        square[..., self._there] = np.add.reduceat(left, self._group_starts, axis=-1)
         square = square.reshape(len(_GRID), -1)
         logs = (self._determinants - np.sum(np.log(spread), axis=1)[:, None]).ravel()
         values, common = self._marginal(square)
         values = values + logs
-        values = values + (_prior(len(SHARES))[:, None] + _prior(len(CORRELATIONS))).ravel()
+        values = values + _PRIORS
         best = int(np.argmax(values))
         share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
         sizes = np.sqrt((self._alike * common[best] + square[best]) / (self._alike + self._count))
-        return float(np.asarray(logsumexp(values))), Noise(
+        return float(np.logaddexp.reduce(values)), Noise(
             sizes, float(np.sqrt(common[best])), correlation, share
         )
 
