@@ -14,17 +14,16 @@ from discover.dataset.importing.folder_files import (
     files_of,
     left_out,
     nothing,
-    numbered,
     unread_columns,
 )
-from discover.dataset.importing.intervals import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
+from discover.dataset.importing.names import name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
-from discover.dataset.importing.quantities import UnsaidUnits
+from discover.dataset.importing.quantities import UnsaidUnits, guess_columns
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
-from discover.dataset.importing.stacked import tests_in_rows, tests_side_by_side
+from discover.dataset.importing.stacked import joined_intervals, tests_in_rows, tests_side_by_side
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.tables.table import read_bytes, shown
@@ -41,16 +40,14 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        if not any(Readings.of(block, mapping, path.name).columns for block in found):
+        given = {str(key): column for key, column in mapping.columns.items()}
+        names = name_table(mapping.names)
+        if not any(guess_columns(block, given, names) for block in found):
             wave = without_names(rows)
             found = found if wave is None else [wave]
         require_blocks(found, path.name)
-    parts = [
-        part
-        for block in found
-        for one in tests_side_by_side(block)
-        for part in tests_in_rows(one, mapping, path.name)
-    ]
+    alone = [one for block in found for one in tests_side_by_side(block)]
+    parts = [part for one in alone for part in tests_in_rows(one, mapping, path.name)]
     blocks = list(enumerate(parts, start=1))
     if mapping.blocks is None:
         return blocks
@@ -65,18 +62,12 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
 
 @dataclass
 class ImportedFolder:
-    """A data folder, not yet written.
+    """A data folder, not yet written."""
 
-    `files`: text of every file by name.
-    `mapping`: everything that was used, guesses included, so that the import can be repeated.
-    `said`: what was understood and done, a line each.
-    `unread`: files and tables that could not be read, and why, a line each.
-    """
-
-    files: dict[str, str] = field(default_factory=dict)
-    mapping: Mapping = field(default_factory=Mapping)
-    said: list[str] = field(default_factory=list)
-    unread: list[str] = field(default_factory=list)
+    files: dict[str, str] = field(default_factory=dict)  # text of every file by name
+    mapping: Mapping = field(default_factory=Mapping)  # all that was used, guesses included
+    said: list[str] = field(default_factory=list)  # what was understood and done, a line each
+    unread: list[str] = field(default_factory=list)  # what could not be read, and why, a line each
 
 
 @dataclass
@@ -117,6 +108,12 @@ class _Import:
         for names, files in other.columns.items():
             self.columns.setdefault(names, []).extend(files)
 
+    def refuse(self, where: str, error: InputError, chosen: TestName | None) -> None:
+        """Keep why a block cannot be read; raise it if the user named the block."""
+        if chosen is not None or self.mapping.blocks is not None:
+            raise error
+        self.unread.append(f"{where}: {error}")
+
 
 def import_files(
     paths: Sequence[Path], mapping: Mapping, sweep: Path | None = None
@@ -147,7 +144,7 @@ def import_files(
             state.unread.append(said if path.name in said else f"{path.name}: {said}")
         else:
             state.add(one)
-    if paths and len(state.unread) and not state.found and sweep is None:
+    if paths and state.unread and not state.found and sweep is None:
         raise InputError(
             f"None of the {len(paths)} files can be read. {' '.join(state.unread[:6])}"
         )
@@ -160,43 +157,33 @@ def import_files(
             "in the mapping file."
         )
     given = {str(key): name for key, name in mapping.columns.items()}
-    unmatched = sorted(set(given) - set(state.seen))
-    if unmatched:
+    if unmatched := sorted(set(given) - set(state.seen)):
         key = unmatched[0]
         raise InputError(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
-    unused = sorted(set(map(str, mapping.units)) - state.named)
-    if unused:
+    of_units = set(map(str, mapping.units))
+    if unused := sorted(of_units - state.named):
         raise InputError(
             f"--unit {unused[0]} changes nothing: no column or line of these files is known as "
             f"{unused[0]}. Known are {', '.join(sorted(state.named))}; name another with "
             f'--column {unused[0]}="its name", or leave the unit out.'
         )
     state.units.require()
-    idle = sorted(set(map(str, mapping.units)) - state.asked_for - _WAVES)
-    state.said = [
-        *state.units.warning(),
-        *(
-            f"warning: --unit {key} changes nothing: no test that was read needs {key}."
-            for key in idle
-        ),
-        *state.said,
+    idle = [
+        f"warning: --unit {key} changes nothing: no test that was read needs {key}."
+        for key in sorted(of_units - state.asked_for - _WAVES)
     ]
     files, notes = files_of(state.found)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
     same = {key: next(iter(names)) for key, names in state.seen.items() if len(names) == 1}
-    used = mapping.model_copy(
-        update={
-            "columns": {**same, **given},
-            "source": tuple(sources),
-            "tests": {**state.tests, **mapping.tests},
-        }
-    )
-    said = [*state.said, *unread_columns(state.columns), *notes]
-    return ImportedFolder(files, used, said, state.unread)
+    tests = {**state.tests, **mapping.tests}
+    used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
+    unread = unread_columns(state.columns)
+    said = [*state.units.warning(), *idle, *state.said, *unread, *notes]
+    return ImportedFolder(files, mapping.model_copy(update=used), said, state.unread)
 
 
 def _read(path: Path, state: _Import) -> None:
@@ -204,22 +191,16 @@ def _read(path: Path, state: _Import) -> None:
     blocks = joined_intervals(blocks_of_file(path, state.mapping), state.mapping, path.name)
     before: Record | None = None
     clock = 0.0
-    reasons = []
-    used = 0
-    columns: list[str] = []
+    used = len(state.found)
+    reasons, columns = [], []
     read: set[str] = set()
-    tables: list[tuple[int, Readings]] = []
     there: dict[str, None] = {}
-
-    def refused(where: str, error: InputError, chosen: TestName | None) -> None:
-        if chosen is not None or state.mapping.blocks is not None:
-            raise error  # of what the user named
-        state.unread.append(f"{where}: {error}")
-
+    tables: list[tuple[int, Readings]] = []
     for number, block in blocks:
         key = f"{key_of(path.name)}:{number}"
         where = f"{path.name}, block {number} {block.name}".strip()
-        stem = _plain(path.stem) + (f"-{number}" if len(blocks) > 1 else "")
+        plain = re.sub(r"[^\w.-]+", "_", path.stem).strip("_.") or "run"
+        name = plain + (f"-{number}" if len(blocks) > 1 else "")
         readings = Readings.of(block, state.mapping.of_block(path.name, number), path.name)
         state.named |= readings.named()
         tables.append((number, readings))
@@ -228,9 +209,8 @@ def _read(path: Path, state: _Import) -> None:
         readings.begins, clock = clock_before(readings, clock)
         chosen = state.mapping.test_of(path.name, number)
         state.tests[key] = chosen or "none"
-        recovered = None
-        if before is not None and chosen in (None, "creep"):
-            recovered = joined(before, readings)
+        follows = before is not None and chosen in (None, "creep")
+        recovered = joined(before, readings) if follows else None  # pyright: ignore[reportArgumentType]
         if recovered is not None:
             state.found[-1] = replace(state.found[-1], record=recovered)
             state.tests[key] = "creep"
@@ -240,59 +220,44 @@ def _read(path: Path, state: _Import) -> None:
             before = None
             continue
         previous, before = before, None
-        taken: list[Recognised] = []
         try:
-            if chosen is None and _CALIBRATION.search(block.name):
-                taken = [
-                    Recognised("none", np.ones(len(readings), bool), _A_CALIBRATION.format(key))
-                ]
-            else:
-                taken = _taken(readings, chosen)
+            one = _taken(readings, chosen, key)
+            made = None if one.kind == "none" else record(readings, one, previous)
         except InputError as error:
-            refused(where, error, chosen)
-        for part, one in enumerate(taken, start=1):
-            try:
-                made = None if one.kind == "none" else record(readings, one, previous)
-            except InputError as error:
-                refused(where, error, chosen)
-                continue
+            state.refuse(where, error, chosen)
+        else:
             why = one.why
-            if made is not None and made.kind != "none":
+            if made is not None and made.kind == "none":
+                why = made.notes[0]
+            elif made is not None:
                 why = _not_at(made, readings, one, state.mapping) if chosen is None else ""
-                made = None if why else made
-            if made is None or made.kind == "none":
-                reason = why if made is None else made.notes[0]
-                reasons.append(f"block {number} is {reason}" if reason else "")
-                state.said.append(left_out(where, block, reason))
-                continue
-            name = stem + (f"-{part}" if len(taken) > 1 else "")
-            state.found.append(NamedRecord(name, made, path.name, block.name))
-            state.tests[key] = made.kind
-            state.note(readings, made)
-            made.notes += readings.notes.values()
-            state.said.append(_summary(where, readings, one, made, columns))
-            before, used = made, used + 1
-            read |= {block.columns[readings.columns[k]][0] for k in readings.used
-                     if k in readings.columns} | set(block.told_by)  # fmt: skip
-            there |= dict.fromkeys(numbered(readings))
-        if chosen != "none":
-            for wave in waves_of(block, state.mapping, path.name):
-                used += 1
-                point = wave.name.rpartition(" ")[2]
-                # in SI units already, whatever the user says of the file's
-                readings = Readings.of(wave, Mapping(), path.name)
-                one = recognise(readings)[0]
-                made = record(readings, one, None)
-                found = NamedRecord(f"{stem}-point-{point}", made, path.name, wave.name)
-                state.found.append(found)
-                state.said.append(_summary(f"{path.name}, {wave.name}", readings, one, made))
+            if made is None or made.kind == "none" or why:
+                reasons += [f"block {number} is {why}"] if why else []
+                state.said.append(left_out(where, block, why))
+            else:
+                state.found.append(NamedRecord(name, made, path.name, block.name))
+                state.tests[key] = made.kind
+                state.note(readings, made)
+                made.notes += readings.notes.values()
+                state.said.append(_summary(where, readings, one, made, columns))
+                before = made
+                known = readings.used.keys() & readings.columns.keys()
+                read |= {block.columns[readings.columns[k]][0] for k in known}
+                read |= set(block.told_by)
+                there |= dict.fromkeys(readings.numbered())
+        for wave in waves_of(readings) if chosen != "none" else ():
+            point = wave.name.rpartition(" ")[2]
+            # in SI units already, whatever the user says of the file's
+            of_wave = Readings.of(wave, Mapping(), path.name)
+            one = recognise(of_wave)
+            made = record(of_wave, one, None)
+            state.found.append(NamedRecord(f"{name}-point-{point}", made, path.name, wave.name))
+            state.said.append(_summary(f"{path.name}, {wave.name}", of_wave, one, made))
     unread = [shown(name) for name in there if name not in read]
     if unread:
         state.columns.setdefault(", ".join(unread), []).append(path.name)
-    if not used and state.unread:
-        raise InputError(" ".join(state.unread))
-    if not used:
-        raise InputError(nothing(path, tables, [reason for reason in reasons if reason]))
+    if len(state.found) == used:
+        raise InputError(" ".join(state.unread) or nothing(path, tables, reasons))
 
 
 _CALIBRATION = re.compile(
@@ -306,9 +271,7 @@ _A_CALIBRATION = (
     "a calibration or check of the instrument by its title, no test of the sample; to take it "
     "nevertheless, say what it is, as in --test {}=flow_curve"
 )
-
-_ISOTHERMAL = 5.0
-"""Width in °C of the middle nine tenths of the temperatures of a test at one temperature."""
+_ISOTHERMAL = 5.0  # °C, width of the middle nine tenths of a test at one temperature
 
 
 def _not_at(made: Record, readings: Readings, one: Recognised, mapping: Mapping) -> str:
@@ -326,19 +289,20 @@ def _not_at(made: Record, readings: Readings, one: Recognised, mapping: Mapping)
         made.notes.append(
             f"nothing says its temperature: taken to be at the {wanted:g} °C asked for"
         )
-    return "" if abs(made.temperature - wanted) <= 1.0 else (
-        f"at {made.temperature:g} °C, not the temperature asked for")  # fmt: skip
+    if abs(made.temperature - wanted) <= 1.0:
+        return ""
+    return f"at {made.temperature:g} °C, not the temperature asked for"
 
 
-def _taken(readings: Readings, chosen: TestName | None) -> list[Recognised]:
+def _taken(readings: Readings, chosen: TestName | None, key: str) -> Recognised:
     """Return what a block is taken for: what the user says, or else what it looks like."""
-    if chosen is None:
-        return recognise(readings)
     every = np.ones(len(readings), bool)
     if chosen == "none":
-        return [Recognised("none", every, "left out as asked")]
-    alike = [one for one in recognise(readings) if one.kind == chosen]
-    return alike or [Recognised(chosen, every, "as asked")]
+        return Recognised("none", every, "left out as asked")
+    if chosen is None and _CALIBRATION.search(readings.block.name):
+        return Recognised("none", every, _A_CALIBRATION.format(key))
+    found = recognise(readings)
+    return found if chosen in (None, found.kind) else Recognised(chosen, every, "as asked")
 
 
 def _read_sweep(path: Path, state: _Import) -> None:
@@ -347,8 +311,7 @@ def _read_sweep(path: Path, state: _Import) -> None:
         readings = Readings.of(block, state.mapping, path.name)
         if not readings.has("omega", "Gp", "Gpp"):
             continue
-        one = next((o for o in recognise(readings) if o.kind == "frequency_sweep"), None)
-        one = one or Recognised("frequency_sweep", np.ones(len(readings), bool), "as asked")
+        one = _taken(readings, "frequency_sweep", "")
         made = record(readings, one, None)
         state.named |= readings.named()
         state.note(readings, made)
@@ -362,7 +325,11 @@ def _read_sweep(path: Path, state: _Import) -> None:
 
 
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
-
+# these are read only where they have to stand for another
+_THROUGH = {
+    "viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
+    "stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2",
+}  # fmt: skip
 _WORDS = {
     "frequency_sweep": "a frequency sweep at small strain",
     "amplitude_sweep": "an amplitude sweep",
@@ -393,21 +360,13 @@ def _summary(
 
 def _is_part(key: str, made: Record) -> bool:
     """Return whether a quantity that was read went into the table, by itself or through another."""
-    sources = {INSTRUMENT.get(name, name) for name in made.table} | set(made.table)
-    # these are read only where they have to stand for another
-    through = {"viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor"}
-    through |= {"stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2"}
     if key == "strain_amplitude":
         return made.kind == "amplitude_sweep"
     if key == "strain":
         return "strain" in made.table or "step_strain" in made.conditions
-    return key in sources or (key in through)
+    return key in made.table or key in _THROUGH | {INSTRUMENT.get(name) for name in made.table}
 
 
 def _source(path: Path, sweep: bool) -> Source:
     digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
     return Source(file=str(path), sha256=digest, sweep=sweep)
-
-
-def _plain(stem: str) -> str:
-    return re.sub(r"[^\w.-]+", "_", stem).strip("_.") or "run"

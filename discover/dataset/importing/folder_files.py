@@ -11,83 +11,66 @@ import numpy as np
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import INDEX_FILE, TESTS_FILE
 from discover.dataset.tables.table import shown
 
+# the table of each kind of test, without its ending
 TABLES = {
-    "frequency_sweep": "lve",
-    "amplitude_sweep": "amplitude_sweep",
-    "flow_curve": "flow_curve",
-    "relaxation": "relaxation",
-    "creep": "creep",
-}
-"""The table of each kind of test, without its ending."""
-
+    "frequency_sweep": "lve", "amplitude_sweep": "amplitude_sweep", "flow_curve": "flow_curve",
+    "relaxation": "relaxation", "creep": "creep",
+}  # fmt: skip
 _TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values()))
-
-_SAME = 1.5
-"""Difference in °C up to which two temperatures are one."""
-
+_SAME = 1.5  # difference in °C up to which two temperatures are one
 _NO_TEMPERATURE = (
     "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
     "FILE:2=60 for a block. To exchange the two, rename them."
 )
-
 _CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "step_time_s")
+_FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
+_OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
 
 
 @dataclass(frozen=True)
 class NamedRecord:
-    """A test and where it comes from.
+    """A test and where it comes from."""
 
-    `name`: of its file, if it is a run, without ending.
-    `source`, `block`: name of the file, and what that calls the block.
-    `chosen`: whether the user chose it as the table of its kind.
-    """
-
-    name: str
+    name: str  # of its file, if it is a run, without ending
     record: Record
-    source: str
-    block: str
-    chosen: bool = False
+    source: str  # name of the file
+    block: str  # what that calls the block
+    chosen: bool = False  # by the user, as the table of its kind
+
+    def near(self, celsius: float | None) -> bool:
+        """Return whether it is at a temperature, or nobody says one of the two."""
+        has = self.record.temperature
+        return has is None or celsius is None or abs(has - celsius) <= _SAME
 
 
 def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     """Return the text of every file of a folder by name, and what is to be said of them."""
-    files: dict[str, str] = {}
+    runs: list[NamedRecord] = []
+    taken: set[str] = set()
+    for one in (one for one in found if one.record.is_run):
+        # a file called creep.txt is no table of compliances
+        own = f"{one.name}-run" if f"{one.name}.csv" in _TAKEN else one.name
+        names = (f"{own}{end}" for end in ("", *(f"_{k}" for k in range(2, len(found) + 2))))
+        # two names that differ in capitals are one file on some disks
+        runs.append(replace(one, name=next(name for name in names if name.lower() not in taken)))
+        taken.add(runs[-1].name.lower())
+    files = {f"{one.name}.csv": _csv(one.record) for one in runs}
     notes: list[str] = []
-    # a file called creep.txt is no table of compliances
-    runs = [
-        replace(one, name=f"{one.name}-run") if f"{one.name}.csv" in _TAKEN else one
-        for one in found
-        if one.record.is_run
-    ]
-    runs = list(_with_own_names(runs))
-    for one in runs:
-        files[f"{one.name}.csv"] = _csv(one.record)
     by_temperature: list[tuple[str, str, str]] = []
     of_runs = {one.record.temperature for one in runs}
     for kind, table in TABLES.items():
         records = [one for one in found if one.record.kind == kind and not one.record.is_run]
-        records = _merged(sorted(records, key=lambda one: not one.chosen), kind)
+        records.sort(key=lambda one: not one.chosen)
+        records = _merged(records) if kind == "amplitude_sweep" else records
         _tables(table, records, of_runs, files, by_temperature, notes)
     if by_temperature:
         files[TESTS_FILE] = _text([("file", "test", "temperature_C"), *by_temperature])
     if runs:
         files[INDEX_FILE] = _index(runs)
     return files, notes
-
-
-def _with_own_names(runs: Sequence[NamedRecord]) -> Iterator[NamedRecord]:
-    """Yield runs, with a number in the names of those that would have the name of one before."""
-    taken: set[str] = set()
-    for one in runs:
-        names = (f"{one.name}{end}" for end in ("", *(f"_{k}" for k in range(2, len(runs) + 2))))
-        # two names that differ in capitals are one file on some disks
-        name = next(name for name in names if name.lower() not in taken)
-        taken.add(name.lower())
-        yield replace(one, name=name)
 
 
 def _tables(
@@ -101,30 +84,29 @@ def _tables(
     """Add the tables of one kind: one of them, or one for each temperature."""
     groups: list[list[NamedRecord]] = []
     for one in records:
-        same = (group for group in groups if _alike(group[0], one))
-        group = next(same, None)
+        group = next((g for g in groups if g[0].near(one.record.temperature)), None)
         if group is None:
-            groups.append([one])
-        else:
-            group.append(one)
-    at_runs = [g for g in groups if of_runs and all(_near(g[0], t) for t in of_runs)]
+            groups.append(group := [])
+        group.append(one)
     for group in groups:
-        main = len(groups) == 1 or group[0].chosen
-        base = table if main else f"{table}_{group[0].record.temperature:g}C"
+        at = f"{group[0].record.temperature:g}" if len(groups) > 1 else ""
+        main = not at or group[0].chosen
+        base = table if main else f"{table}_{at}C"
         if not main:
-            by_temperature.append((f"{base}.csv", table, f"{group[0].record.temperature:g}"))
+            by_temperature.append((f"{base}.csv", table, at))
         for number, one in enumerate(group, start=1):
             name = f"{base}.csv" if number == 1 else f"{base}-{number}.csv"
             files[name] = _csv(one.record)
             if number > 1:
                 known = one.record.temperature is not None
-                at = "at the same temperature, " if known else ""
+                same = "at the same temperature, " if known else ""
                 notes.append(
-                    f"{name} is another {table.replace('_', ' ')}, {at}from "
+                    f"{name} is another {table.replace('_', ' ')}, {same}from "
                     f"{f'{one.source} {one.block}'.strip()}: nothing reads it. "
                     + ("To exchange the two, rename them." if known else _NO_TEMPERATURE)
                 )
     if len(groups) > 1 and not groups[0][0].chosen:
+        at_runs = [g for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
         first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))
         text = f"{table}: {len(groups)} temperatures, {first} to {last} °C, a file each, listed in "
         text += f"{TESTS_FILE}"
@@ -138,35 +120,24 @@ def _tables(
         notes.append(text + ".")
 
 
-def _merged(records: list[NamedRecord], kind: str) -> list[NamedRecord]:
+def _merged(records: Sequence[NamedRecord]) -> list[NamedRecord]:
     """Return amplitude sweeps at one temperature and different frequencies as one table."""
-    if kind != "amplitude_sweep" or len(records) < 2:
-        return records
+
+    def goes_into(one: NamedRecord, into: NamedRecord) -> bool:
+        here, there = one.record.table.get("omega"), into.record.table.get("omega")
+        if here is None or there is None or not into.near(one.record.temperature):
+            return False
+        return not (np.abs(there[:, None] - here) < 0.02 * there[:, None]).any()
+
     kept: list[NamedRecord] = []
     for one in records:
-        for into in kept:
-            table, more = into.record.table, one.record.table
-            known = "omega" in table and "omega" in more
-            if known and _alike(into, one) and not _shared(table["omega"], more["omega"]):
-                for key in table:
-                    table[key] = np.concatenate([table[key], more[key]])
-                break
-        else:
+        into = next((into for into in kept if goes_into(one, into)), None)
+        if into is None:
             kept.append(one)
+        else:
+            table = into.record.table
+            table |= {k: np.concatenate([table[k], one.record.table[k]]) for k in table}
     return kept
-
-
-def _shared(first, second) -> bool:
-    return bool((abs(first[:, None] - second) < 0.02 * first[:, None]).any())
-
-
-def _alike(first: NamedRecord, second: NamedRecord) -> bool:
-    return _near(first, second.record.temperature)
-
-
-def _near(one: NamedRecord, temperature: float | None) -> bool:
-    has = one.record.temperature
-    return has is None or temperature is None or abs(has - temperature) <= _SAME
 
 
 def _index(runs: Sequence[NamedRecord]) -> str:
@@ -204,24 +175,16 @@ def unread_columns(columns: Mapping[str, Sequence[str]]) -> Iterator[str]:
         )
 
 
-def numbered(readings: Readings) -> Iterator[str]:
-    """Yield the names of columns that hold numbers, but for those that number rows."""
-    passed = [readings.columns.get(key) for key in ("point", "strain_wave", "stress_wave")]
-    for i, (name, _) in enumerate(readings.block.columns):
-        if i not in passed and name and any(is_number(row[i]) for row in readings.block.cells):
-            yield name
-
-
 def left_out(where: str, block: Block, reason: str) -> str:
     """Say which table is not read, and how to have it."""
     if reason:
         return f"{where}: left out, {reason}."
+    names = ", ".join(shown(n) for n, _ in block.columns[:15] if n)
     if not any(name for name, _ in block.columns):
         return (
             f"{where}: numbers from line {block.line} on without names; left out. Write the names "
             "above them, or say where they are with --header-row."
         )
-    names = ", ".join(shown(n) for n, _ in block.columns[:15] if n)
     return (
         f"{where}: not a run, and no table that is known (columns {names}); left out. "
         'To have it, name its columns, as in --column stress="its name".'
@@ -229,9 +192,9 @@ def left_out(where: str, block: Block, reason: str) -> str:
 
 
 def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequence[str]) -> str:
-    """Say which table is nearest to a test, what it lacks, and what to do.
+    """Say which table, of these by number, is nearest to a test, what it lacks, and what to do.
 
-    `tables`: number and content of each. `reasons`: why some of them were left out, in words.
+    `reasons`: why some of them were left out, in words.
     """
     if reasons:
         more = f" and {len(reasons) - 6} more" if len(reasons) > 6 else ""
@@ -240,12 +203,10 @@ def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequenc
             "what it is if this is wrong, as in --test frequency_sweep, or give another file."
         )
     number, best = max(tables, key=lambda pair: len(pair[1].columns))
-    several = len(tables) > 1
-    where = f"block {number} (numbers from line {best.block.line})" if several else "its block"
-    wanted = (
-        _OSCILLATION if {"omega", "Gp", "Gpp"} & set(best.columns) and not best.has("time")
-        else _FLOW
-    )  # fmt: skip
+    line = f"block {number} (numbers from line {best.block.line})"
+    where = line if len(tables) > 1 else "its block"
+    swings = {"omega", "Gp", "Gpp"} & set(best.columns) and not best.has("time")
+    wanted = _OSCILLATION if swings else _FLOW
     lacks = [keys for keys in wanted if not any(best.has(key) for key in keys)]
     names = list(dict.fromkeys(shown(name) for name, _ in best.block.columns if name))
     text = (
@@ -253,19 +214,12 @@ def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequenc
         f"{', nor as '.join(' or '.join(keys) for keys in lacks)}. Its columns are "
         f"{', '.join(names[:15])}."
     )
-    raw = [
-        f"{best.block.columns[best.columns[key]][0]} is {key}"
-        for key in INSTRUMENT.values()
-        if key in best.columns
-    ]
-    if raw and best.geometry is None:
+    known = [(best.columns[key], key) for key in INSTRUMENT.values() if key in best.columns]
+    if known and best.geometry is None:
+        raw = ", ".join(f"{best.block.columns[at][0]} is {key}" for at, key in known)
         return (
-            f"{text} {shown(', '.join(raw))}: give the tool that makes stress and rate of them, as "
+            f"{text} {shown(raw)}: give the tool that makes stress and rate of them, as "
             "in --geometry cone_plate:radius_mm=25,angle_deg=1."
         )
     key = lacks[0][0] if lacks else "stress"
     return f'{text} Name the right one, as in --column {key}="name of the column".'
-
-
-_FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
-_OSCILLATION = (("omega",), ("Gp",), ("Gpp",))

@@ -6,7 +6,9 @@ or several, or follows a straight line, and an answer does neither.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -15,43 +17,39 @@ from scipy.interpolate import PchipInterpolator
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, purer
 from discover.dataset.importing.text_export import Said
+from discover.dataset.records.thinning import bends
 
-CONSTANT = 0.03
-"""Spread, of the middle nine tenths of the samples, up to which an imposed quantity is constant."""
-AT_REST = 0.02
-"""Rate or stress over the largest, below which it is none."""
-EXACTLY = 1e-3
-"""Spread below which a quantity is a command, not an answer that happens to be constant."""
-
+CONSTANT = 0.03  # spread of the middle nine tenths up to which an imposed quantity is constant
+AT_REST = 0.02  # rate or stress over the largest, below which it is none
+EXACTLY = 1e-3  # spread below which it is a command, not an answer that happens to be constant
 _MORE_EXACT = 10.0
 _JUMP = 0.1
 _STRAIGHT = 0.003
 _FEWEST_HELD = 3
-_MOVES = 0.2
-"""Share of the largest strain by which a strain that was held does not change later on."""
-
+_MOVES = 0.2  # share of the largest strain by which one that was held does not change later on
 # Steady states differ on the way up and down by their scatter. Ten per cent is more than a gap or a
 # temperature does within one measurement
 APART = 0.1
 _ABOVE_SCATTER = 4.0
 _FEWEST_OF_BRANCH = 4
+_WITHOUT_CREEP = (
+    "and the creep before it, from which it starts, is not in the file: give both in one file, one "
+    "after the other"
+)
 
 Values = Float[np.ndarray, " n"]
 
 
 @dataclass(frozen=True)
 class Course:
-    """What was recorded over time; at least one of rate and strain is known.
-
-    `time`, `stress`, `rate`, `strain` in s, Pa and 1/s, each of shape (n,).
-    """
+    """What was recorded over time in s, Pa and 1/s, each of shape (n,); rate or strain is known."""
 
     time: Values
     stress: Values
     rate: Values | None
     strain: Values | None
 
-    @property
+    @cached_property
     def moved(self) -> Values:
         """The rate, or the change of the strain where no rate was recorded."""
         if self.rate is not None:
@@ -60,25 +58,72 @@ class Course:
         rises = np.all(np.diff(self.time) > 0.0)
         return np.gradient(self.strain, self.time) if rises else np.diff(self.strain)
 
+    @cached_property
+    def rate_is_set(self) -> bool:
+        """Whether the rate is held or goes straight, or the strain does the latter."""
+        if self.rate is not None:
+            return held(self.rate) or straight(self.time, self.rate)
+        assert self.strain is not None
+        return straight(self.time, self.strain) and not held(self.strain)
+
+    @cached_property
+    def stress_is_set(self) -> bool:
+        """Whether the stress is held."""
+        return held(self.stress)
+
+    @property
+    def follows_stress(self) -> bool:
+        """Whether the stress is a smooth ramp and the rate is not."""
+        ramp = straight(self.time, self.stress)
+        return (ramp or _rougher(self.time, self.moved, self.stress)) and not self.rate_is_set
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the strain changes later on in the record, so that it was not held."""
+        if self.strain is None:
+            return True
+        late = self.strain[len(self.strain) // 4 :]
+        return bool(np.ptp(late) > _MOVES * np.max(np.abs(self.strain)))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the rate changes on the whole, not from sample to sample as noise does."""
+        moved = np.abs(self.moved)
+        third = max(len(moved) // 3, 1)
+        scatter = float(np.median(np.abs(np.diff(moved))))
+        change = abs(float(np.median(moved[:third]) - np.median(moved[-third:])))
+        return change > max(CONSTANT * float(np.median(moved)), 3.0 * scatter)
+
+    @property
+    def jumps(self) -> bool:
+        """Whether the strain has a part that is there at once, as a given stress makes it."""
+        if self.strain is None or len(self.time) < 5:
+            return False
+        begins = np.polynomial.Polynomial.fit(self.time, self.strain, 1)(0.0)
+        with_stress = begins * np.median(self.stress) > 0.0
+        return bool(with_stress and abs(begins) > CONSTANT * np.max(np.abs(self.strain)))
+
+    @cached_property
+    def ways(self) -> "UpAndDown | None":
+        """How far the stresses of the ways up and down in rate are apart."""
+        return None if self.rate is None else up_and_down(self.rate, self.stress)
+
 
 def kind_of_course(course: Course, said: Said | None) -> tuple[TestName, str]:
     """Return which test a record is, and what says so."""
     strain, stress = course.strain, course.stress
     swings = alternates(strain if strain is not None else course.moved) or alternates(stress)
-    if swings and not held(stress):  # creep and recovery have a rate of both signs
+    if swings and not course.stress_is_set:  # creep and recovery have a rate of both signs
         if strain is not None and purer(course.time, stress, strain):
             return "creep", "the stress is a sine and the strain is not"
         return "run", "an oscillation, sample by sample"
-    if said is not None:
-        found = _as_said(course, said)
-        if found is not None:
-            return found
-    return _by_numbers(course)
+    found = None if said is None else _as_said(course, said)
+    return _by_numbers(course) if found is None else found
 
 
 def _as_said(course: Course, said: Said) -> tuple[TestName, str] | None:
     """Return the test that words say; None where they leave it open."""
-    by_rate, by_stress = _rate_is_set(course), held(course.stress)
+    by_rate, by_stress = course.rate_is_set, course.stress_is_set
     only_stress = by_stress and not by_rate
     flows = by_rate and not by_stress and bool(np.median(np.abs(course.moved)))
     calls = f"it is called {said.words!r}"
@@ -86,8 +131,8 @@ def _as_said(course: Course, said: Said) -> tuple[TestName, str] | None:
         return "none", f"a recovery ({calls}), {_WITHOUT_CREEP}"
     excluded = {
         "creep": flows and "the rate is held and the stress is not",
-        "relaxation": (flows or only_stress) and _goes_on(course) and "the strain is not held",
-        "start_up": only_stress and _drifts(course) and "the stress is held and the rate is not",
+        "relaxation": (flows or only_stress) and course.goes_on and "the strain is not held",
+        "start_up": only_stress and course.drifts and "the stress is held and the rate is not",
     }.get(said.test)
     if excluded:
         return None if said.by_file_name else ("none", f"called {said.words!r}, but {excluded}")
@@ -95,42 +140,42 @@ def _as_said(course: Course, said: Said) -> tuple[TestName, str] | None:
         return "creep", f"{calls}; the strain is what the stress was answered with"
     if said.test == "relaxation" and course.strain is not None:
         return "relaxation", f"{calls}; the stress relaxes"
-    if said.test == "flow_curve" and (every_row_differs(course.moved) or _steps_alike(course)):
+    alike = course.ways is not None and not course.ways.apart
+    if said.test == "flow_curve" and (every_row_differs(course.moved) or alike):
         return "flow_curve", f"{calls}; every row is another steady state"
-    if said.test == "ramp":
-        if _follows_stress(course):
-            return "creep", "a ramp of stress, which the strain follows"
-        return None if only_stress else ("run", f"{calls}; the rate goes its way in time")
-    if said.test in ("loop", "intervals") and not only_stress and not said.by_file_name:
+    if said.test == "ramp" and course.follows_stress:
+        return "creep", "a ramp of stress, which the strain follows"
+    by_name = said.by_file_name and said.test != "ramp"
+    if said.test in ("ramp", "loop", "intervals") and not only_stress and not by_name:
         return "run", f"{calls}; the rate goes its way in time"
     return None
 
 
 def _by_numbers(course: Course) -> tuple[TestName, str]:
-    stress, rate, strain = course.stress, course.rate, course.strain
-    by_rate, by_stress = _rate_is_set(course), held(stress)
-    if by_stress and np.any(stress):
+    stress, rate, strain, ways = course.stress, course.rate, course.strain, course.ways
+    by_rate = course.rate_is_set
+    steps = rate is not None and every_row_differs(rate)
+    if course.stress_is_set and np.any(stress):
         exact = spread(stress) < EXACTLY
-        steps = rate is not None and every_row_differs(rate)
         more = max(spread(stress) * _MORE_EXACT, EXACTLY) <= spread(course.moved)
-        if (exact and (more or _jumps(course))) or (not by_rate and not steps and _drifts(course)):
+        drifts = not by_rate and not steps and course.drifts
+        if (exact and (more or course.jumps)) or drifts:
             return "creep", "the stress is held, and the rate is what answers it"
     if not np.any(np.abs(stress) > 0.0) and strain is not None and np.ptp(strain) > 0.0:
         return "none", f"a recovery, as there is no stress, {_WITHOUT_CREEP}"
-    if rate is not None and every_row_differs(rate):
+    if rate is not None and steps:
         span = f"{np.min(np.abs(rate)):.3g} to {np.max(np.abs(rate)):.3g} 1/s"
         return "flow_curve", f"every row has another rate, {span}"
-    if rate is not None and _steps_alike(course):
+    if ways is not None and not ways.apart:
         return "flow_curve", "the rate goes up and down in steps, and the stress is the same"
-    if straight(course.time, stress) and _follows_stress(course):
+    if straight(course.time, stress) and course.follows_stress:
         return "creep", "a ramp of stress, which the strain follows"
     if strain is not None and not by_rate:
         # held: what is left of the rise of the strain lies before the middle of the record
         late = strain[len(strain) // 4 :]
         if abs(np.median(strain)) > 0.0 and spread(late) < CONSTANT:
             return "relaxation", "the strain is held, and the stress relaxes"
-    ways = None if rate is None else up_and_down(rate, stress)
-    if ways is not None and ways.apart:
+    if ways is not None:
         return "run", (
             f"the rate goes up and down over time, and the stresses of the two ways are "
             f"{ways.described}"
@@ -140,72 +185,11 @@ def _by_numbers(course: Course) -> tuple[TestName, str]:
     return "run", "a flow at a given rate, over time"
 
 
-_WITHOUT_CREEP = (
-    "and the creep before it, from which it starts, is not in the file: give both in one file, one "
-    "after the other"
-)
-
-
-def _follows_stress(course: Course) -> bool:
-    """Return whether the stress is a smooth ramp and the rate is not."""
-    smooth = straight(course.time, course.stress) or _rougher(
-        course.time, course.moved, course.stress
-    )
-    return smooth and not _rate_is_set(course)
-
-
-def _rate_is_set(course: Course) -> bool:
-    if course.rate is not None:
-        return held(course.rate) or straight(course.time, course.rate)
-    assert course.strain is not None
-    return straight(course.time, course.strain) and not held(course.strain)
-
-
-def _goes_on(course: Course) -> bool:
-    """Return whether the strain changes later on in the record, so that it was not held."""
-    if course.strain is not None:
-        late = course.strain[len(course.strain) // 4 :]
-        return bool(np.ptp(late) > _MOVES * np.max(np.abs(course.strain)))
-    return True
-
-
-def _drifts(course: Course) -> bool:
-    """Return whether the rate changes on the whole, not from sample to sample as noise does."""
-    moved = np.abs(course.moved)
-    third = max(len(moved) // 3, 1)
-    first, last = moved[:third], moved[-third:]
-    scatter = np.median(np.abs(np.diff(moved)))
-    change = abs(float(np.median(first) - np.median(last)))
-    return change > max(CONSTANT * float(np.median(moved)), 3.0 * float(scatter))
-
-
-def _jumps(course: Course) -> bool:
-    """Return whether the strain has a part that is there at once, as a given stress makes it."""
-    if course.strain is None or len(course.time) < 5:
-        return False
-    line = np.polynomial.Polynomial.fit(course.time, course.strain, 1)
-    return bool(line(0.0) * np.median(course.stress) > 0.0) and bool(
-        abs(line(0.0)) > CONSTANT * np.max(np.abs(course.strain))
-    )
-
-
-def _steps_alike(course: Course) -> bool:
-    if course.rate is None:
-        return False
-    ways = up_and_down(course.rate, course.stress)
-    return ways is not None and not ways.apart
-
-
-@dataclass(frozen=True)
-class UpAndDown:
-    """Stresses on the way down over those at the same rates on the way up, as logarithms.
-
-    `logarithms`: shape (m,).
-    `scatter`: standard deviation of the logarithm of a stress.
-    """
+class UpAndDown(NamedTuple):
+    """Stresses on the way down over those at the same rates on the way up."""
 
     logarithms: Float[np.ndarray, " m"]
-    scatter: float
+    scatter: float  # standard deviation of the logarithm of a stress
 
     @property
     def apart(self) -> bool:
@@ -223,8 +207,7 @@ class UpAndDown:
 def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
     """Return by how much stresses differ on the way up and down; None if rates go one way only.
 
-    `rate`, `stress` in 1/s and Pa, in the order in which they were measured. Rows of one sign are
-    compared.
+    `rate`, `stress` in 1/s and Pa, as they were measured. Rows of one sign are compared.
     """
     use = (rate * np.sign(np.median(rate)) > 0.0) & (stress * np.sign(np.median(stress)) > 0.0)
     if np.sum(use) < 2 * _FEWEST_OF_BRANCH or np.mean(use) < 0.7:
@@ -237,34 +220,29 @@ def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
     moving = np.flatnonzero(turns)
     cuts = moving[1:][turns[moving[1:]] != turns[moving[:-1]]]
     ways = [
-        way
-        for way in zip([0, *cuts], [*(cuts + 1), len(x)], strict=True)
-        if way[1] - way[0] >= _FEWEST_OF_BRANCH
+        slice(a, b)
+        for a, b in zip([0, *cuts], [*(cuts + 1), len(x)], strict=True)
+        if b - a >= _FEWEST_OF_BRANCH
     ]
     if len(ways) < 2 or len(cuts) > len(x) // _FEWEST_OF_BRANCH:
         return None
-    found, bends = [], []
-    for (a, b), (c, d) in pairwise(ways):
-        (first, one), (second, other) = _in_order(x[a:b], y[a:b]), _in_order(x[c:d], y[c:d])
+    found, off = [], []
+    for way, back in pairwise(ways):
+        (first, one), (second, other) = (_in_order(x[w], y[w]) for w in (way, back))
         both = (first >= second[0]) & (first <= second[-1])
-        if (x[b - 1] - x[a]) * (x[d - 1] - x[c]) < 0.0 and both.any():
+        if (x[way][-1] - x[way][0]) * (x[back][-1] - x[back][0]) < 0.0 and both.any():
             found.append(np.interp(first[both], second, other) - one[both])
-        bends += [_bends(first, one), _bends(second, other)]
-    off = np.concatenate(bends) if bends else np.empty(0)
-    if not found or not len(off):
+        off += [bends(first, one), bends(second, other)]
+    left = np.abs(np.concatenate(off)) if off else np.empty(0)
+    if not found or not len(left):
         return None
-    scatter = 1.4826 * float(np.median(np.abs(off))) / np.sqrt(1.5)
+    scatter = 1.4826 * float(np.median(left)) / np.sqrt(1.5)
     return UpAndDown(np.concatenate(found), scatter)
 
 
 def _in_order(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     places, first = np.unique(x, return_index=True)
     return places, y[first]
-
-
-def _bends(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    share = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
-    return y[1:-1] - (y[:-2] + share * (y[2:] - y[:-2]))
 
 
 def spread(values: Values) -> float:
@@ -309,8 +287,7 @@ def every_row_differs(rate: Values) -> bool:
 def strain_of(time: Values, rate: Values) -> Values:
     """Return the strain that a rate has made since t = 0, shape (n,).
 
-    `time` in s, from the start of the test, increasing. `rate` in 1/s; before the first sample it
-    is taken as there.
+    `time`, `rate` in s, increasing, and 1/s; before the first sample the rate is taken as there.
     """
     before = max(float(time[0]), 0.0) * float(rate[0])
     if len(time) < 2:

@@ -29,9 +29,9 @@ TestName = Literal[
 """What a block may be taken for: ``run`` is a record in time at a given rate, ``none`` nothing."""
 
 EVERY_BLOCK = "*"
+_ENCODED = "file_percent_encoded"
 
-Celsius = Annotated[float, Field(ge=-273.15, le=2000)]
-"""A temperature that can be."""
+Celsius = Annotated[float, Field(ge=-273.15, le=2000)]  # a temperature that can be
 
 
 class Geometry(Section):
@@ -55,32 +55,20 @@ class Geometry(Section):
             raise ValueError(f"{self.type} needs {needed}")
         return self
 
-    @property
-    def stress_per_torque(self) -> float:
-        """σ12/M in Pa/(N m)."""
-        factor = 1.5 if self.type == "cone_plate" else 2.0
-        return factor / (math.pi * (self.radius_mm * 1e-3) ** 3)
-
-    @property
-    def strain_per_angle(self) -> float:
-        """γ/θ, per radian."""
-        if self.angle_deg is not None and self.type == "cone_plate":
+    def per_signal(self, key: str) -> float | None:
+        """Return σ12/M in Pa/(N m), γ/θ or γ̇/Ω, or N1/F in Pa/N; None where F does not give N1."""
+        is_cone, radius = self.type == "cone_plate", self.radius_mm * 1e-3
+        if key == "stress":
+            return (1.5 if is_cone else 2.0) / (math.pi * radius**3)
+        if key == "N1":
+            return 2.0 / (math.pi * radius**2) if is_cone else None
+        if self.angle_deg is not None and is_cone:
             return 1.0 / math.radians(self.angle_deg)
         return self.radius_mm / (self.gap_mm or math.nan)
 
-    @property
-    def normal_stress_per_force(self) -> float | None:
-        """N1/F in Pa/N, or None where the force does not give N1."""
-        if self.type == "plate_plate":
-            return None
-        return 2.0 / (math.pi * (self.radius_mm * 1e-3) ** 2)
-
 
 class Layout(Section):
-    """How the text is laid out; whatever is left out is found from the file.
-
-    `format` names the importer of a file that is no text.
-    """
+    """How the text is laid out, or which importer reads it; what is left out is found."""
 
     format: str | None = None
     delimiter: Literal["tab", "semicolon", "comma", "space"] | None = None
@@ -89,15 +77,8 @@ class Layout(Section):
     encoding: str | None = None
 
 
-_ENCODED = "file_percent_encoded"
-
-
 class Source(Section):
-    """A file that was imported, with its hash.
-
-    TOML is UTF-8, and names on old disks need not be: ``file_percent_encoded`` takes the place of
-    ``file`` there.
-    """
+    """A file that was imported, with its hash; ``file_percent_encoded`` if its name is no UTF-8."""
 
     file: str
     sha256: str | None = None
@@ -117,9 +98,8 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `names` are the tables of ``names.toml``, keys of `tests` ``FILE:BLOCK``, ``FILE`` or
-    `EVERY_BLOCK`; the rest is recognised. Keys of
-    `temperatures` are ``FILE:BLOCK`` or ``FILE``; values in °C.
+    Keys of `names` are the tables of ``names.toml``, of `tests` ``FILE:BLOCK``, ``FILE`` or
+    `EVERY_BLOCK`, of `temperatures`, in °C, ``FILE:BLOCK`` or ``FILE``.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
@@ -140,22 +120,15 @@ class Mapping(Section):
         return self
 
     def test_of(self, file: str, block: int) -> TestName | None:
-        """Return what the user says that a block of a file is; None if nothing.
-
-        Parameters
-        ----------
-        block
-            Number of the block, from 1.
-        """
+        """Return what the user says that a block of a file, from 1, is; None if nothing."""
         name = key_of(file)
         keys = f"{name}:{block}", name, EVERY_BLOCK
         return next((self.tests[key] for key in keys if key in self.tests), None)
 
     def of_block(self, file: str, block: int) -> "Mapping":
         """Return what holds for a block of a file, its temperature being that of the file."""
-        name = key_of(file)
-        degrees = self.temperatures.get(f"{name}:{block}")
-        of_file = {} if degrees is None else {"temperatures": {name: degrees}}
+        degrees = self.temperatures.get(f"{key_of(file)}:{block}")
+        of_file = {} if degrees is None else {"temperatures": {key_of(file): degrees}}
         return self.model_copy(update=of_file)
 
 
@@ -169,18 +142,12 @@ def key_of(file: str) -> str:
 
 
 def make_mapping(content: dict, where: str) -> Mapping:
-    """Return a mapping from nested dictionaries.
-
-    Raises InputError if a key is unknown or a value is wrong; names it.
-    """
+    """Return a mapping from nested dictionaries; InputError names a key or value that is wrong."""
     return validated(Mapping, content, where)
 
 
 def read_mapping(path: Path) -> Mapping:
-    """Return the mapping in a TOML file.
-
-    Raises InputError if it cannot be read or is wrong.
-    """
+    """Return the mapping in a TOML file; InputError says what is wrong with it."""
     content, _ = read_toml(path, "mapping file", f"Write it like the {MAPPING_FILE} of an import.")
     return make_mapping(content, path.name)
 
@@ -213,11 +180,8 @@ def write_mapping(mapping: Mapping) -> str:
 
 
 def _file(name: str) -> str:
-    try:
-        name.encode()
-    except UnicodeEncodeError:
-        return f"{_ENCODED} = {_toml(quote(os.fsencode(name)))}"
-    return f"file = {_toml(name)}"
+    key = key_of(name)
+    return f"file = {_toml(name)}" if key == name else f"{_ENCODED} = {_toml(key)}"
 
 
 def _key(name: str) -> str:

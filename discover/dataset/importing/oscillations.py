@@ -6,27 +6,22 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import fminbound
 
-from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
 
+Values = Float[np.ndarray, " n"]
+
 _FEWEST_SAMPLES = 20
 _HARMONICS = 9
-_SINE = 0.005
-"""Higher harmonics over the first, up to which a record is a sine."""
-
-_AS_BEFORE = 0.05
-"""Difference over the amplitude, up to which one cycle repeats another."""
-
+_SINE = 0.005  # higher harmonics over the first, up to which a record is a sine
+_AS_BEFORE = 0.05  # difference over the amplitude, up to which one cycle repeats another
+# share of a period within which a fluid from rest has no stress yet, unless it answers at once
 _AT_ONCE = 0.02
-"""Share of a period within which a fluid from rest has no stress yet, unless it answers at once."""
-
 _FAR = 0.3
-_WHOLE = 1e-3
-"""Share of a period up to which a record is as long as one."""
-
-Values = Float[np.ndarray, " n"]
+_WHOLE = 1e-3  # share of a period up to which a record is as long as one
+_FEWEST = 32
+_DERIVATIVE = 0.05  # misfit to the derivative of another column, up to which one is its rate
 
 
 def alternates(values: Values) -> bool:
@@ -44,10 +39,7 @@ def alternates(values: Values) -> bool:
 
 
 def frequency_of(time: Values, values: Values) -> float:
-    """Return the angular frequency in rad/s at which a sine with an offset fits best.
-
-    `time` in s, increasing.
-    """
+    """Return the angular frequency in rad/s at which a sine with an offset fits best; `time` in s."""
     span = float(time[-1] - time[0])
     centred = values - np.mean(values)
     turns = np.flatnonzero(np.sign(centred[1:]) != np.sign(centred[:-1]))
@@ -91,10 +83,8 @@ def purer(time: Values, stress: Values, strain: Values) -> bool:
 def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
     """Return whether a record begins as it goes on, in steady alternation, and not from rest.
 
-    Its first cycle repeats in the next, or its first sample is far from rest.
-
-    `time` in s. `imposed`, `answer`: what was imposed, and what the fluid answered: strain and
-    stress, or stress and strain.
+    Its first cycle repeats in the next, or its first sample is far from rest. `imposed` and
+    `answer` are strain and stress, or stress and strain.
     """
     period = 2.0 * np.pi / frequency_of(time, imposed)
     size = float(np.max(np.abs(answer)))
@@ -119,24 +109,17 @@ def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
 # strain and stress, and time, strain, rate and stress   [Ewoldt, Hosoi & McKinley 2008, J. Rheol.
 # 52, 1427; Donley, Singh, Shetty & Rogers 2020, PNAS 117, 21945].
 
-_FEWEST = 32
-_DERIVATIVE = 0.05
-"""Misfit of a column to the derivative of another, over its size, up to which it is its rate."""
 
-
-def waves_of(block: Block, mapping: Mapping, name: str) -> list[Block]:
+def waves_of(readings: Readings) -> list[Block]:
     """Return the waveforms that stand beside the summary of an oscillation, a block for each point.
 
     Time is counted from the first sample. Where the export gives none, the samples are whole cycles
     at the frequency of the point, closed with the first sample, and the rate is the derivative of
     the Fourier series, without harmonics that are noise.
     """
-    readings = Readings.of(block, mapping, name)
-    if not {"strain_wave", "stress_wave"} <= set(readings.columns):
+    strain, stress = readings.alone("strain_wave"), readings.alone("stress_wave")
+    if strain is None or stress is None:
         return []
-    strain, stress = readings.get("strain_wave"), readings.get("stress_wave")
-    assert strain is not None
-    assert stress is not None
     clock, omega = readings.get("wave_time"), readings.get("omega")
     raw = np.isfinite(strain) & np.isfinite(stress)
     # samples follow the line of their point, which may hold the first of them
@@ -156,29 +139,24 @@ def waves_of(block: Block, mapping: Mapping, name: str) -> list[Block]:
             cycles = int(np.argmax(np.abs(np.fft.rfft(wave)[1:]))) + 1
             slowest = frequency / cycles
             time = np.arange(np.sum(rows) + 1) / np.sum(rows) * 2.0 * np.pi / slowest
-            rate = _derivative(wave, cycles) * slowest
+            series = np.fft.rfft(wave)  # of whole cycles; the derivative in the phase of all
+            order = np.arange(len(series))
+            kept = np.where(order <= _HARMONICS * cycles, 1j * order * series, 0.0)
+            rate = np.fft.irfft(kept, len(wave)) * slowest
             columns["shear rate"] = ("1/s", np.append(rate, rate[0]))
             wave, answer = np.append(wave, wave[0]), np.append(answer, answer[0])
         else:
             continue
         columns |= {"time": ("s", time), "strain": ("", wave), "stress": ("Pa", answer)}
-        found.append(Block.of(columns, f"{block.name} waveform of point {point}".strip()))
+        name = f"{readings.block.name} waveform of point {point}".strip()
+        found.append(Block.of(columns, name))
     return found
 
 
-def _derivative(wave: Float[np.ndarray, " n"], cycles: int) -> Float[np.ndarray, " n"]:
-    """Return the derivative of whole cycles in the phase of all of them together, in radians."""
-    series = np.fft.rfft(wave)
-    order = np.arange(len(series))
-    kept = order <= _HARMONICS * cycles
-    return np.fft.irfft(np.where(kept, 1j * order * series, 0.0), len(wave))
-
-
 def without_names(rows: Sequence[Sequence[str]]) -> Block | None:
-    """Return a table of three or four columns without names as an oscillation; None if it is none.
+    """Return a table without names as an oscillation: time, strain and stress in SI units.
 
-    Time, strain and stress in SI units, or with the rate before the stress, which is checked to be
-    the derivative of the strain.
+    Or with the rate before the stress, which has to be the derivative of the strain; else None.
     """
     filled = [[cell for cell in row if cell] for row in rows]
     numbers = [row for row in filled if row and all(map(is_number, row))]
@@ -193,9 +171,7 @@ def without_names(rows: Sequence[Sequence[str]]) -> Block | None:
     if not (alternates(strain) and alternates(stress)):
         return None
     omega = frequency_of(time, strain)
-    fit = np.stack([np.ones(len(time)), np.cos(omega * time), np.sin(omega * time)], axis=1)
-    left = strain - fit @ np.linalg.lstsq(fit, strain, rcond=None)[0]
-    if np.std(left) > _DERIVATIVE * np.std(strain):
+    if np.std(strain - _series(time, strain, omega, 1)[0]) > _DERIVATIVE * np.std(strain):
         return None  # the second column is no imposed sine
     named = {"time": ("s", time), "strain": ("", strain)}
     if values.shape[1] == 4:

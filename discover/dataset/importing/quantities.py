@@ -1,22 +1,24 @@
-"""Which column is what, and how its unit becomes SI."""
+"""Which column is what, and how its unit becomes SI: said, told by the numbers, or asked for."""
 
 import re
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.names import NameTable, plain
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import is_clock, is_number
+from discover.dataset.importing.text_rows import is_clock
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
 from discover.dataset.tables import units
 from discover.dataset.tables.table import shown
 from discover.dataset.tables.units import Quantity, read_heading, read_unit, tidy_unit
 from discover.errors import InputError
 from discover.words import listed
+
+Values = Float[np.ndarray, " n"]
+Get = Callable[[str], Values | None]
 
 _QUANTITIES: dict[str, Quantity | str] = {
     "time": units.TIME, "shear_rate": units.SHEAR_RATE, "stress": units.SHEAR_STRESS,
@@ -33,7 +35,6 @@ _QUANTITIES: dict[str, Quantity | str] = {
     "radius": "m", "diameter": "m", "gap": "m", "cone_angle": "rad", "strain_wave": "",
     "stress_wave": "Pa", "wave_time": "s", "point": "",
 }  # fmt: skip
-"""What a column may hold: a quantity of data folders, or the SI unit of one of exports alone."""
 
 
 def _quantity(key: str, unit: str) -> Quantity:
@@ -44,34 +45,37 @@ def _quantity(key: str, unit: str) -> Quantity:
 QUANTITIES: dict[str, Quantity] = {
     key: _quantity(key, one) if isinstance(one, str) else one for key, one in _QUANTITIES.items()
 }
+"""What a column may hold: quantities of data folders, and in SI units those of exports alone."""
+
+_SHORT = 3  # letters of a name that says too little without its unit
 
 
 def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> dict[str, int]:
-    """Return the place of each quantity among the columns of a block.
+    """Return the place of each quantity among the columns of a block that hold a number.
 
-    Columns without a single number are passed over; a clock is a time only if no number is.
-
-    `given`: names of columns that the user gave; they win over guesses. Raises InputError if a name
-    that was given stands above two columns.
+    A clock is a time only if no number is. `given`: names of columns that the user gave; they win.
+    Raises InputError if one stands above two columns.
     """
-    count = range(len(block.columns))
-    numbers = [any(is_number(row[i]) for row in block.cells) for i in count]
-    clocks = [not numbers[i] and any(is_clock(row[i]) for row in block.cells) for i in count]
+    names = [name for name, _ in block.columns]
+    clocks = [
+        i for i in range(len(names))
+        if i not in block.filled and any(is_clock(row[i]) for row in block.cells)
+    ]  # fmt: skip
     found: dict[str, int] = {}
     for key in QUANTITIES:
         if key in given:
-            at = [i for i in count if block.columns[i][0] == given[key]]
-            at = at or [i for i in count if plain(block.columns[i][0]) == plain(given[key])]
+            at = [i for i, name in enumerate(names) if name == given[key]]
+            at = at or [i for i, name in enumerate(names) if plain(name) == plain(given[key])]
             if len(at) > 1:
                 raise InputError(
                     f"Two columns are named {given[key]!r} (block at line {block.line}). Rename "
                     "one in the file."
                 )
         else:
-            ranks = {i: name_rank(key, *block.columns[i], table) for i in count}
+            ranks = {i: name_rank(key, *column, table) for i, column in enumerate(block.columns)}
             places = {i: rank for i, rank in ranks.items() if rank is not None}
             at = sorted(places, key=places.__getitem__)
-        at = [i for i in at if numbers[i]] + [i for i in at if clocks[i] and key == "time"]
+        at = [i for i in at if i in block.filled] + [i for i in at if i in clocks and key == "time"]
         if at:
             found[key] = at[0]
     return found
@@ -84,21 +88,12 @@ def name_rank(key: str, name: str, unit: str, table: NameTable) -> int | None:
         return rank if fits(key, name, unit) else None
     if name == QUANTITIES[key].column:
         return 0
-    inside = None if unit else _split(key, name, table)
+    inside = None if unit else split_name(key, name, table)
     return None if inside is None else inside[0]
 
 
-def unit_in_name(key: str, name: str, table: NameTable) -> str:
-    """Return the unit at the end of a column's name, as in ``stress_kPa`` or ``τ/Pa``; or empty.
-
-    It has to be a unit of the quantity, and what stands before it a name of that.
-    """
-    inside = _split(key, name, table)
-    return "" if inside is None else inside[1]
-
-
-def _split(key: str, name: str, table: NameTable) -> tuple[int, str] | None:
-    """Return the rank of a name that ends in a unit, and that unit."""
+def split_name(key: str, name: str, table: NameTable) -> tuple[int, str] | None:
+    """Return the rank of a name that ends in a unit of the quantity, and it: ``stress_kPa``."""
     for mark in re.finditer(r"[\s_/,;]+", name):
         head, tail = name[: mark.start()], name[mark.end() :]
         rank = 0 if head == QUANTITIES[key].stem else table.rank(key, head)
@@ -122,26 +117,19 @@ def _is_unit_of(key: str, unit: str) -> bool:
 def fits(key: str, name: str, unit: str) -> bool:
     """Return whether a short name, which may mean several things, has a unit of the quantity.
 
-    `name`, `unit`: of the column; a longer name fits whatever its unit is, so that a wrong one is
-    said.
+    A longer name fits whatever its unit is, so that a wrong one is said.
     """
     if name.strip() == "T" and not unit:
         return key == "temperature"
     name = plain(name)
     if len(name) > _SHORT or any(letter > "\u2e80" for letter in name):
         return True
-    if key == "temperature":
-        return to_celsius(0.0, unit) is not None
-    if not unit or read_unit(unit) is None:
+    if key != "temperature" and (not unit or read_unit(unit) is None):
         # without a unit G' is a modulus, and t is a time; D and n may be anything
         return name in ("t", "w", "f", "j") or not (
             (name == "gp" and key == "shear_rate") or (len(name) == 1 and name.isascii())
         )
     return _is_unit_of(key, unit)
-
-
-_SHORT = 3
-"""Letters of a name that says too little without its unit."""
 
 
 def to_celsius(value: float, unit: str) -> float | None:
@@ -154,16 +142,13 @@ def to_celsius(value: float, unit: str) -> float | None:
         return value
     if scale in ("K", "KELVIN"):
         return value - 273.15
-    if scale in ("F", "FAHRENHEIT"):
-        return (value - 32.0) / 1.8
-    return None
+    return (value - 32.0) / 1.8 if scale in ("F", "FAHRENHEIT") else None
 
 
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
-    """Return the factor from a column's unit to SI.
+    """Return the factor to SI from a column's unit as the export or the user writes it.
 
-    `unit`: their unit as the export or the user writes it. Raises InputError if the unit is unknown
-    or a unit of something else.
+    Raises InputError if the unit is unknown or one of something else.
     """
     quantity = QUANTITIES[key]
     if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
@@ -185,60 +170,36 @@ def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     return factor
 
 
-# They are told by its numbers, taken as SI where nothing else is usual, or asked for, all at once.
-
-Values = Float[np.ndarray, " n"]
-Get = Callable[[str], Values | None]
-
+# units of which either is usual; the last is that of SI
 _CHOICES = {
-    "strain": ("%", "1"),
-    "strain_amplitude": ("%", "1"),
-    "strain_wave": ("%", "1"),
-    "omega": ("Hz", "rad/s"),
-    "phase_angle": ("deg", "rad"),
-    "viscosity": ("mPa*s", "Pa*s"),
-    "complex_viscosity": ("mPa*s", "Pa*s"),
-    "torque": ("mN*m", "N*m"),
-    "angular_velocity": ("1/min", "rad/s"),
-    "angle": ("deg", "rad"),
-    "radius": ("mm", "m"),
-    "diameter": ("mm", "m"),
-    "gap": ("mm", "m"),
-    "cone_angle": ("deg", "rad"),
-}
-"""Units of which either is usual; the last is that of SI."""
-
-_SHARE = 0.05
-"""Error of a ratio of columns up to which it is that of two units: they differ by 6 at least."""
+    **dict.fromkeys(("strain", "strain_amplitude", "strain_wave"), ("%", "1")),
+    **dict.fromkeys(("phase_angle", "angle", "cone_angle"), ("deg", "rad")),
+    **dict.fromkeys(("viscosity", "complex_viscosity"), ("mPa*s", "Pa*s")),
+    **dict.fromkeys(("radius", "diameter", "gap"), ("mm", "m")),
+    "omega": ("Hz", "rad/s"), "torque": ("mN*m", "N*m"), "angular_velocity": ("1/min", "rad/s"),
+}  # fmt: skip
+_SHARE = 0.05  # error of a ratio of columns up to which it is that of two units, which differ by 6
 
 
-@dataclass(frozen=True)
-class UnsaidUnit:
-    """A unit in which a column is read although the file does not give it.
-
-    `how`: told by the numbers, assumed, or to be asked for: until then `unit` stands in for it.
-    `why`: what tells it.
-    """
+class UnsaidUnit(NamedTuple):
+    """A unit in which a column is read although the file does not give it."""
 
     column: str
-    unit: str
-    how: Literal["told", "assumed", "asked"]
-    why: str = ""
+    unit: str  # stands in for it until it is said
+    how: Literal["told", "assumed", "asked"]  # by the numbers, as nothing else is usual, or not
+    why: str = ""  # what tells it
 
 
 def unsaid_unit(key: str, column: str, raw: Values, get: Get, table: NameTable) -> UnsaidUnit:
     """Return the unit of a column without one.
 
-    `get`: gives other columns of the block in SI units, None where it has no such column. `table`:
-    what quantities are called: an angular frequency is one in rad/s, a frequency may count.
+    `get`: gives other columns of the block in SI units, None where it has no such column. An
+    angular frequency is one in rad/s, a frequency may count.
     """
     choices = _CHOICES.get(key)
-    if key == "omega" and "frequency" not in table.find(column):
-        choices = None
-    if choices is None:
+    if choices is None or (key == "omega" and "frequency" not in table.find(column)):
         return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
-    told = _told(key, raw, get)
-    if told is not None:
+    if (told := _told(key, raw, get)) is not None:
         return UnsaidUnit(column, told[0], "told", told[1])
     return UnsaidUnit(column, choices[-1], "asked")
 
@@ -247,9 +208,11 @@ def _told(key: str, raw: Values, get: Get) -> tuple[str, str] | None:
     """Return the unit that other columns leave as the only one, and how they do."""
     if key == "phase_angle":
         # between 0 and a right angle, with some noise beyond
-        far = bool(np.nanmax(np.abs(raw)) > 1.05 * np.pi / 2.0) if np.isfinite(raw).any() else False
+        far = np.any(np.abs(raw) > 1.05 * np.pi / 2.0)
         return ("deg", "no angle of loss is that many radians") if far else None
-    size = _modulus(get)
+    size, storage, loss = get("complex_modulus"), get("Gp"), get("Gpp")
+    if size is None and storage is not None and loss is not None:
+        size = np.hypot(storage, loss)
     if key == "omega":
         viscosity = get("complex_viscosity")
         if size is None or viscosity is None:
@@ -259,30 +222,21 @@ def _told(key: str, raw: Values, get: Get) -> tuple[str, str] | None:
     if not key.startswith("strain"):
         return None
     factors = {"1": 1.0, "%": 0.01}
-    stress = next((get(k) for k in ("stress_amplitude", "stress") if get(k) is not None), None)
+    stress = next((s for k in ("stress_amplitude", "stress") if (s := get(k)) is not None), None)
     time, rate = get("time"), get("shear_rate")
-    ways = []
-    if stress is not None and size is not None:
-        ways.append((stress / size, "the stress is |G*| times it"))
-    if stress is not None and (modulus := get("relaxation_modulus")) is not None:
-        ways.append((stress / modulus, "the stress is G(t) times it"))
-    if stress is not None and (compliance := get("compliance")) is not None:
-        ways.append((stress * compliance, "it is J(t) times the stress"))
-    for made, why in ways:
-        told = _of_ratio(made, raw, factors, why)
-        if told is not None:
-            return told
+    if stress is not None:
+        modulus, compliance = get("relaxation_modulus"), get("compliance")
+        ways = [(size, "the stress is |G*| times it"), (modulus, "the stress is G(t) times it")]
+        made = [(stress / g, why) for g, why in ways if g is not None]
+        if compliance is not None:
+            made.append((stress * compliance, "it is J(t) times the stress"))
+        told = (_of_ratio(values, raw, factors, why) for values, why in made)
+        if (first := next(filter(None, told), None)) is not None:
+            return first
     if time is not None and rate is not None and len(time) > 2:
         steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
         return _of_ratio(steps, np.diff(raw), factors, "it grows as the rate says")
     return None
-
-
-def _modulus(get: Get) -> Values | None:
-    size, storage, loss = get("complex_modulus"), get("Gp"), get("Gpp")
-    if size is None and storage is not None and loss is not None:
-        size = np.hypot(storage, loss)
-    return size
 
 
 def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
@@ -294,29 +248,33 @@ def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
         return None
     # the middle alone is taken: a start, a rest and noise leave single rows far off
     middle = np.percentile(ratio, [30.0, 50.0, 70.0])
-    for unit, factor in factors.items():
-        if np.all(np.abs(middle / factor - 1.0) < _SHARE):
-            return unit, why
-    return None
+    near = (u for u, f in factors.items() if np.all(np.abs(middle / f - 1.0) < _SHARE))
+    return next(((unit, why) for unit in near), None)
 
 
-@dataclass
 class UnsaidUnits:
     """Units of all files of an import that none of them gives."""
 
-    found: dict[tuple[str, str], tuple[str, UnsaidUnit]] = field(default_factory=dict)
+    def __init__(self):
+        self.found: dict[tuple[str, str], tuple[str, UnsaidUnit]] = {}
 
     def add(self, file: str, units: Iterable[tuple[str, UnsaidUnit]]) -> None:
         """Add the units of a test that is imported, by quantity."""
         for key, unit in units:
             self.found.setdefault((key, unit.column), (file, unit))
 
+    def _of(self, how: str) -> tuple[list[tuple[str, UnsaidUnit]], str]:
+        """Return the quantities whose unit is told so, and the files, in words."""
+        said = [(key, file, one) for (key, _), (file, one) in self.found.items() if one.how == how]
+        files = list(dict.fromkeys(file for _, file, _ in said))
+        return [(key, one) for key, _, one in said], listed(files) if files else ""
+
     def require(self) -> None:
         """Raise InputError if there are units that only the user knows; asks for all of them."""
-        asked = {key: one for (key, _), (_, one) in self.found.items() if one.how == "asked"}
+        pairs, files = self._of("asked")
+        asked = dict(pairs)
         if not asked:
             return
-        files = dict.fromkeys(file for file, one in self.found.values() if one.how == "asked")
         options = "; ".join(
             f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
             for key, one in asked.items()
@@ -324,21 +282,20 @@ class UnsaidUnits:
         what = "a unit" if len(asked) == 1 else "the units"
         names = listed([shown(one.column) for one in asked.values()])
         raise InputError(
-            f"{listed(list(files))} does not give {what} of {names}, and the numbers do not tell. "
+            f"{files} does not give {what} of {names}, and the numbers do not tell. "
             f"Say which: {options}."
         )
 
     def warning(self) -> list[str]:
         """Return the sentence on what is taken as SI, if anything is."""
-        assumed = [(key, one) for (key, _), (_, one) in self.found.items() if one.how == "assumed"]
-        assumed = [(key, one) for key, one in assumed if QUANTITIES[key].unit]
+        pairs, files = self._of("assumed")
+        assumed = [(key, one) for key, one in pairs if QUANTITIES[key].unit]
         if not assumed:
             return []
-        files = dict.fromkeys(file for file, one in self.found.values() if one.how == "assumed")
         read = listed([f"{shown(one.column)} in {one.unit}" for _, one in assumed])
         key, one = assumed[-1]
         other = {"s": "min", "1/s": "1/min", "rad/s": "Hz"}.get(one.unit, f"m{one.unit}")
         return [
-            f"warning: {listed(list(files))} gives no units here, so SI is taken: {read}. If one "
+            f"warning: {files} gives no units here, so SI is taken: {read}. If one "
             f"is another, say so, as in --unit {key}={other}."
         ]

@@ -1,6 +1,7 @@
 """Quantities of a block in SI units: its columns, what follows from them, what its header says."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import PurePath
 
@@ -15,62 +16,39 @@ from discover.dataset.importing.quantities import (
     factor_to_si,
     guess_columns,
     name_rank,
+    split_name,
     to_celsius,
-    unit_in_name,
     unsaid_unit,
 )
 from discover.dataset.importing.text_export import Block
-from discover.dataset.importing.text_rows import (
-    Constant,
-    is_clock,
-    is_number,
-    seconds,
-    temperature_in,
-)
+from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
 from discover.dataset.tables.table import shown
 from discover.errors import InputError
 
+# what the instrument itself measures, from which each follows by the geometry of the tool
 INSTRUMENT = {
-    "stress": "torque",
-    "shear_rate": "angular_velocity",
-    "strain": "angle",
-    "N1": "normal_force",
-}
-"""What the instrument itself measures, from which each follows by the geometry of the tool."""
-
-_COEFFICIENTS = {"N1": "psi1", "N2": "psi2"}
-"""N1 = Ψ1 γ̇² and N2 = Ψ2 γ̇²."""
-
+    "stress": "torque", "shear_rate": "angular_velocity", "strain": "angle", "N1": "normal_force",
+}  # fmt: skip
+_COEFFICIENTS = {"N1": "psi1", "N2": "psi2"}  # N1 = Ψ1 γ̇² and N2 = Ψ2 γ̇²
+# a column of strain may be called the one or the other by who gives its unit
 SAME = {"strain": "strain_amplitude", "strain_amplitude": "strain"}
-"""A column of strain may be called the one or the other by who gives its unit."""
 
 Values = Float[np.ndarray, " n"]
 
 
 @dataclass
 class Readings:
-    """What a block says of each quantity.
-
-    `columns`: place of each quantity among its columns.
-    `mapping`: what the user says of units and tool.
-    `name`: of the file, for messages.
-    `geometry`: of the tool, from the mapping or the header; None where neither has it.
-    `begins`: reading of a clock of the whole measurement, in s, when the block before ended; else
-        0.
-    `used` in words, where each quantity that was asked for comes from.
-    `unsaid`: units of those quantities that the file does not give.
-    `notes` in words, what it says that cannot be.
-    """
+    """What a block says of each quantity."""
 
     block: Block
-    columns: dict[str, int]
-    mapping: Mapping
-    name: str
-    geometry: Geometry | None = None
-    begins: float = 0.0
-    used: dict[str, str] = field(default_factory=dict)
-    unsaid: dict[str, UnsaidUnit] = field(default_factory=dict)
-    notes: dict[str, str] = field(default_factory=dict)
+    columns: dict[str, int]  # place of each quantity among the columns
+    mapping: Mapping  # what the user says of units and tool
+    name: str  # of the file, for messages
+    geometry: Geometry | None = None  # of the tool; None where nobody says it
+    begins: float = 0.0  # reading of a clock of the whole measurement, in s, when the block began
+    used: dict[str, str] = field(default_factory=dict)  # whence each quantity asked for, in words
+    unsaid: dict[str, UnsaidUnit] = field(default_factory=dict)  # their units that nobody gives
+    notes: dict[str, str] = field(default_factory=dict)  # what it says that cannot be, in words
 
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
@@ -79,8 +57,8 @@ class Readings:
         Raises InputError if a name that the user gave stands above two columns.
         """
         given = {str(key): column for key, column in mapping.columns.items()}
-        table = name_table(mapping.names)
-        found = cls(block, guess_columns(block, given, table), mapping, name, mapping.geometry)
+        columns = guess_columns(block, given, name_table(mapping.names))
+        found = cls(block, columns, mapping, name, mapping.geometry)
         if found.geometry is None:
             found.geometry = found._geometry()
         return found
@@ -107,9 +85,15 @@ class Readings:
         """Return whether all of these are known, as `get` finds them."""
         return all(self.get(key) is not None for key in keys)
 
-    def alone(self, key: str) -> bool:
-        """Return whether a quantity is a column of its own, not one that follows from others."""
-        return key in self.columns
+    def alone(self, key: str) -> Values | None:
+        """Return a quantity that is a column of its own; None where it follows from others."""
+        return self.get(key) if key in self.columns else None
+
+    def whole(self, *keys: str) -> np.ndarray:
+        """Return the rows that have a number in each of these quantities."""
+        values = (self.get(key) for key in keys)
+        kept = [np.zeros(len(self), bool) if v is None else np.isfinite(v) for v in values]
+        return np.logical_and.reduce([np.ones(len(self), bool), *kept])
 
     @property
     def names(self) -> NameTable:
@@ -120,6 +104,12 @@ class Readings:
         """Return the quantities of which the block has a column or its header a number."""
         also = {SAME[key] for key in self.columns if key in SAME}
         return {*self.columns, *also, *(k for k in QUANTITIES if self._find_constant(k))}
+
+    def numbered(self) -> Iterator[str]:
+        """Yield the names of columns that hold numbers, but for those that number rows."""
+        passed = [self.columns.get(key) for key in ("point", "strain_wave", "stress_wave")]
+        names = [name for name, _ in self.block.columns]
+        yield from (names[i] for i in self.block.filled if i not in passed and names[i])
 
     def _unit_given(self, key: str) -> str:
         """Return the unit that the user says; of a strain also by the name of its amplitude."""
@@ -161,26 +151,28 @@ class Readings:
     def _column(self, key: str) -> Values:
         at = self.columns[key]
         column, unit = self.block.columns[at]
-        cells = [row[at] for row in self.block.cells]
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit else "")
-        if key == "time" and any(map(is_clock, cells)):
+        if key == "time" and any(is_clock(row[at]) for row in self.block.cells):
             self.used[key] = f"{shown(column)} [clock, in s]"
-            return seconds(cells, self._unit_given(key) or unit)
-        raw = np.array([float(cell) if is_number(cell) else math.nan for cell in cells])
-        unit = self._unit_given(key) or unit or unit_in_name(key, column, self.names)
+            return seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
+        raw = self.block.numbers[at]
+        if not (unit := self._unit_given(key) or unit):
+            split = split_name(key, column, self.names)
+            unit = "" if split is None else split[1]
         if key == "temperature":
             kelvin = to_celsius(0.0, unit or "°C")
             if kelvin is None:
                 return np.full(len(raw), math.nan)
             degrees = np.array([to_celsius(value, unit or "°C") for value in raw], dtype=float)
-            real = _is_temperature(degrees)
-            if not np.all(real | np.isnan(degrees)):
-                worst = cells[int(np.argmin(real | np.isnan(degrees)))]
+            wrong = ~(_is_temperature(degrees) | np.isnan(degrees))
+            if np.any(wrong):
+                worst = self.block.cells[int(np.argmax(wrong))][at]
                 self._no_temperature(f"{self.used[key]} {shown(worst)}")
-            return np.where(real, degrees, math.nan)
+            return np.where(wrong, math.nan, degrees)
         if not unit:
-            said = next((c.unit for c in self.block.constants if self._is_unit_line(c, key)), "")
-            unit = said or self._unsaid(key, column, raw)
+            lines = (c for c in self.block.constants if not c.value)
+            said = (c.unit for c in lines if self.names.rank(key, c.name) is not None)
+            unit = next(said, "") or self._unsaid(key, column, raw)
         factor = factor_to_si(key, unit, column, self.name)
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
         if key in self.unsaid and self.unsaid[key].how == "told":
@@ -191,68 +183,58 @@ class Readings:
 
     def _unsaid(self, key: str, column: str, raw: Values) -> str:
         """Return the unit in which a column without one is read, and keep it in `unsaid`."""
-        own = {QUANTITIES[k].column for k in QUANTITIES if QUANTITIES[k].unit}
+        own = {one.column for one in QUANTITIES.values() if one.unit}
         if column == QUANTITIES[key].column and own & {name for name, _ in self.block.columns}:
             return "1"  # a table of this project's own
         if key not in self.unsaid:
             used, unsaid = dict(self.used), dict(self.unsaid)
-            alone = {k: self._column for k in self.columns if k != key}
+            others = self.columns.keys() - {key}
             found = unsaid_unit(
-                key, column, raw, lambda k: alone[k](k) if k in alone else None, self.names
+                key, column, raw, lambda k: self._column(k) if k in others else None, self.names
             )
             # what tells a unit is not thereby part of the test
             self.used, self.unsaid = used, {**unsaid, key: found}
         return self.unsaid[key].unit
 
-    def _is_unit_line(self, constant: Constant, key: str) -> bool:
-        return not constant.value and self.names.rank(key, constant.name) is not None
-
     def _made(self, key: str) -> Values | None:
         """Return a quantity that follows from others of the same row."""
         source = INSTRUMENT.get(key)
         if source in self.columns and self.geometry is not None:
-            factor = _per_signal(self.geometry, key)
+            factor = self.geometry.per_signal(key)
             return None if factor is None else self._column(source) * factor
-        if key == "stress" and "viscosity" in self.columns:
-            rate = self.get("shear_rate")
-            return None if rate is None else self._column("viscosity") * rate
-        if key == "tensile_stress" and (grows := self._of_extension()) in self.columns:
-            rate = self.get("hencky_rate")
-            return None if rate is None else self._column(grows) * rate
-        if key in _COEFFICIENTS and _COEFFICIENTS[key] in self.columns:
-            rate = self.get("shear_rate")
-            return None if rate is None else self._column(_COEFFICIENTS[key]) * rate**2
         if key in ("Gp", "Gpp"):
             return self._moduli()[key == "Gpp"]
         if key == "strain_amplitude":
             if "strain" in self.columns:
                 return self._column("strain")
-            size = self.get("stress_amplitude")
-            storage, loss = self.get("Gp"), self.get("Gpp")
-            if size is not None and storage is not None and loss is not None:
-                return size / np.hypot(storage, loss)
-        return None
-
-    def _of_extension(self) -> str:
-        """Return which viscosity is one of extension: one alone beside a Hencky rate is."""
+            size, storage, loss = map(self.get, ("stress_amplitude", "Gp", "Gpp"))
+            if size is None or storage is None or loss is None:
+                return None
+            return size / np.hypot(storage, loss)
+        # a viscosity alone beside a Hencky rate is one of extension
         alone = "hencky_rate" in self.columns and "shear_rate" not in self.columns
         named = "extensional_viscosity" in self.columns
-        return "viscosity" if alone and not named else "extensional_viscosity"
+        tension = "viscosity" if alone and not named else "extensional_viscosity"
+        source, rate_key, power = {
+            "stress": ("viscosity", "shear_rate", 1),
+            "tensile_stress": (tension, "hencky_rate", 1),
+            "N1": ("psi1", "shear_rate", 2),
+            "N2": ("psi2", "shear_rate", 2),
+        }.get(key, ("", "", 0))
+        rate = self.get(rate_key) if source in self.columns else None
+        return None if rate is None else self._column(source) * rate**power
 
     def _moduli(self) -> tuple[Values | None, Values | None]:
-        if "phase_angle" in self.columns:
-            angle = self._column("phase_angle")
-        elif "loss_factor" in self.columns:
-            angle = np.arctan(self._column("loss_factor"))
-        else:
+        angle = self.alone("phase_angle")
+        if angle is None and (factor := self.alone("loss_factor")) is not None:
+            angle = np.arctan(factor)
+        if angle is None:
             return None, None
-        if "complex_modulus" in self.columns:
-            size = self._column("complex_modulus")
-        elif "complex_viscosity" in self.columns and (omega := self.get("omega")) is not None:
-            size = self._column("complex_viscosity") * omega
-        else:
-            return None, None
-        return size * np.cos(angle), size * np.sin(angle)
+        size = self.alone("complex_modulus")
+        if size is None and "complex_viscosity" in self.columns:
+            omega = self.get("omega")
+            size = None if omega is None else self._column("complex_viscosity") * omega
+        return (None, None) if size is None else (size * np.cos(angle), size * np.sin(angle))
 
     def _constant(self, key: str) -> float | None:
         """Return what the header says of the whole block, in SI units; None if nothing."""
@@ -265,8 +247,7 @@ class Readings:
                 "a number can be. Correct that line."
             )
         unit = self._unit_given(key) or found.unit
-        if not unit:
-            unit = self._unsaid(key, found.name, np.array([float(found.value)]))
+        unit = unit or self._unsaid(key, found.name, np.array([float(found.value)]))
         self.used[key] = f"{shown(found.name)} {found.value} {shown(unit)} of the header"
         return float(found.value) * factor_to_si(key, unit, found.name, self.name)
 
@@ -298,12 +279,6 @@ class Readings:
         except (InputError, ValueError):
             pass  # not a number of a tool; torque then needs --geometry
         return None
-
-
-def _per_signal(geometry: Geometry, key: str) -> float | None:
-    if key == "stress":
-        return geometry.stress_per_torque
-    return geometry.normal_stress_per_force if key == "N1" else geometry.strain_per_angle
 
 
 def _is_temperature(degrees):

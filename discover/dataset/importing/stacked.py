@@ -1,29 +1,41 @@
-"""The tests that one table holds: side by side, one below the other, or row by row in turn."""
+"""The tests that one table holds, apart, and the intervals of one test, together.
+
+Tests stand side by side, one below the other, or row by row in turn. What repeats tells them apart:
+a word or number in a column of its own, a temperature, a set value, a clock or a series of rates
+that starts again. Intervals of a thixotropy test are one run: what a structured fluid does in one
+depends on those before it   [Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214].
+"""
 
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from discover.dataset.importing.in_time import CONSTANT, every_row_differs, spread, up_and_down
 from discover.dataset.importing.mapping import Mapping
-from discover.dataset.importing.names import plain
-from discover.dataset.importing.quantities import to_celsius
+from discover.dataset.importing.names import name_table, plain
+from discover.dataset.importing.quantities import (
+    QUANTITIES,
+    guess_columns,
+    name_rank,
+    to_celsius,
+)
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
+from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words, said_of
 from discover.dataset.importing.text_rows import Constant, is_number, name_and_unit
 from discover.dataset.tables import units
 from discover.dataset.tables.units import read_unit
 from discover.errors import InputError
 
+# what a test measures; a table of several tests has one of these several times
 _ANSWERS = {
     "stress", "strain", "Gp", "Gpp", "torque", "angle", "tensile_stress", "viscosity", "compliance",
     "relaxation_modulus", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
 }  # fmt: skip
-"""What a test measures; a table of several tests has one of these several times."""
-
 _NUMBER = r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
 _LABEL = re.compile(
     rf"(?:(?P<name>[^=:]{{1,30}}?)\s*[=:]\s*)?(?P<value>{_NUMBER})\s*(?P<unit>[^\s0-9].{{0,15}}|1/.+)?"
@@ -32,63 +44,56 @@ _APART = re.compile(r"[\s_,;@(\[]+(?:(?:at|bei|à)\s+)?")
 _COUNTED = re.compile(r"(?P<base>.*(?:[^\W\d_]|[)\]'*]))[\s._#]*\(?(?P<count>[0-9]{1,3})\)?")
 
 
-@dataclass(frozen=True)
-class _Head:
-    """A column's name without what tells it from others of that name."""
+class _Head(NamedTuple):
+    """A column's name and unit without the label that tells it from others of that name."""
 
     base: str
     unit: str
-    label: str
+    label: str = ""
 
 
 def tests_side_by_side(block: Block) -> list[Block]:
     """Return the tests that stand side by side in a table, with the columns that they share."""
-    filled = [i for i in range(len(block.columns)) if any(is_number(row[i]) for row in block.cells)]
     first: dict[tuple[str, ...], int] = {}
-    for i in filled:  # a column that stands there twice is one
+    for i in block.filled:  # a column that stands there twice is one
         first.setdefault((*block.columns[i], *(row[i] for row in block.cells)), i)
     own = sorted(first.values())
-    for heads in (_heads(block), [_Head(name, unit, "") for name, unit in block.columns]):
+    for heads in (list(map(_head, block.columns)), [_Head(*column) for column in block.columns]):
         count = Counter(plain(heads[i].base) for i in own if heads[i].base)
         repeated = [i for i in own if count[plain(heads[i].base)] > 1]
         groups = _groups(repeated, heads, block.over)
-        answers = [any(_quantity(heads[i]) in _ANSWERS for i in group) for _, group in groups]
-        if len(groups) > 1 and all(answers):
+        if len(groups) > 1 and all(
+            any(_quantity(heads[i]) in _ANSWERS for i in group) for _, group in groups
+        ):
             return list(_columns(block, heads, own, groups))
     return [block]
 
 
-def _heads(block: Block) -> list[_Head]:
-    heads = []
-    for name, unit in block.columns:
-        head = _Head(name, unit, "")
-        inside, *label = re.split(r"\s*[,;@]\s*", unit, maxsplit=1)
-        if label:
-            head = _Head(name, inside, label[0])
-        elif _is_condition(unit):
-            head = _Head(name, "", unit)
-        elif _quantity(head):
-            pass
-        elif labelled := _labelled(name):
-            head = _Head(*name_and_unit(labelled[0], unit), labelled[1])
-        elif counted := _COUNTED.fullmatch(name):
-            base, within = name_and_unit(counted["base"], unit)
-            if _quantity(_Head(base, within, "")):
-                head = _Head(base, within, f"no. {counted['count']}")
-        heads.append(head)
-    return heads
-
-
-def _labelled(name: str) -> tuple[str, str] | None:
-    """Return a name and the condition that stands after it, as in "G' 20 °C"; None if none does."""
-    parts = ((name[: m.start()], name[m.end() :].strip(" )]")) for m in _APART.finditer(name))
-    return next((part for part in parts if part[0] and _is_condition(part[1])), None)
+def _head(column: tuple[str, str]) -> _Head:
+    name, unit = column
+    inside, *label = re.split(r"\s*[,;@]\s*", unit, maxsplit=1)
+    if label:
+        return _Head(name, inside, label[0])
+    if _is_condition(unit):
+        return _Head(name, "", unit)
+    if not _quantity(_Head(name, unit)):
+        # a condition may stand after the name, as in "G' 20 °C", or a count
+        for m in _APART.finditer(name):
+            before, after = name[: m.start()], name[m.end() :].strip(" )]")
+            if before and _is_condition(after):
+                return _Head(*name_and_unit(before, unit), after)
+        if counted := _COUNTED.fullmatch(name):
+            head = _Head(*name_and_unit(counted["base"], unit), f"no. {counted['count']}")
+            if _quantity(head):
+                return head
+    return _Head(name, unit)
 
 
 def _quantity(head: _Head) -> str | None:
     """Return which quantity a column of this name would be."""
-    block = Block("", ((head.base, head.unit),), (("1",),), 1)
-    return next(iter(Readings.of(block, Mapping(), "").columns), None)
+    table = name_table()
+    ranks = ((key, name_rank(key, head.base, head.unit, table)) for key in QUANTITIES)
+    return next((key for key, rank in ranks if rank is not None), None)
 
 
 def _groups(
@@ -97,19 +102,16 @@ def _groups(
     """Return what is said of each of the tests side by side, and its own columns."""
     labels = {i: heads[i].label or (over[i] if over else "") for i in repeated}
     by_label: dict[str, list[int]] = {}
-    for i in repeated:
-        by_label.setdefault(labels[i], []).append(i)
-    alone = all(
-        len({plain(heads[i].base) for i in group}) == len(group) for group in by_label.values()
-    )
-    if all(labels.values()) and alone and len(by_label) > 1:
-        return list(by_label.items())
     seen: Counter[str] = Counter()
     in_turn: dict[int, list[int]] = {}
     for i in repeated:
         base = plain(heads[i].base)
+        by_label.setdefault(labels[i], []).append(i)
         in_turn.setdefault(seen[base], []).append(i)
         seen[base] += 1
+    alone = all(len({plain(heads[i].base) for i in g}) == len(g) for g in by_label.values())
+    if all(labels.values()) and alone and len(by_label) > 1:
+        return list(by_label.items())
     said = [next(filter(None, (labels[i] for i in group)), "") for group in in_turn.values()]
     said = said if len(set(said)) == len(said) else [""] * len(said)
     return list(zip(said, in_turn.values(), strict=True))
@@ -122,9 +124,7 @@ def _columns(
     taken = {i for _, group in groups for i in group}
     shared: list[int] = []
     starts = [min(group) for _, group in groups]
-    for i in own:
-        if i in taken:
-            continue
+    for i in (i for i in own if i not in taken):
         before = [k for k, start in enumerate(starts) if start < i]
         if before and _quantity(heads[i]) in _ANSWERS | {"N1", "N2", "normal_force"}:
             groups[before[-1]][1].append(i)  # what one test has more than the others
@@ -132,11 +132,11 @@ def _columns(
             shared.append(i)
     for label, group in groups:
         columns = sorted([*shared, *group])
-        rows = [row for row in block.cells if any(is_number(row[i]) for i in group)]
+        part = block.rows(np.flatnonzero(~np.isnan(block.numbers[group]).all(axis=0)))
         names = tuple((heads[i].base, heads[i].unit) for i in columns)
-        cells = tuple(tuple(row[i] for i in columns) for row in rows)
-        part = replace(block, columns=names, cells=cells, over=(), apart=True)
-        known = set(Readings.of(part, Mapping(), "").columns)
+        cells = tuple(tuple(row[i] for i in columns) for row in part.cells)
+        part = replace(part, columns=names, cells=cells, over=(), apart=True)
+        known = set(guess_columns(part, {}, name_table()))
         said = [_constant(one, known) for one in label.split(", ")] if label else []
         constants = (*block.constants, *(one for one in said if one is not None))
         of = label or f"columns {min(group) + 1} to {max(group) + 1}"
@@ -151,8 +151,7 @@ def _is_condition(label: str) -> bool:
 def _constant(label: str, known: set[str]) -> Constant | None:
     """Return what stands above or beside names as the condition of a test, if it is one.
 
-    A number alone is what the columns lack: the rate of stresses over time, the temperature of all
-    else.
+    A number alone is what the columns lack: the rate of stresses over time, or the temperature.
     """
     found = _LABEL.fullmatch(label.strip("()[]@ "))
     if found is None or label.startswith("no. "):
@@ -181,80 +180,68 @@ def _name_of(unit: str) -> str | None:
     return next((name for kind, name in kinds if units.factor_to(read, kind) is not None), None)
 
 
-# What repeats tells them apart: a word or number in a column of its own, a temperature, a set
-# value, a clock or a series of rates that starts again.
-
-_FEWEST = 3
-"""Rows of a test."""
-
-_SAME_TEMPERATURE = 1.5
-"""Difference in °C up to which neighbouring readings are of one temperature."""
-
-_DRIFT = 3.0
-"""Spread in °C, up to which readings without a gap are one temperature, and no ramp."""
-
-_BACK = 0.1
-"""Share of the way so far, within which a clock is back at its start."""
-
-_MOSTLY = 0.6
-"""Share of steps in one direction, from which on values go that way."""
-
-_Rows = Int[np.ndarray, " m"]
+_FEWEST = 3  # rows of a test
+_SAME_TEMPERATURE = 1.5  # °C up to which neighbouring readings are of one temperature
+_DRIFT = 3.0  # spread in °C, up to which readings without a gap are one temperature, and no ramp
+_BACK = 0.1  # share of the way so far, within which a clock is back at its start
+_MOSTLY = 0.6  # share of steps in one direction, from which on values go that way
 
 
 @dataclass(frozen=True)
 class _Piece:
     """Rows of one test, and whether those before are of another sample or temperature."""
 
-    rows: _Rows
+    rows: Int[np.ndarray, " m"]
     apart: bool = False
     told_by: tuple[int, ...] = ()
 
+    def by_value(self, values: np.ndarray, column: int) -> "list[_Piece]":
+        """Return the rows of each value, in the order of their first; all of them if one has few.
+
+        `values`: of a column in these rows, shape (m,).
+        """
+        _, first, group = np.unique(values, return_index=True, return_inverse=True)
+        if len(first) < 2 or np.min(np.bincount(group)) < _FEWEST:
+            return [self]
+        told = (*self.told_by, column)
+        return [_Piece(self.rows[group == k], True, told) for k in np.argsort(first)]
+
 
 def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
-    """Return the tests that stand one below the other, or row by row in turn.
-
-    `mapping`, `name`: what the user says of the file, and its name.
-    """
+    """Return the tests that stand one below the other, or row by row in turn."""
     readings = Readings.of(block, mapping, name)
     pieces = [_Piece(np.arange(len(readings)), block.apart)]
     for split in (_by_words, _by_temperature, _by_restart, _by_set_value):
         pieces = [part for piece in pieces for part in split(readings, piece)]
     if len(pieces) == 1:
         return [block]
-    parts = []
-    for piece in pieces:
-        told = tuple(dict.fromkeys((*piece.told_by, *_told_by(block, pieces))))
-        first = block.cells[int(piece.rows[0])]
-        label = ", ".join(_said(block.columns[i], first[i]) for i in told[:2])
-        parts.append(replace(
-            block,
-            name=_joined(block.name, label or f"from line {block.line + int(piece.rows[0])} on"),
-            cells=tuple(block.cells[int(i)] for i in piece.rows),
-            line=block.line + int(piece.rows[0]),
-            apart=piece.apart,
-            told_by=tuple(block.columns[i][0] for i in told),
-        ))  # fmt: skip
-    return parts
-
-
-def _joined(name: str, label: str) -> str:
-    return ", ".join(filter(None, (name, label)))
-
-
-def _said(column: tuple[str, str], cell: str) -> str:
-    name, unit = column
-    return f"{name} {cell} {unit}".strip() if is_number(cell) else cell
-
-
-def _told_by(block: Block, pieces: Sequence[_Piece]) -> list[int]:
-    """Return the columns that have one value in each of the tests, and not one in all."""
-    told = []
+    # the columns that have one value in each of the tests, and not one in all
+    told_by = []
     for i in range(len(block.columns)):
         values = [{block.cells[int(row)][i] for row in piece.rows} for piece in pieces]
         if all(len(one) == 1 for one in values) and len(set.union(*values)) > 1:
-            told.append(i)
-    return told
+            told_by.append(i)
+    parts = []
+    for piece in pieces:
+        told = tuple(dict.fromkeys((*piece.told_by, *told_by)))
+        first = block.cells[int(piece.rows[0])]
+        line = block.line + int(piece.rows[0])
+        said = [
+            f"{block.columns[i][0]} {first[i]} {block.columns[i][1]}".strip()
+            if is_number(first[i])
+            else first[i]
+            for i in told[:2]
+        ]
+        label = ", ".join(said) or f"from line {line} on"
+        part = replace(
+            block.rows(piece.rows),
+            name=", ".join(filter(None, (block.name, label))),
+            line=line,
+            apart=piece.apart,
+            told_by=tuple(block.columns[i][0] for i in told),
+        )
+        parts.append(part)
+    return parts
 
 
 def _by_words(readings: Readings, piece: _Piece) -> list[_Piece]:
@@ -262,40 +249,30 @@ def _by_words(readings: Readings, piece: _Piece) -> list[_Piece]:
     for i, (name, _) in enumerate(readings.block.columns):
         if found := OF_TESTS.fullmatch(plain_words(name)):
             words = np.array([readings.block.cells[int(row)][i] for row in piece.rows])
-            parts = _by_value(piece, words, i)
+            parts = piece.by_value(words, i)
             if len(parts) > 1:
                 return parts if found["sample"] else [replace(one, apart=False) for one in parts]
     return [piece]
 
 
-def _by_value(piece: _Piece, values: np.ndarray, column: int) -> list[_Piece]:
-    """Return the rows of each value, in the order of their first; all of them if one has few."""
-    _, first, group = np.unique(values, return_index=True, return_inverse=True)
-    if len(first) < 2 or np.min(np.bincount(group)) < _FEWEST:
-        return [piece]
-    told = (*piece.told_by, column)
-    return [_Piece(piece.rows[group == k], True, told) for k in np.argsort(first)]
-
-
 def _by_temperature(readings: Readings, piece: _Piece) -> list[_Piece]:
     """Split where readings of temperature gather about a few values, other than along a record."""
-    if not readings.alone("temperature"):
-        return [piece]
-    values = readings.get("temperature")
-    assert values is not None
-    degrees = values[piece.rows]
+    column = readings.alone("temperature")
+    degrees = np.empty(0) if column is None else column[piece.rows]
     known = np.isfinite(degrees)
-    if np.sum(known) < 2 * _FEWEST or (_goes_on(readings, piece) and not _sweeps(readings, piece)):
+    if np.sum(known) < 2 * _FEWEST:
+        return [piece]
+    time = _values(readings, "time", piece)
+    if time is not None and np.all(np.diff(time) > 0.0) and not _sweeps(readings, piece):
         return [piece]
     order = np.sort(degrees[known])
     cuts = order[1:][np.diff(order) > _SAME_TEMPERATURE] - 0.5 * _SAME_TEMPERATURE
     group = np.searchsorted(cuts, degrees)
     # a row without a reading is at the temperature of that before it
-    last = np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))
-    group = group[last]
+    group = group[np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))]
     spreads = [np.ptp(degrees[known & (group == k)]) for k in np.unique(group)]
-    return [piece] if max(spreads) > _DRIFT else _by_value(
-        piece, group, readings.columns["temperature"])  # fmt: skip
+    drifts = max(spreads) > _DRIFT
+    return [piece] if drifts else piece.by_value(group, readings.columns["temperature"])
 
 
 def _by_set_value(readings: Readings, piece: _Piece) -> list[_Piece]:
@@ -310,7 +287,7 @@ def _by_set_value(readings: Readings, piece: _Piece) -> list[_Piece]:
         cells = np.array([readings.block.cells[int(row)][i] for row in piece.rows])
         if len(np.unique(cells)) > len(cells) // _FEWEST:
             continue
-        parts = _by_value(piece, cells, i)
+        parts = piece.by_value(cells, i)
         rises = all(np.all(np.diff(time[np.isin(piece.rows, part.rows)]) > 0.0) for part in parts)
         if len(parts) > 1 and rises and (len(best) == 1 or len(parts) < len(best)):
             best = parts
@@ -329,13 +306,11 @@ def _by_restart(readings: Readings, piece: _Piece) -> list[_Piece]:
             values = np.log(np.maximum(np.abs(values), 1e-300))
         elif np.mean(np.diff(values) > 0.0) < _MOSTLY:
             continue
-        cuts = _restarts(values)
-        if cuts:
-            parts = np.split(piece.rows, cuts)
-            apart = [piece.apart, *([key != "time"] * len(cuts))]
-            return [
-                _Piece(rows, one, piece.told_by) for rows, one in zip(parts, apart, strict=True)
-            ]
+        if cuts := _restarts(values):
+            first, *later = np.split(piece.rows, cuts)
+            apart = key != "time"
+            return [replace(piece, rows=first), *(replace(piece, rows=rows, apart=apart)
+                                                  for rows in later)]  # fmt: skip
     return [piece]
 
 
@@ -352,26 +327,17 @@ def _restarts(values: Float[np.ndarray, " m"]) -> list[int]:
         if abs(values[i] - values[begin]) <= _BACK * way:
             cuts.append(int(i))
             begin = int(i)
-    sizes = np.diff([0, *cuts, len(values)])
-    return cuts if np.min(sizes) >= _FEWEST else []
+    return cuts if np.min(np.diff([0, *cuts, len(values)])) >= _FEWEST else []
 
 
 def _values(readings: Readings, key: str, piece: _Piece) -> Float[np.ndarray, " m"] | None:
     """Return a column of its own in the rows of a test; None if it lacks one in some."""
-    if not readings.alone(key):
-        return None
     try:
-        values = readings.get(key)
+        values = readings.alone(key)
     except InputError:  # said where the block is read, if it is
         return None
-    assert values is not None
-    values = values[piece.rows]
+    values = np.empty(0) if values is None else values[piece.rows]
     return values if len(values) > 2 * _FEWEST - 1 and np.all(np.isfinite(values)) else None
-
-
-def _goes_on(readings: Readings, piece: _Piece) -> bool:
-    time = _values(readings, "time", piece)
-    return time is not None and bool(np.all(np.diff(time) > 0.0))
 
 
 def _sweeps(readings: Readings, piece: _Piece) -> bool:
@@ -390,7 +356,102 @@ def _strain_varies(readings: Readings) -> bool:
         strain = readings.get("strain_amplitude")
     except InputError:
         return False
-    if strain is None or not np.isfinite(strain).any():
+    size = np.empty(0) if strain is None else np.abs(strain[np.isfinite(strain)])
+    return bool(len(size) and np.max(size) > 1.2 * np.min(size))
+
+
+_SAME_RATE, _ANOTHER_RATE = 1.3, 5.0
+_SAME_STRESS = 0.1  # over the stress: an interval repeats another, and starts as that did
+
+Numbered = tuple[int, Block]
+
+
+def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) -> list[Numbered]:
+    """Return numbered blocks of a file, those that are intervals of one thixotropy test as one.
+
+    Words say that they are, or three rates of which the last is the first again, or rates that go
+    up and then down with stresses that differ. A block that the user names a test for is left.
+    """
+    left, found = list(blocks), []
+    while left:
+        number, first = left[0]
+        several: list[Block] = []
+        for at, block in left:  # as many as have the same columns and are nobody's choice
+            chosen = mapping.test_of(file, at)
+            # an import that is repeated knows the whole by the number of its first interval
+            free = chosen is None or (not several and chosen == "run")
+            if not free or (several and block.apart) or block.columns != first.columns:
+                break
+            several.append(block)
+        count = _how_many(several, mapping, file)
+        found.append((number, first if count < 2 else _as_one(several[:count], mapping, file)))
+        left = left[max(count, 1) :]
+    return found
+
+
+def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
+    """Return how many of these blocks, from the first on, are one test."""
+    if len(blocks) < 2:
+        return 0
+    said = said_of(blocks[0], file)
+    all_are = said is not None and said.test in ("loop", "intervals")
+    ways: list[tuple[np.ndarray, np.ndarray]] = []  # rates and stresses
+    for block in blocks if all_are else blocks[:3]:
+        try:
+            readings = Readings.of(block, mapping, file)
+            rate, stress = readings.get("shear_rate"), readings.get("stress")
+        except InputError:  # said where the block is read
+            break
+        if rate is None or stress is None or readings.has("omega", "Gp"):
+            break
+        kept = np.isfinite(rate) & np.isfinite(stress)
+        if np.sum(kept) < 3:
+            break
+        ways.append((rate[kept], stress[kept]))
+    if all_are:
+        return len(ways)
+    if len(ways) > 1 and _is_loop(*ways[:2]):
+        return 2
+    if len(ways) < 3:
+        return 0
+    held = [float(np.median(rate)) if spread(rate) < CONSTANT else 0.0 for rate, _ in ways]
+    loops = held[1] and _is_loop(ways[0], ways[2])
+    return 3 if loops or _recovers(*held, ways[0][1], ways[2][1]) else 0
+
+
+def _recovers(first, second, third, before: np.ndarray, after: np.ndarray) -> bool:
+    """Return whether the third rate is the first again, after another, and what it does is not."""
+    if not (first and second and third) or min(first / third, first / second) <= 0.0:
         return False
-    size = np.abs(strain[np.isfinite(strain)])
-    return bool(np.max(size) > 1.2 * np.min(size))
+    again, other = first / third, first / second
+    if max(again, 1.0 / again) > _SAME_RATE or max(other, 1.0 / other) < _ANOTHER_RATE:
+        return False
+    both = min(len(before), len(after))
+    apart = np.median(np.abs(before[:both] - after[:both]))
+    return bool(apart > _SAME_STRESS * np.max(np.abs(before)))
+
+
+def _is_loop(up: tuple[np.ndarray, np.ndarray], down: tuple[np.ndarray, np.ndarray]) -> bool:
+    """Return whether rates go up and then down with other stresses."""
+    if not (every_row_differs(up[0]) and every_row_differs(down[0])):
+        return False
+    both = up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))
+    return both is not None and both.apart
+
+
+def _as_one(blocks: Sequence[Block], mapping: Mapping, file: str) -> Block:
+    """Return intervals one after the other; a clock that starts again goes on."""
+    first = blocks[0]
+    at = Readings.of(first, mapping, file).columns.get("time")
+    cells: list[tuple[str, ...]] = []
+    last = 0.0
+    for block in blocks:
+        times = [float(row[at]) for row in block.cells if at is not None and is_number(row[at])]
+        begin = last if times and cells and times[0] <= last else 0.0
+        for row in block.cells:
+            if at is not None and is_number(row[at]):
+                last = begin + float(row[at])
+                row = (*row[:at], repr(last), *row[at + 1 :])
+            cells.append(row)
+    name = " to ".join(dict.fromkeys(block.name for block in (first, blocks[-1]) if block.name))
+    return replace(first, name=name, cells=tuple(cells))

@@ -1,21 +1,21 @@
-"""Blocks of numbers in a table of cells, with the names and units above them.
+"""Blocks of numbers in a table of cells, with the names, the units and the words above them.
 
 One reader serves plain tables, TRIOS (text, CSV, "Export to LIMS" and spreadsheets; blocks headed
-``[step]``), RheoCompass (blocks headed ``Interval data:``), rSpace and RheoWin, since all are the
-same thing: a line of names, perhaps a line of units, then lines of numbers, some of which begin
-with a word. What a block is called is read from the lines above it, or is that word. The reader of
-hermes-rheo was considered for TRIOS: its version 2.0.0 pins older scipy, pandas and matplotlib
-than are used here and brings piblin, mastercurves, openpyxl and numdifftools along, for a format of
-four lines; it does not read RheoCompass, and TRIOS' other text export neither.
+``[step]``), RheoCompass (``Interval data:``), rSpace and RheoWin: all are a line of names, perhaps
+a line of units, then lines of numbers, some of which begin with a word. What a block is called is
+read from the lines above it, or is that word. hermes-rheo 2.0.0 reads TRIOS' four lines alone, pins
+older scipy, pandas and matplotlib and brings piblin, mastercurves, openpyxl and numdifftools along.
 """
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
+from jaxtyping import Float
 from numpy.typing import ArrayLike
 
 from discover.dataset.importing.text_rows import (
@@ -38,9 +38,8 @@ _WORDS_FOR_NAME = (
     "intervalle et points de données:", "step name", "test:",
 )  # fmt: skip
 _POINT_OF_SEGMENT = re.compile(r"([0-9]+)\|[0-9]+")
+# a line of one cell that is neither a name with its value nor a number
 _TITLE = re.compile(r"[^:=;]*[^\W\d_]{3}[^:=;]*")
-"""A line of one cell that is neither a name with its value nor a number."""
-
 _DATA_POINT = "data point"
 _FEWEST = 3
 
@@ -54,7 +53,6 @@ OF_TESTS = re.compile(
     rf"((?P<sample>{_OF_SAMPLES})|{_OF_STEPS})s?( (name|id|no|nr|number|index|label))?#?"
 )
 """Names of columns that say which sample or step a row is of, as `plain_words` gives them."""
-
 _INVALID = re.compile(r"\((invalid|invalide|ungültig)\)", re.IGNORECASE)
 
 
@@ -122,6 +120,24 @@ class Block:
         cells = tuple(tuple("" if x != x else repr(x) for x in row) for row in rows)
         return cls(name, heads, cells, 1)
 
+    @cached_property
+    def numbers(self) -> Float[np.ndarray, "columns n"]:
+        """The cells as numbers, nan where one is none; read once."""
+        rows = [[float(c) if is_number(c) else np.nan for c in row] for row in self.cells]
+        return np.array(rows, dtype=float).reshape(len(rows), len(self.columns)).T
+
+    @cached_property
+    def filled(self) -> tuple[int, ...]:
+        """The columns that hold a number."""
+        return tuple(np.flatnonzero(~np.isnan(self.numbers).all(axis=1)).tolist())
+
+    def rows(self, chosen: Sequence[int] | np.ndarray) -> "Block":
+        """Return the block of some rows, with what is read of them already."""
+        kept = [int(i) for i in chosen]
+        part = replace(self, cells=tuple(self.cells[i] for i in kept))
+        part.__dict__["numbers"] = self.numbers[:, kept]
+        return part
+
 
 def plain_words(name: str) -> str:
     """Return the words of a name in small letters, without signs between them."""
@@ -151,17 +167,15 @@ def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
     blocks: list[Block] = []
     header: _Columns | None = None
     over: tuple[str, ...] = ()
-    above: list[Sequence[str]] = list(rows[: header_row or 0])
     read, i = 0, header_row or 0
+    above: list[Sequence[str]] = list(rows[:i])
     head: Rows = ()
     while i < len(rows):
         if not _is_numbers(rows[i]):
             above.append(rows[i])
             i += 1
             continue
-        end = i
-        while end < len(rows) and _is_numbers(rows[end]):
-            end += 1
+        end = next((k for k in range(i, len(rows)) if not _is_numbers(rows[k])), len(rows))
         # numbers after an empty line alone stand under the names of those before
         if any(any(row) for row in rows[read:i]) or not read:
             header, over = _header(rows, i, header_row)
@@ -189,18 +203,15 @@ def _by_label(
             f"The table from line {data + 1} on has {width} columns and {end - data} rows; the "
             f"limit is {MOST_CELLS} cells. Keep the columns and rows of the measurement."
         )
-    name = _name(rows, data)
-    numbered = enumerate(rows[data:end], start=data + 1)
-    groups = [
-        (label, list(lines)) for label, lines in groupby(numbered, key=lambda pair: _label(pair[1]))
-    ]
+    numbered = list(enumerate(rows[data:end], start=data + 1))
+    groups = [(label, list(lines)) for label, lines in groupby(numbered, lambda p: _label(p[1]))]
     alone = sum(bool(label) and len(lines) < 2 for label, lines in groups)
-    if alone > 2 and 2 * alone > len(groups):  # a column of words or of the time of day
-        groups = [("", [line for _, lines in groups for line in lines])]
-    if OF_TESTS.fullmatch(plain_words(header[0][0])) and not _POINT_OF_SEGMENT.fullmatch(
-        rows[data][0]
-    ):
-        groups = [("", [line for _, lines in groups for line in lines])]  # split as any such column
+    # a column of words or of the time of day; or one that splits as any such column does
+    is_column = alone > 2 and 2 * alone > len(groups)
+    splits = OF_TESTS.fullmatch(plain_words(header[0][0]))
+    if is_column or (splits and not _POINT_OF_SEGMENT.fullmatch(rows[data][0])):
+        groups = [("", numbered)]
+    name = _name(rows, data)
     for label, lines in groups:
         if label and label != _DATA_POINT and len(lines) < 2:
             continue  # a line about the measurement, such as the number of its points
@@ -238,18 +249,18 @@ def _header(
     rows: Rows, data: int, header_row: int | None
 ) -> tuple[_Columns | None, tuple[str, ...]]:
     """Return names and units of the columns above the numbers, and what stands above the names."""
+    units: Sequence[str] = []
     if header_row is not None:
-        at, names = header_row - 1, rows[header_row - 1]
-        between = [row for row in rows[header_row:data] if any(row)]
-        units = between[0] if between else []
+        at = header_row - 1
+        units = next((row for row in rows[header_row:data] if any(row)), units)
     else:
         above = [i for i in range(max(0, data - 6), data) if any(rows[i])]
         if not above or _is_numbers(rows[above[-1]]):
             return None, ()
-        has_units = len(above) > 1 and _are_units(rows[above[-1]], rows[above[-2]])
-        units = rows[above[-1]] if has_units else []
-        at = above[-2] if has_units else above[-1]
-        names = rows[at]
+        at = above[-1]
+        if len(above) > 1 and _are_units(rows[at], rows[above[-2]]):
+            at, units = above[-2], rows[at]
+    names = list(rows[at])
     # a line of names may begin as a comment does
     if names and names[0].startswith(("#", "%")):
         first = names[0].lstrip("#% ")
@@ -259,18 +270,14 @@ def _header(
     columns = [name_and_unit(name, unit) for name, unit in zip(names, units, strict=False)]
     if not any(name for name, _ in columns):
         return None, ()
-    return tuple(columns), _over(rows[max(0, at - 2) : at], width)
-
-
-def _over(rows: Rows, width: int) -> tuple[str, ...]:
-    """Return what the lines above the names say of each column, a cell holding for those after."""
+    # what the lines above the names say of each column, a cell holding for those after
     labels = [""] * width
-    for row in rows:
+    for row in rows[max(0, at - 2) : at]:
         cell = ""
         for i in range(width) if sum(map(bool, row)) > 1 else ():
             cell = (row[i] if i < len(row) else "") or cell
             labels[i] = ", ".join(filter(None, (labels[i], cell)))
-    return tuple(labels)
+    return tuple(columns), tuple(labels)
 
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
@@ -339,29 +346,21 @@ _WORDS: dict[SaidTest, str] = {
 _PATTERNS: dict[SaidTest, re.Pattern[str]] = {
     test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()
 }
-
 _SAY_THE_TEST = re.compile(
     r"test|type|mode|experiment|method|procedure|measurement|title|name|step|segment|action"
     r"|result|versuch|messung|art|essai|ensayo|prova|interval+e?|task|試験|测试|測定",
     re.IGNORECASE,
 )
 _OTHERS_NAME = re.compile(r"(file|sample|user|company|geometry|instrument|operator)", re.IGNORECASE)
-_LONGEST = 8
-"""Words of a line beyond which it is prose, of which nothing is taken."""
+_LONGEST = 8  # words of a line beyond which it is prose, of which nothing is taken
 
 
-@dataclass(frozen=True)
-class Said:
-    """What words say of a test.
-
-    `test`: which it is.
-    `words`: those that say it, as the file has them.
-    `by_file_name`: whether only the name of the file says so, which the numbers overrule.
-    """
+class Said(NamedTuple):
+    """What words say of a test."""
 
     test: SaidTest
-    words: str
-    by_file_name: bool = False
+    words: str  # as the file has them
+    by_file_name: bool = False  # nothing else says so, and the numbers overrule it
 
 
 def said_of(block: Block, file: str) -> Said | None:
@@ -369,27 +368,23 @@ def said_of(block: Block, file: str) -> Said | None:
 
     The name of its step comes first, then the lines above it, the nearest first, then the file's.
     """
-    stem = re.sub(r"[_-]+", " ", file.rpartition(".")[0] or file)
     for words in (block.name, *_titles(block.above)):
-        test = _named(words)
-        if test is not None:
+        if (test := _named(words)) is not None:
             return Said(test, words)
-    test = _named(stem)
+    test = _named(re.sub(r"[_-]+", " ", file.rpartition(".")[0] or file))
     return None if test is None else Said(test, file, by_file_name=True)
 
 
 def _named(words: str) -> SaidTest | None:
-    found: list[SaidTest] = [t for t, pattern in _PATTERNS.items() if pattern.search(words)]
-    if "recovery" in found and "creep" in found:  # one run, or "recovery after creep"
-        places = [_PATTERNS[test].search(words) for test in ("recovery", "creep")]
-        first = min(places, key=lambda place: place.start() if place else 0)
-        found.remove("creep" if first is places[0] else "recovery")
-    if {"planar", "biaxial"} & set(found):
-        found = [test for test in found if test != "uniaxial"]
-    if {"loop", "intervals"} & set(found):  # made of ramps or of steps, and relaxing meanwhile
-        found = [test for test in found if test in ("loop", "intervals")]
+    places = {t: m.start() for t, pattern in _PATTERNS.items() if (m := pattern.search(words))}
+    if {"recovery", "creep"} <= set(places):  # one run, or "recovery after creep"
+        places.pop("creep" if places["recovery"] <= places["creep"] else "recovery")
+    if {"planar", "biaxial"} & set(places):
+        places.pop("uniaxial", None)
+    # made of ramps or of steps, and relaxing meanwhile
+    found = [t for t in places if t in ("loop", "intervals")] or list(places)
     if "flow_curve" in found and "ramp" in found:
-        found = ["ramp"]
+        return "ramp"
     return found[0] if len(found) == 1 else None
 
 

@@ -6,10 +6,9 @@ import io
 import re
 import unicodedata
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -18,6 +17,8 @@ from discover.dataset.importing.names import code_page_of
 from discover.dataset.tables.table import read_bytes
 from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
+
+Decimal = Literal[".", ","]
 
 _DATE = (
     r"(?:(?P<year>\d{4})[-/.](?P<month>\d{1,2})[-/.](?P<day>\d{1,2})"
@@ -48,14 +49,14 @@ def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
     # is the first of May
     found = [m for m in matches if m]
-    months = [int(m["second"]) for m in found if m["second"]]
-    days = [int(m["first"]) for m in found if m["first"]]
-    american = any(m["half"] and m["mark"] == "/" for m in found) and max(days, default=0) <= 12
-    american = american or max(months, default=0) > 12
+    most = {key: max((int(m[key]) for m in found if m["second"]), default=0)
+            for key in ("first", "second")}  # fmt: skip
+    american = any(m["half"] and m["mark"] == "/" for m in found) and most["first"] <= 12
+    american = american or most["second"] > 12
     in_hours = re.fullmatch(r"h+\W?m+(?:in)?", unit.strip().lower()) is not None
     values = np.array([_reading(m, american, in_hours) for m in matches])
-    known = np.flatnonzero(np.isfinite(values))
-    if not len(known):
+    known = np.isfinite(values)
+    if not known.any():
         return values
     clock = values[known]
     # a day goes by where a clock without a date falls back by more than half of one
@@ -69,45 +70,34 @@ def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
 def _reading(match: re.Match | None, american: bool, in_hours: bool) -> float:
     if match is None:
         return np.nan
-    numbers = [float((match[key] or "0").replace(",", ".")) for key in _UNITS]
+    parts = ("hours", "minutes", "seconds")
+    hours, minutes, rest = (float((match[key] or "0").replace(",", ".")) for key in parts)
     if in_hours and match["hours"] is None:
-        numbers = [numbers[1], numbers[2], 0.0]
+        hours, minutes, rest = minutes, rest, 0.0
     if match["half"]:
-        numbers[0] = numbers[0] % 12 + 12.0 * (match["half"][0] in "Pp")
-    time = 3600.0 * numbers[0] + 60.0 * numbers[1] + numbers[2] + _DAY * int(match["days"] or 0)
-    if match["year"]:
-        date = int(match["year"]), int(match["month"]), int(match["day"])
-    elif match["last"]:
-        day, month = int(match["first"]), int(match["second"])
-        year = int(match["last"])
-        date = (year if year > 99 else 2000 + year, *((day, month) if american else (month, day)))
-    else:
+        hours = hours % 12 + 12.0 * (match["half"][0] in "Pp")
+    time = 3600.0 * hours + 60.0 * minutes + rest + _DAY * int(match["days"] or 0)
+    if not (match["year"] or match["last"]):
         return time
+    date = [match[key] for key in ("year", "month", "day")]
+    if not match["year"]:
+        month, day = ("first", "second") if american else ("second", "first")
+        date = [match["last"] if len(match["last"]) > 2 else f"20{match['last']}"]
+        date += [match[month], match[day]]
     try:
-        return datetime(*date, tzinfo=UTC).timestamp() + time
+        return datetime(*map(int, date), tzinfo=UTC).timestamp() + time
     except ValueError:  # no such day
         return np.nan
 
 
-_UNITS = ("hours", "minutes", "seconds")
-
-
-Decimal = Literal[".", ","]
-
 DELIMITERS = {"tab": "\t", "semicolon": ";", "comma": ",", "space": " "}
-
-LARGEST_EXPORT = 100_000_000
-"""Bytes of an export as text, of a spreadsheet's when it is unpacked."""
-
-MOST_CELLS = 10_000_000
-"""Cells of a table; more take gigabytes, and hundreds of samples are enough for a test."""
+LARGEST_EXPORT = 100_000_000  # bytes as text, of a spreadsheet when it is unpacked
+MOST_CELLS = 10_000_000  # more take gigabytes, and hundreds of samples are enough for a test
+_FEWER = "Export fewer samples, or one test a file."
 
 _POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-
-
-_FEWER = "Export fewer samples, or one test a file."
 
 
 def is_number(cell: str) -> bool:
@@ -123,9 +113,8 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    `delimiter`: name from `DELIMITERS`; found from the file if None. `decimal`: decimal sign; found
-    from the file if None. `encoding`: of the text; found from the file if None. Raises InputError
-    if the file cannot be read, or its decimal sign cannot be told from its thousands separator.
+    `delimiter` (a name of `DELIMITERS`), `decimal`, `encoding`: found from the file if None. Raises
+    InputError if the file cannot be read, or a decimal comma may be of thousands.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()
@@ -146,9 +135,7 @@ def read_rows(
             f"{path.name} cannot be split into columns ({error}). Give the text export of a "
             "rheometer, and check --delimiter."
         ) from None
-    if mark == ",":
-        decimal = "."
-    return with_points(rows, path.name, decimal)
+    return with_points(rows, path.name, "." if mark == "," else decimal)
 
 
 def with_points(
@@ -156,8 +143,8 @@ def with_points(
 ) -> list[list[str]]:
     """Return rows of cells without spaces around them, numbers with decimal points.
 
-    `decimal`: decimal sign; found from the cells if None. Raises InputError if the decimal sign
-    cannot be told from the thousands separator.
+    `decimal`: decimal sign; found from the cells if None. Raises InputError if it may be the
+    separator of thousands.
     """
     rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
     sign = decimal or _decimal(rows, name)
@@ -182,42 +169,34 @@ def _tidy(cell: str) -> str:
     return plain if is_number(plain) or _COMMA.fullmatch(plain) else cell
 
 
+# encodings of Python in which no instrument writes a file
+_NO_TEXT = {"idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape", "utf_7"}
+
+
 def _decode(content: bytes, name: str, encoding: str | None) -> str:
     if encoding is None:
-        if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
-            encoding = "utf-16"
-        elif content[1:2] == b"\0":
-            encoding = "utf-16-le"
-        else:
-            encoding = "utf-8-sig"
-    if not _is_encoding(encoding):
+        marked = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+        in_pairs = "utf-16-le" if content[1:2] == b"\0" else "utf-8-sig"
+        encoding = "utf-16" if marked else in_pairs
+    try:
+        known = codecs.lookup(encoding).name.replace("-", "_") not in _NO_TEXT
+        "0".encode(encoding)  # some are no encodings of text
+    except (LookupError, ValueError):
+        known = False
+    if not known:
         raise InputError(
             f"There is no encoding {encoding[:60]!r} of text; try utf-8, utf-16 or cp1252."
         )
     try:
         text = content.decode(encoding)
     except UnicodeError:
+        if encoding != "utf-8-sig":
+            raise InputError(f"{name} is not text in {encoding}. Try another --encoding.") from None
         # instruments on Windows write µ, ° and · so; and the letters of the country
-        known = encoding == "utf-8-sig"
-        text = content.decode(code_page_of(content), "replace") if known else None
-    if text is None:
-        raise InputError(f"{name} is not text in {encoding}. Try another --encoding.")
+        text = content.decode(code_page_of(content), "replace")
     if "\0" in text:
         raise InputError(f"{name} is not text. Export it as text or CSV from the rheometer.")
     return text
-
-
-_NO_TEXT = ("idna", "punycode", "undefined", "unicode_escape", "raw_unicode_escape", "utf-7")
-"""Encodings of Python in which no instrument writes a file."""
-
-
-def _is_encoding(name: str) -> bool:
-    try:
-        known = codecs.lookup(name).name
-        "0".encode(name)  # some are no encodings of text
-    except (LookupError, ValueError):
-        return False
-    return known.replace("-", "_") not in {other.replace("-", "_") for other in _NO_TEXT}
 
 
 def _delimiter(lines: list[str]) -> str:
@@ -259,28 +238,14 @@ _UNIT = re.compile(
     r"[#%\s]*([^:=#%]{1,40}?)[\s_]+(?:units?|einheit|unité)\s*[:=]\s*(\S.{0,19})", re.I
 )
 _WITH_KEY = re.compile(rf"[#%\s]*([^:=#%]{{1,40}}?)\s*[:=]\s*{_VALUE}")
-_DEGREES = re.compile(
-    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
-    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])"
-)
-_KELVIN_FROM = 200.0
-"""Below which a melt or a solution is frozen, in K."""
-
-_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
 
 
-@dataclass(frozen=True)
-class Constant:
-    """A number that holds for a whole block.
+class Constant(NamedTuple):
+    """A number that holds for a whole block."""
 
-    `name`: as the file writes it.
-    `value`: with a decimal point; empty where the line gives a unit alone, as "Rate Unit: 1/s".
-    `unit`: empty where the file gives none.
-    """
-
-    name: str
-    value: str
-    unit: str
+    name: str  # as the file writes it
+    value: str  # with a decimal point; empty where the line gives a unit alone: "Rate Unit: 1/s"
+    unit: str  # empty where the file gives none
 
 
 def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
@@ -296,27 +261,28 @@ def constants_of(rows: Sequence[Sequence[str]]) -> tuple[Constant, ...]:
 def _constants(cells: Sequence[str]) -> Iterator[Constant]:
     if not 1 <= len(cells) <= 8:
         return
-    value = _ALONE.fullmatch(" ".join(cells[1:3]))
-    if value and len(cells) <= 3:
-        yield _constant(cells[0], *value.groups())
-        return
-    for part in " ".join(cells).split(";"):
-        if unit := _UNIT.fullmatch(part.strip()):
+    value = _ALONE.fullmatch(" ".join(cells[1:3])) if len(cells) <= 3 else None
+    parts = [] if value else [part.strip() for part in " ".join(cells).split(";")]
+    said = [(cells[0], *value.groups())] if value else []
+    for part in parts:
+        if unit := _UNIT.fullmatch(part):
             yield Constant(unit[1], "", unit[2])
-            continue
-        match = _WITH_KEY.fullmatch(part.strip())
-        if match:
-            yield _constant(*match.groups())
+        elif match := _WITH_KEY.fullmatch(part):
+            said.append(match.groups())
+    for name, number, unit in said:
+        name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
+        yield Constant(name, number.replace(",", "."), unit)
 
 
-def _constant(name: str, number: str, unit: str | None) -> Constant:
-    name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
-    return Constant(name, number.replace(",", "."), unit)
-
-
+_DEGREES = re.compile(
+    r"(?:(?<![^\s_=(\[,;@])-)?(?<![\w.,])([0-9]+(?:[.,][0-9]+)?)\s*_?"
+    r"(?:°|º|˚|deg(?:rees?)?[\s_]*)?\s*([CcK]|celsius|kelvin)(?![^\W_])"
+)
 _AS_SYMBOL = re.compile(
     r"(?<![^\W_])T(?:emp(?:erature)?)?\s*=\s*(-?[0-9]+(?:[.,][0-9]+)?)(?![\w.,%°])"
 )
+_TO = re.compile(r"[0-9]\s*(?:°?\s*C)?\s*(?:to|bis|à|-|–|\.\.)\s*$")
+_KELVIN_FROM = 200.0  # K; below it a melt or a solution is frozen
 
 
 def temperature_in(text: str) -> Constant | None:
@@ -328,14 +294,12 @@ def temperature_in(text: str) -> Constant | None:
     text = text.replace("_", " ")
     for match in _DEGREES.finditer(text):
         value = match[1].replace(",", ".")
-        unit = match[2][0].upper()
+        unit = "°C" if match[2][0].upper() == "C" else "K"
         if _TO.search(text[: match.start()]):
             return None  # a ramp
-        if unit == "C" or _KELVIN_FROM <= float(value) <= 700.0:
-            sign = "-" if match[0].startswith("-") else ""
-            found[sign + value, unit] = Constant(
-                "temperature", sign + value, "°C" if unit == "C" else "K"
-            )
+        if unit == "°C" or _KELVIN_FROM <= float(value) <= 700.0:
+            signed = f"-{value}" if match[0].startswith("-") else value
+            found[signed, unit] = Constant("temperature", signed, unit)
     if not found and (match := _AS_SYMBOL.search(text)):
         value = match[1].replace(",", ".")
         if abs(float(value)) < _KELVIN_FROM:  # from there on it may be in kelvin

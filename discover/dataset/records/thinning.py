@@ -175,6 +175,12 @@ def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float
     return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
 
 
+def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np.ndarray:
+    """Return what samples lie off the straight line between their neighbours, shape (n - 2,)."""
+    share = (place[1:-1] - place[:-2]) / (place[2:] - place[:-2])
+    return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
+
+
 _CORNER = 0.01  # share of the largest rate, or stress, that was imposed
 _ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
 
