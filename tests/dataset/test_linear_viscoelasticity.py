@@ -4,7 +4,7 @@ from independent import Giesekus, Modes
 from independent.sweeps import modulus_of
 
 from discover.dataset import LinearSweep, RelaxationSpectrum, load_dataset, relaxation_spectrum
-from discover.dataset.checking.sweeps import sweep_inertia
+from discover.dataset.checking.linear_theory import sweep_inertia
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 

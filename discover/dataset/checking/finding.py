@@ -7,6 +7,7 @@ from typing import Any, Literal, get_args
 import pandas as pd
 
 from discover.notebook_view import NotebookView
+from discover.words import counted
 
 Severity = Literal["error", "warning", "note"]
 
@@ -49,8 +50,7 @@ class Findings(tuple[Finding, ...], NotebookView):
     @property
     def counts(self) -> str:
         """How many there are of each severity, in words."""
-        numbers = ((severity, len(self.of(severity))) for severity in get_args(Severity))
-        return ", ".join(f"{n} {severity}{'' if n == 1 else 's'}" for severity, n in numbers)
+        return ", ".join(counted(len(self.of(one)), one) for one in get_args(Severity))
 
     def _shown(self) -> Iterable[Any]:
         yield f"{self.counts}." if self else "Nothing wrong was found."

@@ -2,17 +2,20 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from discover.dataset.checking.finding import Finding, Findings
-from discover.dataset.checking.linear_theory import against_linear_theory, doubts_of_sweep
+from discover.dataset.checking.linear_theory import (
+    against_linear_theory,
+    doubts_of_amplitude_sweep,
+    doubts_of_sweep,
+)
 from discover.dataset.checking.normal_stress import doubts_of_normal_stress
 from discover.dataset.checking.runs import doubts_among_runs, doubts_of_run, doubts_of_temperature
-from discover.dataset.checking.start import doubts_of_start, doubts_of_unseen_start
-from discover.dataset.checking.sweeps import doubts_of_amplitude_sweep
+from discover.dataset.checking.start import doubts_of_start
 from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
@@ -38,19 +41,14 @@ from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, read_table, shown
+from discover.dataset.tables.units import Quantity
 from discover.errors import InputError, problems_in
 
 _RUN_QUANTITIES = (
-    units.TIME,
-    units.SHEAR_RATE,
-    units.SHEAR_STRESS,
-    units.FIRST_NORMAL_STRESS_DIFFERENCE,
-    units.SECOND_NORMAL_STRESS_DIFFERENCE,
-    units.STRAIN,
-    units.HENCKY_RATE,
-    units.TENSILE_STRESS,
+    units.TIME, units.SHEAR_RATE, units.SHEAR_STRESS, units.FIRST_NORMAL_STRESS_DIFFERENCE,
+    units.SECOND_NORMAL_STRESS_DIFFERENCE, units.STRAIN, units.HENCKY_RATE, units.TENSILE_STRESS,
     units.HENCKY_STRAIN,
-)
+)  # fmt: skip
 _SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
 _TABLE_QUANTITIES = (*_RUN_QUANTITIES, *_SWEEP_QUANTITIES, COMPLIANCE, RELAXATION_MODULUS)
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
@@ -88,42 +86,8 @@ def check_folder(
         before = rates_before(index, None)
     except InputError as error:
         return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
-    unused: dict[str, list[str]] = {}
-    converted: dict[str, list[str]] = {}
-    runs, of_runs = _runs(root, index, before, unused, converted)
-    findings += of_runs
-    for column, files in unused.items():
-        text = f"The column {shown(column)} in {_files(files)} is not used."
-        findings.append(Finding("note", "columns", files[0], text))
-    sweep, spectrum, said = _sweep(root, converted)
-    _convert_tables(root, index, converted)
-    for text, files in converted.items():
-        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
-    findings += said
-    findings += _transients(runs, sweep, spectrum)
-    if clock_factor is None and not _shift_columns(index):
-        findings += doubts_of_temperature(runs)
-    tables, of_tables = _tables(root, index, sweep)
-    findings += of_tables
-    findings += _folder(root, index, [*runs, *tables.values()])
-    rank = {"error": 0, "warning": 1, "note": 2}
-    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
-
-
-def _errors(what: str, where: str, error: InputError) -> list[Finding]:
-    return [Finding("error", what, where, one) for one in problems_in(str(error))]
-
-
-def _runs(
-    root: Path,
-    index: Table,
-    before: np.ndarray | None,
-    unused: dict[str, list[str]],
-    converted: dict[str, list[str]],
-) -> tuple[list[Run], list[Finding]]:
-    """Return the runs that can be read, and what is wrong or doubtful in each; fill the columns."""
+    seen = _Columns(root)
     runs: list[Run] = []
-    findings: list[Finding] = []
     for row, name in enumerate(index.columns["file"]):
         try:
             reason = reason_to_set_aside(index, row, rate_before=True)
@@ -137,25 +101,34 @@ def _runs(
             findings += _errors("run", name, error)
             continue
         findings += doubts_of_run(runs[-1])
-        findings += _columns(root, name, unused, converted)
-    return runs, findings
-
-
-def _transients(
-    runs: list[Run], sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
-) -> list[Finding]:
-    """Return what is doubtful in runs at a given rate: each, against linear theory, together."""
+        findings += seen.of_run(name)
+    for column, files in seen.unused.items():
+        text = f"The column {shown(column)} in {_files(files)} is not used."
+        findings.append(Finding("note", "columns", files[0], text))
+    sweep, spectrum, said = _sweep(root, seen)
+    for name in (f"{kind}.csv" for kind in TABLES):
+        if name not in index.columns["file"] and (root / name).is_file():
+            seen.note_conversions(name, _TABLE_QUANTITIES)
+    for text, files in seen.converted.items():
+        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
+    findings += said
     transients = [run for run in runs if run.protocol.control == "rate"]
-    findings: list[Finding] = []
     for run in transients:
-        doubts = list(doubts_of_start(run, sweep, spectrum))
-        if not doubts and spectrum is None:
-            doubts = doubts_of_unseen_start(run)
-        findings += doubts
+        findings += doubts_of_start(run, sweep, spectrum)
         findings += doubts_of_normal_stress(run, sweep, spectrum)
     findings += against_linear_theory(transients, sweep, spectrum)
     findings += doubts_among_runs(transients)
-    return findings
+    if clock_factor is None and not _shift_columns(index):
+        findings += doubts_of_temperature(runs)
+    tables, of_tables = _tables(root, index, sweep)
+    findings += of_tables
+    findings += _folder(root, index, [*runs, *tables.values()])
+    rank = {"error": 0, "warning": 1, "note": 2}
+    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
+
+
+def _errors(what: str, where: str, error: InputError) -> list[Finding]:
+    return [Finding("error", what, where, one) for one in problems_in(str(error))]
 
 
 def _tables(
@@ -233,53 +206,55 @@ def _files(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
 
 
-def _columns(
-    root: Path, name: str, unused: dict[str, list[str]], converted: dict[str, list[str]]
-) -> Iterator[Finding]:
-    """Collect columns that nobody reads and conversions; yield what looks like a slip."""
-    try:
-        columns = tuple(read_table(root / name, name).columns)
-        found = [units.find_column(columns, quantity) for quantity in _RUN_QUANTITIES]
-    except InputError:
-        return
-    pairs = list(zip(_RUN_QUANTITIES, found, strict=True))
-    _note_conversions(name, pairs, converted)
-    used = {column[0] for column in found if column is not None}
-    missing = [q for q, column in pairs if column is None]
-    for column in columns:
-        if column in used:
-            continue
-        meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
-        slips = [q for q in missing if column.startswith(f"{q.stem}_")]
-        if meant and column.lower() != "strain":
-            text = (
-                f"The column {column} in {name} is not read. If it holds {meant[0].stem}, rename "
-                f"it to {meant[0].column}."
-            )
-            yield Finding("warning", "columns", name, text)
-        elif slips:
-            text = (
-                f"The column {shown(column)} in {name} is not read: it ends in no unit of "
-                f"{slips[0].stem}. If it holds that, rename it to {slips[0].column}."
-            )
-            yield Finding("warning", "columns", name, text)
-        else:
-            unused.setdefault(column, []).append(name)
+class _Columns:
+    """What the columns of the files are read as, over all of them."""
 
+    def __init__(self, root: Path):
+        self._root = root
+        self.unused: dict[str, list[str]] = {}  # files by column
+        self.converted: dict[str, list[str]] = {}  # files by what is done to a column
 
-def _note_conversions(
-    name: str,
-    found: Iterable[tuple[units.Quantity, tuple[str, float] | None]],
-    converted: dict[str, list[str]],
-) -> None:
-    for quantity, column in found:
-        text = "" if column is None else units.conversion_note(*column, quantity)
-        if text:
-            converted.setdefault(text, []).append(name)
+    def note_conversions(self, name: str, quantities: Sequence[Quantity]) -> dict[Quantity, str]:
+        """Keep which columns of a file are converted; return the column of each quantity."""
+        self._all: tuple[str, ...] = ()
+        try:
+            self._all = tuple(read_table(self._root / name, name).columns)
+            found = {one: units.find_column(self._all, one) for one in quantities}
+        except InputError:
+            return {}  # said when it is read
+        known = {one: column for one, column in found.items() if column is not None}
+        for quantity, (column, factor) in known.items():
+            if text := units.conversion_note(column, factor, quantity):
+                self.converted.setdefault(text, []).append(name)
+        return {one: column for one, (column, _) in known.items()}
+
+    def of_run(self, name: str) -> Iterator[Finding]:
+        """Yield what looks like a slip in the columns of a run; keep those that nobody reads."""
+        known = self.note_conversions(name, _RUN_QUANTITIES)
+        missing = [one for one in _RUN_QUANTITIES if one not in known]
+        for column in self._all if known else ():
+            if column in known.values():
+                continue
+            meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
+            slips = [q for q in missing if column.startswith(f"{q.stem}_")]
+            if meant and column.lower() != "strain":
+                text = (
+                    f"The column {column} in {name} is not read. If it holds {meant[0].stem}, "
+                    f"rename it to {meant[0].column}."
+                )
+            elif slips:
+                text = (
+                    f"The column {shown(column)} in {name} is not read: it ends in no unit of "
+                    f"{slips[0].stem}. If it holds that, rename it to {slips[0].column}."
+                )
+            else:
+                self.unused.setdefault(column, []).append(name)
+                continue
+            yield Finding("warning", "columns", name, text)
 
 
 def _sweep(
-    root: Path, converted: dict[str, list[str]]
+    root: Path, seen: _Columns
 ) -> tuple[LinearSweep | None, RelaxationSpectrum | None, list[Finding]]:
     try:
         sweep = find_sweep(root)
@@ -291,33 +266,13 @@ def _sweep(
             "declared or fitted, and a wrong one looks like a missing effect."
         )
         return None, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
-    columns = tuple(read_table(root / SWEEP_FILE).columns)
-    pairs = [(quantity, units.find_column(columns, quantity)) for quantity in _SWEEP_QUANTITIES]
-    _note_conversions(SWEEP_FILE, pairs, converted)
+    seen.note_conversions(SWEEP_FILE, _SWEEP_QUANTITIES)
     try:
         spectrum = relaxation_spectrum(sweep)
     except (InputError, RuntimeError, np.linalg.LinAlgError) as error:
         text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
         return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
-
-
-def _convert_tables(root: Path, index: Table, converted: dict[str, list[str]]) -> None:
-    """Collect the conversions of the tables beside the runs."""
-    for name in (f"{kind}.csv" for kind in TABLES):
-        if name in index.columns["file"] or not (root / name).is_file():
-            continue
-        try:
-            columns = tuple(read_table(root / name).columns)
-            pairs = [(q, units.find_column(columns, q)) for q in _TABLE_QUANTITIES]
-        except InputError:
-            continue  # said when it is read
-        _note_conversions(name, pairs, converted)
-
-
-def _digest(run: Run) -> bytes:
-    """Return what tells runs of different samples apart, however many there are."""
-    return hashlib.sha256(run.time.tobytes() + run.recorded.tobytes()).digest()
 
 
 def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
@@ -334,7 +289,9 @@ def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
             )
     seen: dict[bytes, str] = {}
     for run in runs:
-        first = seen.setdefault(_digest(run), run.name)
+        # what tells runs of different samples apart, however many there are
+        digest = hashlib.sha256(run.time.tobytes() + run.recorded.tobytes()).digest()
+        first = seen.setdefault(digest, run.name)
         if first != run.name:
             text = (
                 f"{run.name} holds the same samples as {first}. Held out, a copy of a fitted "

@@ -1,14 +1,15 @@
 """First normal stress differences that no fluid can have, told without any law."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.runs import is_start_up, local_noise
+from discover.dataset.checking.runs import is_start_up, local_noise, steady_stress
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
@@ -33,50 +34,44 @@ _FEWEST_LEFT = 10
 _SLOW, _SECOND_ORDER_FACTOR = 0.3, 3.0
 # Laun's rule is one of experience, and holds to some ten per cent where Cox's and Merz's does
 _COX_MERZ, _LAUN_FACTOR = 1.15, 2.0
-_STEADY = 0.1  # most change of the stress in the last fifth
+
+Values = Float[np.ndarray, " n"]
 
 
 def doubts_of_normal_stress(
     run: Run, sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
 ) -> Iterator[Finding]:
-    """Yield why the N1 of a start-up of shear cannot be right.
+    """Yield why the N1 of a start-up of shear cannot be right; nothing of any other run.
 
-    `run`: any run; nothing is said of one that is no start-up of shear with its N1. `sweep`,
-    `spectrum`: the linear sweep and its modes, without which a run is held against itself alone.
+    `sweep`, `spectrum`: without them a run is held against itself alone.
     """
-    normal = run.first_normal_stress_difference
-    if normal is None:
-        return
-    for fault in _faults(run, normal, sweep, spectrum):
+    for fault in _faults(run, sweep, spectrum):
         yield Finding("warning", "N1", run.name, f"N1 in {run.name} {fault.why}")
 
 
-@dataclass(frozen=True)
-class _Fault:
-    """Why an N1 cannot be right.
+class _Fault(NamedTuple):
+    """Why an N1 cannot be right."""
 
-    `why`: the rest of a sentence that begins with the record, and what to do.
-    `until`: time in s from which on the record may be right; infinite if that is never.
-    """
-
-    why: str
-    until: float = np.inf
+    why: str  # the rest of a sentence that begins with the record, and what to do
+    until: float = np.inf  # time in s from which on the record may be right, if ever
 
 
 def sound_normal_stress(
     runs: Sequence[Run], sweep: LinearSweep | None
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Return from when on the N1 of runs may be right, and why of those of which it never is.
+    """Return from when on, in s, the N1 of runs may be right, and why of those that never are.
 
-    Times in s by name of the run, the samples up to which cannot be right; and reasons by name.
-    Runs without N1, or of which nothing can be said, are in neither.
+    By name of the run. Runs without N1, or of which nothing can be said, are in neither.
     """
-    there = [(run, n1) for run in runs if (n1 := run.first_normal_stress_difference) is not None]
-    spectrum = _spectrum(sweep) if there and sweep is not None else None
+    there = [run for run in runs if run.first_normal_stress_difference is not None]
+    spectrum = None
+    if there and sweep is not None:
+        with suppress(InputError):  # the check of the folder says why
+            spectrum = relaxation_spectrum(sweep)
     late: dict[str, float] = {}
     never: dict[str, str] = {}
-    for run, normal in there:
-        faults = list(_faults(run, normal, sweep, spectrum))
+    for run in there:
+        faults = list(_faults(run, sweep, spectrum))
         lasting = [fault for fault in faults if fault.until == np.inf]
         if lasting:
             never[run.name] = f"it {lasting[0].why.rstrip('.')}"
@@ -85,44 +80,35 @@ def sound_normal_stress(
     return late, never
 
 
-def _spectrum(sweep: LinearSweep) -> RelaxationSpectrum | None:
-    try:
-        return relaxation_spectrum(sweep)
-    except InputError:  # the check of the folder says why
-        return None
-
-
 def _faults(
-    run: Run,
-    normal: Float[np.ndarray, " n"],
-    sweep: LinearSweep | None,
-    spectrum: RelaxationSpectrum | None,
+    run: Run, sweep: LinearSweep | None, spectrum: RelaxationSpectrum | None
 ) -> Iterator[_Fault]:
+    normal = run.first_normal_stress_difference
     in_shear = run.protocol.control == "rate" and run.flow == "shear" and run.from_rest
-    if not (in_shear and is_start_up(run)):
+    if normal is None or not (in_shear and is_start_up(run)):
         return
-    early = _early(run, normal)
-    if early is not None:
+    if (early := _early(run, normal)) is not None:
         yield early
+    rate, end = abs(float(run.rate[0])), float(np.median(normal[-max(3, len(run) // 10) :]))
+    if end < 0 and rate * run.time[-1] > _SMALL_STRAIN:
+        yield _Fault(
+            f"ends negative ({end:.3g} Pa). Few fluids do that; check its sign and the baseline of "
+            "the normal force."
+        )
     lasting = (
-        _negative_end(run, normal),
-        None if spectrum is None else _second_order(run, normal, spectrum),
-        None if sweep is None else _laun(run, normal, sweep),
+        None if spectrum is None else _second_order(rate, end, spectrum),
+        None if sweep is None else _laun(run, rate, end, sweep),
     )
     yield from (_Fault(why) for why in lasting if why is not None)
 
 
-def _end(run: Run, values: Float[np.ndarray, " n"]) -> float:
-    return float(np.median(values[-max(3, len(run) // 10) :]))
-
-
-def _averaged(values: Float[np.ndarray, " n"], width: int) -> Float[np.ndarray, " _"]:
+def _averaged(values: Values, width: int) -> Float[np.ndarray, " _"]:
     """Return means over so many samples around each; at an end those of the last whole window."""
     means = np.mean(np.lib.stride_tricks.sliding_window_view(values, width), axis=1)
     return np.pad(means, (width // 2, width - 1 - width // 2), mode="edge")
 
 
-def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
+def _early(run: Run, normal: Values) -> _Fault | None:
     """Hold N1 against what elasticity allows in start-up from rest.
 
     With every mode elastic N1 = σ12 γ (Lodge & Meissner 1972, Rheol. Acta 11, 351); relaxation
@@ -170,56 +156,35 @@ def _early(run: Run, normal: Float[np.ndarray, " n"]) -> _Fault | None:
     )
 
 
-def _negative_end(run: Run, normal: Float[np.ndarray, " n"]) -> str | None:
-    end = _end(run, normal)
-    if end >= 0 or abs(run.rate[0]) * run.time[-1] <= _SMALL_STRAIN:
-        return None
-    return (
-        f"ends negative ({end:.3g} Pa). Few fluids do that; check its sign and the baseline of the "
-        "normal force."
-    )
-
-
-def _second_order(
-    run: Run, normal: Float[np.ndarray, " n"], spectrum: RelaxationSpectrum
-) -> str | None:
+def _second_order(rate: float, end: float, spectrum: RelaxationSpectrum) -> str | None:
     """Hold the last N1 of a slow run against N1 = 2 γ̇² Σ G_k λ_k²   [Coleman & Markovitz 1964]."""
     moment = spectrum.mean_relaxation_time * spectrum.zero_shear_viscosity
-    rate = abs(run.rate[0])
+    most = 2.0 * moment * rate**2
     if spectrum.elastic_modulus or rate * spectrum.mean_relaxation_time > _SLOW:
         return None
-    end, most = _end(run, normal), 2.0 * moment * rate**2
-    if 0 <= end <= _SECOND_ORDER_FACTOR * most:
-        return None
-    return (
+    return None if 0 <= end <= _SECOND_ORDER_FACTOR * most else (
         f"ends at {end:.3g} Pa; at this slow rate the linear sweep predicts a value between 0 and "
         f"{most:.3g} Pa, quadratic in the rate. The normal force is below what the transducer "
         "resolves, or has a baseline."
-    )
+    )  # fmt: skip
 
 
-def _laun(run: Run, normal: Float[np.ndarray, " n"], sweep: LinearSweep) -> str | None:
+def _laun(run: Run, rate: float, end: float, sweep: LinearSweep) -> str | None:
     """Hold a steady N1 against Laun's rule where Cox's and Merz's holds of the same run.
 
     N1 = 2G′(1 + (G′/G″)²)^0.7 and σ12 = |G*| at ω = γ̇   [Laun 1986, J. Rheol. 30, 459].
     """
-    omega, rate = sweep.angular_frequency, abs(run.rate[0])
-    tail = np.abs(run.stress[run.time > 0.8 * run.time[-1]])
-    if not omega[0] <= rate <= omega[-1] or len(tail) < 3:
-        return None
-    if np.ptp(tail) > _STEADY * np.median(tail):
+    omega, steady = sweep.angular_frequency, steady_stress(run)
+    if steady is None or not omega[0] <= rate <= omega[-1]:
         return None
     storage, loss = (
         float(np.exp(np.interp(np.log(rate), np.log(omega), np.log(np.maximum(values, 1e-300)))))
         for values in (sweep.storage_modulus, sweep.loss_modulus)
     )
-    ratio = float(np.median(tail)) / np.hypot(storage, loss)
-    if not 1.0 / _COX_MERZ < ratio < _COX_MERZ:
+    rule = 2.0 * storage * (1.0 + (storage / loss) ** 2) ** 0.7
+    if not 1.0 / _COX_MERZ < steady / np.hypot(storage, loss) < _COX_MERZ:
         return None
-    end, rule = _end(run, normal), 2.0 * storage * (1.0 + (storage / loss) ** 2) ** 0.7
-    if rule / _LAUN_FACTOR <= end <= rule * _LAUN_FACTOR:
-        return None
-    return (
+    return None if rule / _LAUN_FACTOR <= end <= rule * _LAUN_FACTOR else (
         f"ends at {end:.3g} Pa where Laun's rule has {rule:.3g} Pa, though the stress of the same "
         "run follows the rule of Cox and Merz. A baseline, or a gap that gives way, does that."
-    )
+    )  # fmt: skip

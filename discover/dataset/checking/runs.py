@@ -6,19 +6,16 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.checking.finding import Finding
-from discover.dataset.records.thinning import beside_a_step
+from discover.dataset.records.thinning import bends, beside_a_step
 from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
 from discover.statistics.noise.held_values import read_times
 
-FEWEST_SAMPLES = 10
-"""Runs with fewer samples than this say little about a law."""
+FEWEST_SAMPLES = 10  # runs with fewer say little about a law
 
 # A spike stands out of its neighbours by this many standard deviations of the local noise, and by
 # this part of the largest stress: the first keeps noisy runs quiet, the second rounded ones
-_SPIKE_SIGMAS = 10.0
-_SPIKE_SHARE = 0.03
-
+_SPIKE_SIGMAS, _SPIKE_SHARE = 10.0, 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
@@ -26,57 +23,59 @@ _FEWEST_PER_CYCLE = 16
 _SPREAD_OF_BENDS = 1.4826 / np.sqrt(1.5)
 _NEIGHBOURHOOD = 31
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
+# Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
+# band) stays within this factor
+_UNIT_FACTOR = 30.0
+# In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11): within the gain of most records
+_ONE_TEMPERATURE = 2.0
 
 
 def doubts_of_run(run: Run) -> Iterator[Finding]:
     """Yield what is doubtful about a run."""
-
-    def warn(subject: str, text: str) -> Finding:
-        return Finding("warning", subject, run.name, text)
-
+    source = str(run.metadata.get("shear_rate_source", ""))
     if "thinned" in run.metadata:
         yield Finding("note", "samples", run.name, f"{run.name}: {run.metadata['thinned']}.")
-    if str(run.metadata.get("shear_rate_source", "")).startswith("derived"):
-        source = run.metadata["shear_rate_source"]
+    if source.startswith("derived"):
         yield Finding("note", "rate", run.name, f"{run.name}: the shear rate is {source}.")
     if len(run) < FEWEST_SAMPLES:
-        yield warn(
-            "samples", f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
-        )
+        text = f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
+        yield Finding("warning", "samples", run.name, text)
     if run.protocol.control != "rate":
-        yield from _at_given_stress(run)
-        return
-    if not run.flows:
-        yield warn(
-            "rate",
-            f"The shear rate in {run.name} is zero throughout, so nothing flows. Leave the run "
-            "out, unless it follows a flow.",
-        )
-        return
-    if not np.any(run.stress):
-        yield warn("stress", f"The stress in {run.name} is zero throughout. Check the column.")
-        return
-    if len(run) < 3:
-        return
-    if np.ptp(run.stress) <= 1e-9 * np.max(np.abs(run.stress)):
-        yield warn(
-            "stress",
-            f"The stress in {run.name} is the same in every sample: a steady value or a command "
-            "rather than a record. Check the column.",
-        )
-        return
-    yield from _outliers(run)
-    yield from _held_values(run)
-    yield from _clock_start(run)
-    yield from _strain(run)
-    if np.ptp(run.rate) <= 1e-6 * np.max(np.abs(run.rate)):
-        if run.from_rest and np.any(run.rate):
-            yield from _start_up(run)
+        doubts = _at_given_stress(run)
+    elif unusable := _unusable(run):
+        doubts = (unusable,)
+    elif len(run) < 3:
+        doubts = ()
     else:
-        yield from _cycles(run)
+        doubts = (
+            _outliers(run), _held_values(run), _clock_start(run),
+            None if "derived" in source else _strain(run), *_by_course(run),
+        )  # fmt: skip
+    for subject, text in filter(None, doubts):
+        yield Finding("warning", subject, run.name, text)
 
 
-def _at_given_stress(run: Run) -> Iterator[Finding]:
+Doubt = tuple[str, str] | None
+"""Subject and text of a warning, if there is one."""
+
+
+def _unusable(run: Run) -> Doubt:
+    if not run.flows:
+        return "rate", (
+            f"The shear rate in {run.name} is zero throughout, so nothing flows. Leave the run "
+            "out, unless it follows a flow."
+        )
+    if not np.any(run.stress):
+        return "stress", f"The stress in {run.name} is zero throughout. Check the column."
+    if len(run) > 2 and np.ptp(run.stress) <= 1e-9 * np.max(np.abs(run.stress)):
+        return "stress", (
+            f"The stress in {run.name} is the same in every sample: a steady value or a command "
+            "rather than a record. Check the column."
+        )
+    return None
+
+
+def _at_given_stress(run: Run) -> Iterator[Doubt]:
     """Yield what is doubtful of the strain that a given stress was answered with."""
     strain = run.recorded
     if np.ptp(strain) <= 1e-9 * np.max(np.abs(strain)):
@@ -84,13 +83,13 @@ def _at_given_stress(run: Run) -> Iterator[Finding]:
             f"The strain in {run.name} is the same in every sample, whatever the stress. Check "
             "the column."
         )
-        yield Finding("warning", "strain", run.name, text)
+        yield "strain", text
     elif float(strain @ run.stress) < 0.0:
         text = (
             f"The strain in {run.name} goes against the stress that is imposed. Change the sign "
             "of one of the two columns."
         )
-        yield Finding("warning", "strain", run.name, text)
+        yield "strain", text
 
 
 def spikes(run: Run) -> Float[np.ndarray, " k"]:
@@ -100,35 +99,31 @@ def spikes(run: Run) -> Float[np.ndarray, " k"]:
     the lines at its neighbours the other way; a corner or a fast rise does not. Nor is a sample one
     that is next to a step of the rate.
     """
-    off = _bends(run.time, run.stress)
+    off = bends(run.time, run.stress)
     if len(off) < 5:
         return np.empty(0)
     width = min(41, len(off))
     first = np.clip(np.arange(len(off)) - width // 2, 0, len(off) - width)
     windows = np.lib.stride_tricks.sliding_window_view(np.abs(off), width)
     noise = 1.4826 * np.median(windows, axis=1)[first]
-    large = np.abs(off) > np.maximum(
-        _SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.stress))
-    )
+    size = np.abs(off)
+    large = size > np.maximum(_SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.stress)))
     alone = np.zeros(len(off), dtype=bool)
     alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
     # the neighbours of a spike bend too, but less
-    alone[1:-1] &= (np.abs(off[1:-1]) > np.abs(off[:-2])) & (np.abs(off[1:-1]) > np.abs(off[2:]))
+    alone[1:-1] &= (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])
     return run.time[1:-1][large & alone & ~beside_a_step(run)[1:-1]]
 
 
 def stress_noise(run: Run) -> float:
     """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
-    off = _bends(run.time, run.stress)
+    off = bends(run.time, run.stress)
     return float(_SPREAD_OF_BENDS * np.median(np.abs(off))) if len(off) else 0.0
 
 
 def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
-    """Return the standard deviation of the noise around each sample of a record, shape (n,).
-
-    `time` in s, increasing. `values` in any unit, which is that of the noise.
-    """
-    off = np.abs(_bends(time, values))
+    """Return the standard deviation of the noise around each sample of a record, shape (n,)."""
+    off = np.abs(bends(time, values))
     if not len(off):
         return np.zeros(len(values))
     width = min(_NEIGHBOURHOOD, len(off))
@@ -136,69 +131,75 @@ def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
     return _SPREAD_OF_BENDS * np.pad(around, (width // 2 + 1, width - width // 2), mode="edge")
 
 
-def _bends(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
-    return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
-
-
-def _outliers(run: Run) -> Iterator[Finding]:
+def _outliers(run: Run) -> Doubt:
     found = spikes(run)
-    if len(found):
-        where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
-        count = "one sample" if len(found) == 1 else f"{len(found)} samples"
-        text = (
-            f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
-            "them; remove them if the instrument made them."
-        )
-        yield Finding("warning", "outliers", run.name, text)
+    if not len(found):
+        return None
+    where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
+    count = "one sample" if len(found) == 1 else f"{len(found)} samples"
+    return "outliers", (
+        f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
+        "them; remove them if the instrument made them."
+    )
 
 
-def _held_values(run: Run) -> Iterator[Finding]:
-    """Yield that each value is read several times, where all are read as often."""
-    if (often := read_times(run.stress)) > 1:
-        text = (
-            f"Each value of the stress in {run.name} stands in {often} samples: the "
-            "transducer is read more often than it has values. Keep the first sample of each "
-            "value, or what is late in the others looks like a lag."
-        )
-        yield Finding("warning", "stress", run.name, text)
+def _held_values(run: Run) -> Doubt:
+    """Return that each value is read several times, where all are read as often."""
+    often = read_times(run.stress)
+    return None if often <= 1 else ("stress", (
+        f"Each value of the stress in {run.name} stands in {often} samples: the "
+        "transducer is read more often than it has values. Keep the first sample of each "
+        "value, or what is late in the others looks like a lag."
+    ))  # fmt: skip
 
 
-def _clock_start(run: Run) -> Iterator[Finding]:
-    if run.time[0] > 0.2 * run.time[-1]:
-        text = (
-            f"{run.name} starts at {run.time[0]:.4g} s of {run.time[-1]:.4g} s. Time counts from "
-            "the start of the flow, from rest; if the clock started earlier, subtract its reading "
-            "then."
-        )
-        yield Finding("warning", "time", run.name, text)
+def _clock_start(run: Run) -> Doubt:
+    return None if run.time[0] <= 0.2 * run.time[-1] else ("time", (
+        f"{run.name} starts at {run.time[0]:.4g} s of {run.time[-1]:.4g} s. Time counts from "
+        "the start of the flow, from rest; if the clock started earlier, subtract its reading "
+        "then."
+    ))  # fmt: skip
 
 
-def _strain(run: Run) -> Iterator[Finding]:
-    if run.strain is None or "derived" in str(run.metadata.get("shear_rate_source", "")):
-        return
+def _strain(run: Run) -> Doubt:
+    if run.strain is None:
+        return None
     steps = 0.5 * (run.rate[1:] + run.rate[:-1]) * np.diff(run.time)
     expected = np.concatenate([[0.0], np.cumsum(steps)])
     measured = run.strain - run.strain[0]
     size = np.max(np.abs(expected))
     off = float(np.max(np.abs(measured - expected)) / size) if size > 0 else 0.0
-    if off > 0.1 and np.max(np.abs(measured + expected)) < 0.1 * size:
-        text = (
+    if off <= 0.1:
+        return None
+    if np.max(np.abs(measured + expected)) < 0.1 * size:
+        return "strain", (
             f"The strain in {run.name} runs against its shear rate: one of the two has the wrong "
             "sign. If it is the rate, the stress has it too."
         )
-        yield Finding("warning", "strain", run.name, text)
-    elif off > 0.1:
-        text = (
-            f"The strain in {run.name} differs from its shear rate summed over time by up to "
-            f"{100 * off:.0f} %. Check the units of both (per cent?), or whether the commanded "
-            "rate was reached."
-        )
-        yield Finding("warning", "strain", run.name, text)
+    return "strain", (
+        f"The strain in {run.name} differs from its shear rate summed over time by up to "
+        f"{100 * off:.0f} %. Check the units of both (per cent?), or whether the commanded "
+        "rate was reached."
+    )
 
 
-def _start_up(run: Run) -> Iterator[Finding]:
-    stress = run.stress * np.sign(run.rate[0])
+def _by_course(run: Run) -> Iterator[Doubt]:
+    """Yield what is doubtful of a start-up, or of cycles."""
+    varies = np.ptp(run.rate) > 1e-6 * np.max(np.abs(run.rate))
+    turns = int(np.sum(np.diff(np.sign(run.rate[run.rate != 0])) != 0))
+    if varies and turns > 1:
+        yield _returned_work(run) if run.from_rest else None
+        per_cycle = 2.0 * len(run) / turns
+        if per_cycle < _FEWEST_PER_CYCLE:
+            text = (
+                f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign "
+                f"{turns} times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the "
+                "rate if the sign changes are noise."
+            )
+            yield "sampling", text
+    if varies or not run.from_rest or not np.any(run.rate):
+        return
+    stress, noise = run.stress * np.sign(run.rate[0]), stress_noise(run)
     half = int(np.argmax(stress >= 0.5 * np.max(stress)))
     if half < _FEWEST_ON_THE_RISE:
         text = (
@@ -206,58 +207,30 @@ def _start_up(run: Run) -> Iterator[Finding]:
             f"the start-up is hardly seen. Sample faster at the start, evenly in log time (at "
             f"least {_FEWEST_ON_THE_RISE})."
         )
-        yield Finding("warning", "sampling", run.name, text)
-    noise = stress_noise(run)
-    low = np.abs(stress) < 3.0 * noise
-    below = float(np.mean(low | (stress < 0)))
-    if below > 0.2:
-        last = run.time[np.flatnonzero(low | (stress < 0))[-1]]
+        yield "sampling", text
+    lost = (np.abs(stress) < 3.0 * noise) | (stress < 0)
+    if np.mean(lost) > 0.2:
         text = (
-            f"{100 * below:.0f} % of the stresses in {run.name} are below three times their noise "
-            f"({noise:.2g} Pa) or negative, the last at {last:.4g} s: the transducer's floor. "
+            f"{100 * float(np.mean(lost)):.0f} % of the stresses in {run.name} are below three "
+            f"times their noise ({noise:.2g} Pa) or negative, the last at "
+            f"{run.time[np.flatnonzero(lost)[-1]]:.4g} s: the transducer's floor. "
             "These samples teach nothing; a strain window ([loop] strain) leaves them out."
         )
-        yield Finding("warning", "stress", run.name, text)
+        yield "stress", text
 
 
-def _cycles(run: Run) -> Iterator[Finding]:
-    turns = int(np.sum(np.diff(np.sign(run.rate[run.rate != 0])) != 0))
-    if turns < 2:
-        return
-    if run.from_rest:
-        yield from _work(run)
-    per_cycle = 2.0 * len(run) / turns
-    if per_cycle < _FEWEST_PER_CYCLE:
-        text = (
-            f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign {turns} "
-            f"times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the rate if "
-            "the sign changes are noise."
-        )
-        yield Finding("warning", "sampling", run.name, text)
-
-
-def _work(run: Run) -> Iterator[Finding]:
+def _returned_work(run: Run) -> Doubt:
     """Hold the work of an oscillation from rest against zero, below which no passive fluid goes."""
     power = run.rate * run.stress
-    work = float(np.trapezoid(power, run.time))
-    size = float(np.trapezoid(np.abs(power), run.time))
+    work, size = np.trapezoid(power, run.time), np.trapezoid(np.abs(power), run.time)
     # noise around zero sums to some 1/√n of its size
-    if work < -max(_RETURNED_WORK, 3.0 / np.sqrt(len(run))) * size:
-        text = (
-            f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
-            "exchange, and a fluid at rest before has none to return: the stress or the rate has "
-            "the wrong sign, or one lags the other."
-        )
-        yield Finding("warning", "stress", run.name, text)
-
-
-# Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
-# band) stays within this factor
-_UNIT_FACTOR = 30.0
-
-_ONE_TEMPERATURE = 2.0
-"""In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11), so that less than this is within
-the gain and the noise of most records."""
+    if work >= -max(_RETURNED_WORK, 3.0 / np.sqrt(len(run))) * size:
+        return None
+    return "stress", (
+        f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
+        "exchange, and a fluid at rest before has none to return: the stress or the rate has "
+        "the wrong sign, or one lags the other."
+    )
 
 
 def is_start_up(run: Run) -> bool:
@@ -266,26 +239,47 @@ def is_start_up(run: Run) -> bool:
     return bool(len(run) >= 3 and rate[0] != 0 and np.ptp(rate) <= 1e-6 * np.max(np.abs(rate)))
 
 
+def steady_stress(run: Run) -> float | None:
+    """Return the size of the stress in the last fifth, if it changes by less than a tenth there."""
+    tail = run.stress[run.time > 0.8 * run.time[-1]]
+    level = abs(float(np.median(tail))) if len(tail) else 0.0
+    return level if len(tail) >= 3 and np.ptp(tail) < 0.1 * level else None
+
+
 def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
-    """Yield which start-ups do not go together with the others.
+    """Yield which start-ups, of runs that load, do not go together with the others.
 
     In a faster start-up the largest stress is no smaller, and larger by the ratio of the rates at
     most, as viscosities do not rise with the rate; half of it is reached no later, and earlier by
     that ratio at most, which is the same strain. Shear thickening and yielding break these rules by
     less than another unit of stress or of time does. Another unit of rate may pass for thinning.
-
-    `runs`: those that load; less than two start-ups say nothing.
     """
     for kind in KINDS:  # the stress of an extension is not that of a shear at the same rate
         alike = [r for r in runs if r.flow == kind and r.from_rest and is_start_up(r)]
-        yield from _among_alike(alike)
+        if len(alike) < 2:
+            continue
+        rates = np.array([abs(run.rate[0]) for run in alike])
+        for what, quantity, rises in (
+            ("The stress", _largest, True),
+            ("The time at which the stress rises", _half_time, False),
+        ):
+            values = np.array([quantity(run) for run in alike])
+            for run, ratio in zip(alike, _least_outside(values, rates, rises), strict=True):
+                if abs(np.log(ratio)) < np.log(_UNIT_FACTOR):
+                    continue
+                times = "times too large" if ratio > 1.0 else "times too small"
+                text = (
+                    f"{what} in {run.name} is at least {max(ratio, 1.0 / ratio):.2g} {times} for "
+                    "its shear rate, compared with the other start-ups. Check the units of its "
+                    "stress and time (kPa for Pa, ms for s)."
+                )
+                yield Finding("warning", "units", run.name, text)
 
 
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
     """Yield that runs at several temperatures are taken for those of one fluid, if they are.
 
-    `runs`: those whose times nobody has shifted to one temperature, with ``temperature_C`` of
-    runs.csv.
+    `runs`: those whose times nobody has shifted to one temperature.
     """
     told = {run.name: run.metadata.get("temperature_C") for run in runs}
     known = {name: float(t) for name, t in told.items() if isinstance(t, int | float)}
@@ -299,27 +293,6 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         "and name the column of the factors ([data] clock_factor)."
     )
     yield Finding("warning", "temperature", "", text)
-
-
-def _among_alike(start_ups: Sequence[Run]) -> Iterator[Finding]:
-    if len(start_ups) < 2:
-        return
-    rates = np.array([abs(run.rate[0]) for run in start_ups])
-    for what, quantity, rises in (
-        ("The stress", _largest, True),
-        ("The time at which the stress rises", _half_time, False),
-    ):
-        values = np.array([quantity(run) for run in start_ups])
-        for run, ratio in zip(start_ups, _least_outside(values, rates, rises), strict=True):
-            if abs(np.log(ratio)) < np.log(_UNIT_FACTOR):
-                continue
-            large = f"{ratio:.2g} times too large"
-            size = large if ratio > 1.0 else f"{1.0 / ratio:.2g} times too small"
-            text = (
-                f"{what} in {run.name} is at least {size} for its shear rate, compared with the "
-                "other start-ups. Check the units of its stress and time (kPa for Pa, ms for s)."
-            )
-            yield Finding("warning", "units", run.name, text)
 
 
 def _largest(run: Run) -> float:

@@ -19,30 +19,31 @@ _FAR_FROM_REST = 0.25
 # alone
 _RISE_OVER = 0.5
 # Of a stress, this share may be more than a viscosity makes of the rate, or a transient less
-_NOTICEABLE = 0.2
-_TRANSIENT = 0.05
-# What thickening and another loading add to linear theory is less
-_LINEAR_FACTOR = 2.0
-# Of the largest strain, so much may be there before the first sample and not of the rate
-_NOT_MADE = 0.05
-_HARMONICS = (1, 2, 3, 5, 7)
+_NOTICEABLE, _TRANSIENT = 0.2, 0.05
+_LINEAR_FACTOR = 2.0  # what thickening and another loading add to linear theory is less
+_NOT_MADE = 0.05  # of the largest strain may be there before the first sample and not of the rate
+_HARMONICS = np.array([1, 2, 3, 5, 7])
 
 
 def doubts_of_start(
     run: Run, sweep: LinearSweep | None = None, spectrum: RelaxationSpectrum | None = None
 ) -> Iterator[Finding]:
-    """Yield why a run that is taken as starting from rest cannot have started so.
+    """Yield why a run that is taken as starting from rest cannot have started so, or does not show.
 
     From rest a fluid has no stress but what the flow until the first sample made: that of a
     viscosity at once, that of elasticity with the strain. A record is doubted if its first stress
     is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
     or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
     already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
-    that was recorded with it says that the rate had been another before.
+    that was recorded with it says that the rate had been another before. Without a spectrum, which
+    would say how fast the stress grows, nothing may show it where the run began late.
     """
-    if run.protocol.control != "rate" or not _is_loaded_at_first(run):
+    size, first = float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
+    if run.protocol.control != "rate" or not run.from_rest or len(run) < 5:
         return
-    size, first = _largest_and_first(run)
+    if first < max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run)):
+        return
+    why = ""
     if _only_falls(run):
         why = "it falls from there whatever the rate does, as after a step of strain"
     elif _steady_alternation(run):
@@ -51,51 +52,29 @@ def doubts_of_start(
         why = "the linear sweep allows less than half of that so early"
     elif _strained_before(run):
         why = "the strain recorded there is not what its rate had made by then"
-    else:
-        return
-    text = (
-        f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
-        f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look like "
-        "a missing effect. Give the record from rest on, or say in runs.csv what came before "
-        "(start, step_strain, rate_before); otherwise leave the run out."
-    )
-    yield Finding("warning", "start", run.name, text)
-
-
-def doubts_of_unseen_start(run: Run) -> Iterator[Finding]:
-    """Yield a doubt if a run began so late that nothing shows whether it started from rest.
-
-    For runs without a sweep, which would say how fast the stress grows, and without a better reason
-    to doubt (`doubts_of_start`). It may have started from rest all the same.
-    """
-    size, first = _largest_and_first(run)
     # of an oscillation that was recorded from its start on, the cycles have told
     told = run.time[0] == 0.0 and oscillation(run) is not None
-    if not _is_loaded_at_first(run) or first < _RISE_OVER * size or told or _without_memory(run):
+    if why:
+        text = (
+            f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
+            f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look "
+            "like a missing effect. Give the record from rest on, or say in runs.csv what came "
+            "before (start, step_strain, rate_before); otherwise leave the run out."
+        )
+    elif spectrum is None and first >= _RISE_OVER * size and not told and not _no_memory(run):
+        text = (
+            f"{run.name} is taken as starting from rest, but does not show it: its first stress, "
+            f"at {run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing "
+            "before it was recorded. Sample the start, or say in runs.csv what came before (start, "
+            "rate_before), which would look like a missing effect. A solvent's viscosity makes "
+            "stress at once: where it is most of the fluid's, nothing is wrong."
+        )
+    else:
         return
-    text = (
-        f"{run.name} is taken as starting from rest, but does not show it: its first stress, at "
-        f"{run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing before it "
-        "was recorded. Sample the start, or say in runs.csv what came before (start, rate_before), "
-        "which would look like a missing effect. A solvent's viscosity makes "
-        "stress at once: where it is most of the fluid's, nothing is wrong."
-    )
     yield Finding("warning", "start", run.name, text)
 
 
-def _largest_and_first(run: Run) -> tuple[float, float]:
-    return float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
-
-
-def _is_loaded_at_first(run: Run) -> bool:
-    """Whether a run that is taken as starting from rest has a stress at its first sample."""
-    if not run.from_rest or len(run) < 5:
-        return False
-    size, first = _largest_and_first(run)
-    return first >= max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run))
-
-
-def _without_memory(run: Run) -> bool:
+def _no_memory(run: Run) -> bool:
     """Whether a power law of the rate, where it changes, makes the stress at every sample."""
     rate, stress = np.abs(run.rate), run.stress * np.sign(run.rate)
     use = (rate > 0.0) & (stress > 0.0)
@@ -122,9 +101,8 @@ def _only_falls(run: Run) -> bool:
 def _strained_before(run: Run) -> bool:
     if run.strain is None or run.rate_is_measured:
         return False
-    made = run.rate[0] * run.time[0]
-    whole = float(np.max(np.abs(run.strain)))
-    return bool(abs(run.strain[0] - made) > _NOT_MADE * whole)
+    off = abs(run.strain[0] - run.rate[0] * run.time[0])
+    return bool(off > _NOT_MADE * float(np.max(np.abs(run.strain))))
 
 
 def _steady_alternation(run: Run) -> bool:
@@ -134,16 +112,15 @@ def _steady_alternation(run: Run) -> bool:
     period = 2.0 * np.pi / wave[0]
     time = run.time - run.time[0]
     later = time > period
-    if time[-1] < 2.0 * period or np.count_nonzero(later) < 4 * len(_HARMONICS):
+    n = len(_HARMONICS)
+    if time[-1] < 2.0 * period or np.count_nonzero(later) < 4 * n:
         return False
-    angles = wave[0] * run.time[:, None] * np.array(_HARMONICS)
+    angles = wave[0] * run.time[:, None] * _HARMONICS
     waves = np.hstack([np.cos(angles), np.sin(angles), np.ones((len(run), 1))])
     found, *_ = np.linalg.lstsq(waves[later], run.stress[later], rcond=None)
-    left = run.stress - waves @ found
-    scatter = rms(left[later])
-    early = rms(left[time < 0.25 * period])
     rates, *_ = np.linalg.lstsq(waves, run.rate, rcond=None)
-    n = len(_HARMONICS)
+    left = run.stress - waves @ found
+    scatter, early = rms(left[later]), rms(left[time < 0.25 * period])
     viscosity = complex(found[0], -found[n]) / complex(rates[0], -rates[n])
     size = float(np.max(np.abs(run.stress)))
     alike = early < max(3.0 * scatter, _TRANSIENT * size) and scatter < _NOTICEABLE * size
@@ -155,11 +132,10 @@ def _more_than_linear(run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
 
     Tr is Trouton's ratio of the flow, 1 in shear.
     """
-    time = float(run.time[0])
     modes = spectrum.modulus * spectrum.relaxation_time
     # what is faster than the sweep, a solvent too, is at most its smallest dynamic viscosity
     fast = float(np.min(sweep.loss_modulus / sweep.angular_frequency))
-    linear = fast + float(-np.expm1(-time / spectrum.relaxation_time) @ modes)
+    linear = fast + float(-np.expm1(-float(run.time[0]) / spectrum.relaxation_time) @ modes)
     trouton = float(kinematics_of(run.flow).viscous)
     allowed = _LINEAR_FACTOR * trouton * abs(float(run.rate[0])) * linear
     return abs(float(run.stress[0])) > allowed + 5.0 * stress_noise(run)

@@ -23,19 +23,18 @@ from discover.new_names import require_new_name
 from discover.words import unknown_name
 from tensor_library.registry import Registry
 
+# bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects
 _LARGEST_PART = 10_000_000
-"""Bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects."""
-
 _MOST_COLUMNS = 2000
 _MOST_ROWS = 1_048_576  # as Excel
 _LONGEST_CELL = 1000  # characters
+_GAP = 100  # empty rows, after which lines are no longer counted
 
 
 def read_spreadsheet(path: Path) -> list[Block]:
     """Return the blocks of numbers in all sheets of a spreadsheet; a sheet names what has no name.
 
-    Raises InputError if it is no spreadsheet, is larger than a measurement, or holds no numbers
-    under names.
+    Raises InputError if it is none, is larger than a measurement, or holds no numbers under names.
     """
     from openpyxl import load_workbook
 
@@ -110,10 +109,6 @@ def _rows(sheet, name: str) -> Iterator[tuple]:
             yield row
 
 
-_GAP = 100
-"""Empty rows, after which lines are no longer counted."""
-
-
 def _text(cell: object) -> str:
     if cell is None or cell != cell:
         return ""
@@ -127,17 +122,12 @@ def _text(cell: object) -> str:
 _TIME, _RATE, _STRESS = ("time", "s"), ("gdot", "1/s"), ("stress", "Pa")
 _MODULI = (("omega", "rad/s"), ("G'", "Pa"), ("G''", "Pa"))
 
+# names and units of the columns, by suffix; further ones are read by their own names
 COLUMNS = {
-    ".tts": _MODULI,
-    ".osc": _MODULI,
-    ".shear": (_TIME, _STRESS),
-    ".uext": (_TIME, ("tensile stress", "Pa")),
-    ".laos": (_TIME, ("strain", "-"), _STRESS),
-    ".creep": (_TIME, ("strain", "-")),
-    ".gt": (_TIME, ("relaxation modulus", "Pa")),
-}
-"""Names and units of the columns, by suffix; further ones are read by their own names."""
-
+    ".tts": _MODULI, ".osc": _MODULI, ".shear": (_TIME, _STRESS),
+    ".uext": (_TIME, ("tensile stress", "Pa")), ".laos": (_TIME, ("strain", "-"), _STRESS),
+    ".creep": (_TIME, ("strain", "-")), ".gt": (_TIME, ("relaxation modulus", "Pa")),
+}  # fmt: skip
 _PARAMETERS = {
     ".shear": {"gdot": ("shear rate", "1/s")},
     ".uext": {"gdot": ("hencky rate", "1/s"), "edot": ("hencky rate", "1/s")},
@@ -149,8 +139,7 @@ _TEMPERATURE = ("temperature", "°C")
 def read_reptate(path: Path) -> list[Block]:
     """Return the one block of a file of RepTate.
 
-    Raises InputError if it has too few columns of numbers, or lacks a parameter that such a file
-    needs.
+    Raises InputError if it has too few columns of numbers, or lacks a parameter that it needs.
     """
     suffix = path.suffix.lower()
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
@@ -193,29 +182,20 @@ def read_reptate(path: Path) -> list[Block]:
 
 @dataclass(frozen=True)
 class Importer:
-    """A reader of one kind of file.
-
-    `read`: takes the path of a file and returns its blocks of columns; names and units are
-        understood, and units converted, as those of a text export are.
-    `suffixes`: endings of the names of such files, such as ``.npz``; these need no ``--format``.
-    """
+    """A reader of one kind of file, whose blocks are understood as those of a text export are."""
 
     read: Callable[[Path], Sequence[Block]]
-    suffixes: tuple[str, ...] = ()
+    suffixes: tuple[str, ...] = ()  # of the names of such files, which need no --format
 
 
-def _built_in() -> dict[str, Importer]:
-    return {
-        "spreadsheet": Importer(read_spreadsheet, (".xlsx", ".xlsm")),
-        "reptate": Importer(read_reptate, tuple(COLUMNS)),
-    }
+_BUILT_IN = {
+    "spreadsheet": Importer(read_spreadsheet, (".xlsx", ".xlsm")),
+    "reptate": Importer(read_reptate, tuple(COLUMNS)),
+}
 
-
-IMPORTERS: Registry[Importer] = Registry("importer", "discover.importers", _built_in)
+IMPORTERS: Registry[Importer] = Registry("importer", "discover.importers", lambda: _BUILT_IN)
 """Importers by name; a package's own by entry points of this group. Text needs none of them."""
-
-TEXT = "text"
-"""What may be written as the format of a text export, which is the default."""
+TEXT = "text"  # what may be written as the format of a text export, which is the default
 
 
 def register_importer(
@@ -258,8 +238,8 @@ def register_importer(
 def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
     """Return the blocks of a file that an importer reads; None if it is to be read as text.
 
-    `form`: name of the importer; by the suffix of the file if None. Raises InputError if there is
-    no such importer, or it cannot read the file.
+    `form`: its name; by the suffix of the file if None. Raises InputError if there is none such, or
+    it cannot read the file.
     """
     if form == TEXT:
         return None

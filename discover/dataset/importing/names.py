@@ -18,22 +18,17 @@ from discover.dataset.tables.toml_file import read_toml
 from discover.errors import InputError
 from discover.words import unknown_name
 
+# tables of names.toml that name one quantity, the better first
 _PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
-"""Tables of ``names.toml`` that name one quantity, the better first."""
-
 _GREEK = {
     "gamma": "γ", "tau": "τ", "sigma": "σ", "omega": "ω", "eta": "η", "delta": "δ",
     "epsilon": "ε", "psi": "ψ", "theta": "θ", "phi": "φ",
 }  # fmt: skip
 _LOOK_ALIKE = str.maketrans({"ɣ": "γ", "ɛ": "ε", "ł": "l", "ø": "o", "ı": "i", "đ": "d"})
-_PRIMES = str.maketrans(
-    {
-        **dict.fromkeys("′‘’´`ʹʼ＇", "'"),
-        **dict.fromkeys('″“”"˝ʺ＂', "''"),
-        "‴": "'''",
-        **dict.fromkeys("∗⁎﹡✱", "*"),
-    }
-)
+_PRIMES = str.maketrans({
+    **dict.fromkeys("′‘’´`ʹʼ＇", "'"), **dict.fromkeys('″“”"˝ʺ＂', "''"), "‴": "'''",
+    **dict.fromkeys("∗⁎﹡✱", "*"),
+})  # fmt: skip
 _UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue"})
 
 _DOT = "\u0307"
@@ -45,8 +40,7 @@ _DOT_BEFORE = re.compile(r"\bdot\W*(gamma|γ|epsilon|ε)")
 _WORD = re.compile(rf"(?:[^\W_]|[{_DOT}'*+])+\.?")
 _SPELLED = re.compile(rf"({'|'.join(_GREEK)})([0-9'*+]*)")
 _LONG = " " * 1000
-_SHORTEST = 3
-"""Letters that a word cut short without a dot has at least."""
+_SHORTEST = 3  # letters that a word cut short without a dot has at least
 
 
 def words_of(name: str) -> tuple[str, ...]:
@@ -61,12 +55,13 @@ def words_of(name: str) -> tuple[str, ...]:
     text = _DOT_BEFORE.sub(lambda m: f"{m[1]} dot", text).replace("ġ", f"γ{_DOT}")
     text = text.replace("ẏ", f"γ{_DOT}").replace("ė", f"ε{_DOT}")
     text = _DOTTED_EPSILON.sub(f"ε{_DOT}", _DOTTED.sub(f"γ{_DOT}", text))
-    return tuple(_SPELLED.sub(_letter, word) if _SPELLED.fullmatch(word.rstrip(".")) else word
-                 for word in (w.lstrip("'") for w in _WORD.findall(text)) if word)  # fmt: skip
-
-
-def _letter(match: re.Match) -> str:
-    return _GREEK[match[1]] + match[2]
+    return tuple(
+        _SPELLED.sub(lambda m: _GREEK[m[1]] + m[2], word)
+        if _SPELLED.fullmatch(word.rstrip("."))
+        else word
+        for word in (w.lstrip("'") for w in _WORD.findall(text))
+        if word
+    )
 
 
 def _is_border(a: str, b: str) -> bool:
@@ -82,10 +77,7 @@ def plain(name: str) -> str:
 
 
 class NameTable:
-    """Names of quantities, those of the project and a user's own.
-
-    `own`: A user's names by quantity; they go first.
-    """
+    """Names of quantities, those of the project and a user's own, which go first."""
 
     def __init__(self, own: Mapping[str, Sequence[str]]):
         self._rank: dict[str, dict[str, int]] = {}
@@ -158,9 +150,7 @@ def shipped_names() -> dict[str, tuple[str, ...]]:
     }
 
 
-@cache
-def _table(own: tuple[tuple[str, tuple[str, ...]], ...]) -> NameTable:
-    return NameTable(dict(own))
+_table = cache(lambda own: NameTable(dict(own)))
 
 
 def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
@@ -171,33 +161,23 @@ def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
 def read_names(path: Path) -> dict[str, tuple[str, ...]]:
     """Return a user's names by quantity, from a file of the form of ``names.toml``.
 
-    Raises InputError if it cannot be read, names no quantity that is known, or holds something else
-    than names.
+    Raises InputError if it cannot be read, or holds something else than names of quantities.
     """
     example = 'Write lines such as stress = ["Sigma corr."].'
     content, _ = read_toml(path, "file of names", example)
-    lists = {
-        key: [*value.values()] if isinstance(value, dict) else [value]
-        for key, value in content.items()
-    }
-    wrong = next(
-        (key for key, parts in lists.items() for p in parts if not isinstance(p, list)), ""
-    )
+    parts = {k: [*v.values()] if isinstance(v, dict) else [v] for k, v in content.items()}
+    wrong = next((k for k, lists in parts.items() for p in lists if not isinstance(p, list)), "")
     if wrong:
         raise InputError(
             f'{path.name}: {wrong[:40]} must be a list of names, as in {wrong[:40]} = ["its name"].'
         )
-    names = {key: tuple(name for part in parts for name in part) for key, parts in lists.items()}
+    names = {key: tuple(name for part in lists for name in part) for key, lists in parts.items()}
     check_names(names, path.name)
     return names
 
 
 def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
-    """Check a user's names.
-
-    `names`: by quantity. Raises InputError if there is no such quantity, or a name is no text with
-    a letter in it.
-    """
+    """Refuse a user's names, by quantity, of which one is no quantity or no text with a letter."""
     for key, listed in names.items():
         if key not in shipped_names():
             raise InputError(f"{where}: {unknown_name('quantity', key, shipped_names())}")
@@ -212,21 +192,17 @@ def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")
 
 
-def _may_be_name(cell: str) -> bool:
-    return len(cell) < 80 and any(c.isalpha() for c in cell)
-
-
 def code_page_of(content: bytes) -> str:
     """Return the encoding of a text that is no Unicode: the one in which most names are known.
 
-    Instruments on Windows write the code page of the country. UTF-8 is one of them for a file of
-    which a byte is damaged.
+    Instruments on Windows write the code page of the country; UTF-8 may have a damaged byte.
     """
     sample, table = content[:20_000], name_table()
 
     def known(encoding: str) -> int:
         text = sample.decode(encoding, "replace")
         cells = set(re.split(r"[\t;,\r\n]|[\[(].*?[\])]", text))
-        return sum(bool(table.find(cell)) for cell in cells if _may_be_name(cell))
+        names = (cell for cell in cells if len(cell) < 80 and any(c.isalpha() for c in cell))
+        return sum(bool(table.find(name)) for name in names)
 
     return max(_CODE_PAGES, key=known)

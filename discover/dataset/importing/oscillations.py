@@ -39,7 +39,7 @@ def alternates(values: Values) -> bool:
 
 
 def frequency_of(time: Values, values: Values) -> float:
-    """Return the angular frequency in rad/s at which a sine with an offset fits best; `time` in s."""
+    """Return the angular frequency in rad/s at which a sine with an offset fits best."""
     span = float(time[-1] - time[0])
     centred = values - np.mean(values)
     turns = np.flatnonzero(np.sign(centred[1:]) != np.sign(centred[:-1]))
