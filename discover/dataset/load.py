@@ -1,37 +1,35 @@
 """Load a folder of measured runs: ``runs.csv``, one CSV a run, and tables beside them."""
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
-from discover.dataset.read_run import INDEX_FILE, read_run
-from discover.dataset.records.rates import DEFAULT_WINDOW
+from discover.dataset.read_run import (
+    DEFAULT_WINDOW,
+    INDEX_FILE,
+    read_run,
+    reason_to_set_aside,
+)
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
-from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table, shown
 from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
 from discover.words import did_you_mean
 
-DATA_VARIABLE = "DISCOVER_DATA"
-"""Environment variable that names the folder of data folders."""
-
+DATA_VARIABLE = "DISCOVER_DATA"  # environment variable that names the folder of data folders
 SWEEP_FILE = "lve.csv"
 PROVENANCE_FILE = "PROVENANCE.md"
+# lists tables of one kind at several temperatures, of which no fit takes more than one
 TESTS_FILE = "tests.csv"
-"""Lists tables of one kind at several temperatures, of which no fit takes more than one."""
-
+# files of which a folder needs one to be a data set
 DATA_FILES = (INDEX_FILE, SWEEP_FILE, *(f"{kind}.csv" for kind in TABLES))
-"""Files of which a folder needs one to be a data set."""
 
 
 def folder_roots(base: str | Path | None = None) -> list[Path]:
@@ -40,12 +38,10 @@ def folder_roots(base: str | Path | None = None) -> list[Path]:
 
 
 def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
-    """Return the path of a data folder.
+    """Return the path of a data folder; InputError if there is none, or no data file in it.
 
-    `folder`: path of the folder. A relative one is looked for beside the study file, then in the
-    folder named by the environment variable DISCOVER_DATA, then in the working directory. `base`:
-    folder of the study file, if there is one. Raises InputError if there is no such folder, or it
-    has none of `DATA_FILES`.
+    A relative one is looked for beside the study file, which is in `base`, then in the folder named
+    by the environment variable DISCOVER_DATA, then in the working directory.
     """
     if not isinstance(folder, str | os.PathLike):
         raise InputError(
@@ -83,11 +79,8 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
                 f"{str(folder)!r} is a file. Name the folder that holds {INDEX_FILE}; for a single "
                 "file make one with: discover data import."
             )
-    hint = (
-        ""
-        if os.environ.get(DATA_VARIABLE)
-        else f" The environment variable {DATA_VARIABLE} is not set."
-    )
+    unset = f" The environment variable {DATA_VARIABLE} is not set."
+    hint = "" if os.environ.get(DATA_VARIABLE) else unset
     near = next(filter(None, map(did_you_mean_file, candidates)), "")
     raise InputError(
         f"There is no data folder {str(folder)!r}.{near} Give its path, absolute or relative to "
@@ -144,78 +137,62 @@ def load_dataset(
     >>> data = dc.load_dataset("melt")  # doctest: +SKIP
     >>> train, test = data.split(held_out=["fast.csv"])  # doctest: +SKIP
     """
-    _require_options(
-        {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence},
-        rate_is_measured, rate_window, amplitude_sweep_rad_s,
-    )  # fmt: skip
+    columns = {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence}
+    for option, column in columns.items():
+        if not isinstance(column, str | None):
+            raise InputError(f"{option} is the name of a column; got {short(column)}.")
+    if not isinstance(rate_is_measured, bool | np.bool_):
+        raise InputError(f"rate_is_measured must be True or False; got {short(rate_is_measured)}.")
+    whole = isinstance(rate_window, int | np.integer) and not isinstance(rate_window, bool)
+    if not whole or rate_window < 1:
+        raise InputError(
+            f"rate_window must be a whole number of samples; got {short(rate_window)}."
+        )
+    frequency = amplitude_sweep_rad_s
+    if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
+        raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
     root = resolve_folder(folder, base)
+    name = root.resolve().name
     index = read_index(root)
     names = index.columns["file"]
     problems = Problems()
     tables, unused, sweep = {}, {}, None
     with problems.collected():
-        tables, unused = read_material_functions(root, names, amplitude_sweep_rad_s)
+        tables, unused = read_material_functions(root, names, frequency)
     with problems.collected():
         sweep = find_sweep(root)
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
-    aside: list[str | None] = []
-    for row in range(len(index)):
-        reason = None
+    aside: dict[str, str] = {}
+    used, runs = [], []
+    for row, file in enumerate(names):
         with problems.collected():
             reason = reason_to_set_aside(index, row, before is not None)
-        aside.append(reason)
-    used = [row for row, reason in enumerate(aside) if reason is None]
-    if not used and aside and not problems:
+            if reason is not None:
+                aside[file] = reason
+                continue
+        used.append(row)
+    if aside and not used and not problems:
         raise InputError(
-            f"No run of {root.resolve().name!r} can be fitted: {index.columns['file'][0]} is set "
-            f"aside, since {aside[0]}."
+            f"No run of {name!r} can be fitted: {names[0]} is set aside, since {aside[names[0]]}."
         )
-    runs: tuple[Run, ...] = ()
     for row in used:
         steady = None if before is None else float(before[row])
         with problems.collected():
             run = read_run(root, index, row, factors[row], rate_is_measured, rate_window, steady)
-            runs = (*runs, run)
-    problems.require_none(root.resolve().name)
+            runs.append(run)
+    problems.require_none(name)
     if sequence is not None and runs:
         runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
-    return Dataset(
-        name=root.resolve().name,
-        runs=runs,
-        linear_sweep=sweep,
-        provenance=_provenance(root),
-        set_aside=unused
-        | {
-            name: reason
-            for name, reason in zip(index.columns["file"], aside, strict=True)
-            if reason is not None
-        },
-        material_functions=tables,
-    )
-
-
-def _require_options(
-    columns: Mapping[str, object], measured: object, window: object, frequency: object
-) -> None:
-    for option, column in columns.items():
-        if not isinstance(column, str | None):
-            raise InputError(f"{option} is the name of a column; got {short(column)}.")
-    if not isinstance(measured, bool | np.bool_):
-        raise InputError(f"rate_is_measured must be True or False; got {short(measured)}.")
-    if isinstance(window, bool) or not isinstance(window, int | np.integer) or window < 1:
-        raise InputError(f"rate_window must be a whole number of samples; got {short(window)}.")
-    if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
-        raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
+    return Dataset(name, tuple(runs), sweep, _provenance(root), {**unused, **aside}, tables)
 
 
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
     """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
 
     The study names the column; without it, one whose name begins with ``rate_before`` holds the
-    rates of those runs that are declared to start from a steady flow.
-
-    Raises InputError if the column is missing or holds something other than numbers.
+    rates of those runs that are declared to start from a steady flow. Raises InputError if the
+    column is missing or holds something other than numbers.
     """
     if column is not None:
         rates = read_column(index, "rate_before", column)
@@ -238,10 +215,9 @@ def _provenance(root: Path) -> str:
 
 
 def read_index(root: Path) -> Table:
-    """Return ``runs.csv``, checked for its column ``file``; no lines where there is no such file.
+    """Return ``runs.csv``, without lines where there is no such file.
 
-    Raises InputError if the column is missing, or a name in it is empty, repeated or outside the
-    folder.
+    Raises InputError if it has no column ``file``, or a name in it is empty, repeated or outside.
     """
     if not os.path.lexists(root / INDEX_FILE):
         return Table(INDEX_FILE, {"file": []}, [])
@@ -279,10 +255,7 @@ def _is_inside(root: Path, name: str) -> bool:
 
 
 def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " runs"]:
-    """Return the clock factor of every run; ones if no column is named.
-
-    Raises InputError if the column is missing or holds something other than positive numbers.
-    """
+    """Return the clock factor of every run; ones if no column is named, InputError if wrong."""
     if column is None:
         return np.ones(len(index))
     factors = read_column(index, "clock_factor", column)
@@ -296,10 +269,7 @@ def read_clock_factors(index: Table, column: str | None) -> Float[np.ndarray, " 
 
 
 def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs"]:
-    """Return the numbers in a column of ``runs.csv`` that a key of the study names.
-
-    Raises InputError if the column is missing or holds something other than numbers.
-    """
+    """Return the numbers in a column of ``runs.csv`` that a key names; InputError if none are."""
     if column not in index.columns:
         raise InputError(
             f"{key} names the column {column!r}, but {INDEX_FILE} has only {index.listed}."
@@ -309,10 +279,7 @@ def read_column(index: Table, key: str, column: str) -> Float[np.ndarray, " runs
 
 
 def find_sweep(root: Path) -> LinearSweep | None:
-    """Return the linear sweep of a folder, or None if it has none.
-
-    Raises InputError if the file is wrong, or is a link to outside the folder.
-    """
+    """Return the linear sweep of a folder, or None if it has none; InputError if it is wrong."""
     if not os.path.lexists(root / SWEEP_FILE):
         return None
     if not _is_inside(root, SWEEP_FILE):
@@ -323,10 +290,7 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 
 def read_sweep(path: Path) -> LinearSweep:
-    """Return a linear frequency sweep, sorted by frequency; one of very many is thinned.
-
-    Raises InputError if the file is wrong, or a frequency or modulus is not positive.
-    """
+    """Return a linear frequency sweep, sorted, one of very many thinned; InputError if wrong."""
     table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     frequency, storage, loss = columns = table.all_required(*quantities)

@@ -1,14 +1,14 @@
-"""Read one run of a data folder: its samples, its flow, and what came before them."""
+"""Read one run of a data folder: which test it is, its samples, its rate, and what came before."""
 
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.kind_of_test import DeclaredTest, declared_test
-from discover.dataset.records.rates import DEFAULT_WINDOW, differentiate
 from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation, wave_of
@@ -18,24 +18,118 @@ from discover.errors import InputError, Problems
 from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import imposed_stress
 from discover.protocols.history import after_alternation, after_step_strain
+from discover.protocols.kinematics import KINDS
 from discover.protocols.protocol import FlowProtocol, in_flow, start_up
+from discover.words import did_you_mean
 
 INDEX_FILE = "runs.csv"
 
+DEFAULT_WINDOW = 15  # samples over which the strain is taken to be a cubic in time
+_DEGREE = 3
+_CHUNK = 50_000
+
+# columns of runs.csv that say what was done, with their values; the first is the default
+_VALUES = {"flow": KINDS, "control": ("rate", "stress"), "start": ("rest", "periodic", "steady")}
+_LARGEST_STEP = 1000.0  # strain beyond which a step is a slip of unit, such as per cent
 # A rate column is a command, repeated, if it varies no more than rounding to text does
 _CONSTANT = 1e-6
-
 # From rest a passive fluid cannot return more work than it was given. A record that is noise around
 # zero comes near 0, one with the wrong sign near -1
 _WRONG_SIGN = -0.5
-
-# Intervals between samples, and a little, that may be missing of a cycle
-_NEXT_SAMPLE = 1.5
-
-# Samples that a moving cubic needs
-_FEWEST_SMOOTHED = 5
+_NEXT_SAMPLE = 1.5  # intervals between samples, and a little, that may be missing of a cycle
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_OF_SHEAR = (units.SHEAR_STRESS, units.SHEAR_RATE, units.STRAIN)
+_OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
+_BESIDE = (units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE)
+
+Values = Float[np.ndarray, " n"]
+
+
+class DeclaredTest(NamedTuple):
+    """What a line of ``runs.csv`` says was done."""
+
+    flow: str
+    control: str
+    start: str
+    step_strain: float  # put on before t = 0; zero where there was none
+    step_time: float  # over which it was put on, in s; zero is at once
+    rate_before: float  # of the steady flow before t = 0, in 1/s
+
+
+def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
+    """Return which test the run on a line of ``runs.csv``, counted from 0, is.
+
+    `rate_before`: of the steady flow before it, in 1/s, where the study says so. Raises InputError
+    if a column that says what was done holds something that it cannot, or two contradict.
+    """
+    flow, control, start = (_word(index, row, column) for column in _VALUES)
+    step, time = (_number(index, row, column) for column in ("step_strain", "step_time_s"))
+    where = f"Line {index.lines[row]} of {index.name}"
+    if abs(step) > _LARGEST_STEP:
+        raise InputError(
+            f"{where}: step_strain is {step:g}. A strain is a pure number, 1 for 100 %; correct it."
+        )
+    if time < 0.0:
+        raise InputError(f"{where}: step_time_s is {time:g}. Give a time from 0 on.")
+    if step and (start != "rest" or rate_before):
+        raise InputError(
+            f"{where} declares both a step of strain and a flow before it. Leave one of them out."
+        )
+    if start == "periodic" and rate_before:
+        raise InputError(
+            f"{where} declares both an oscillation and a steady flow before t = 0. Leave one of "
+            "them out."
+        )
+    _number(index, row, "temperature_C")
+    return DeclaredTest(flow, control, start, step, time, rate_before or 0.0)
+
+
+def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
+    """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
+
+    `rate_before`: whether it is known from which steady flow each run starts.
+    """
+    if declared_test(index, row, None).start == "steady" and not rate_before:
+        return (
+            "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
+            "flow in the study (rate_before)"
+        )
+    return None
+
+
+def _word(index: Table, row: int, column: str) -> str:
+    values, cell = _VALUES[column], _cell(index, row, column)
+    if column == "start" and _is_number(cell):
+        return values[0]  # a time at which the run started, as `sequence` takes it
+    if cell and cell not in values:
+        raise InputError(
+            f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}."
+            f"{did_you_mean(cell, values)} Write one of "
+            f"{', '.join(values)}; an empty cell is {values[0]}."
+        )
+    return cell or values[0]
+
+
+def _number(index: Table, row: int, column: str) -> float:
+    cell = _cell(index, row, column)
+    if cell and not _is_number(cell):
+        raise InputError(
+            f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}. Write a number, "
+            "or leave the cell empty."
+        )
+    return float(cell or 0.0)
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        return math.isfinite(float(cell))
+    except ValueError:
+        return False
+
+
+def _cell(index: Table, row: int, column: str) -> str:
+    return index.columns[column][row].strip() if column in index.columns else ""
 
 
 def read_run(
@@ -47,40 +141,41 @@ def read_run(
     rate_window: int = DEFAULT_WINDOW,
     rate_before: float | None = None,
 ) -> Run:
-    """Return the run on one line of ``runs.csv``.
-
-    `root`, `index`, `row`: the folder, its ``runs.csv``, and the line, counted from 0. Raises
-    InputError if its file is missing or wrong.
-    """
+    """Return the run on a line of ``runs.csv``; InputError if its file is missing or wrong."""
     name = index.columns["file"][row]
     table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
-    metadata = _metadata(index, row)
+    # float() would also read 1_2, nan or inf, which are labels here
+    cells = {column: cells[row] for column, cells in index.columns.items() if column != "file"}
+    metadata: dict[str, float | str] = {
+        column: float(cell) if _NUMBER.fullmatch(cell) else cell for column, cell in cells.items()
+    }
     test = declared_test(index, row, rate_before)
-    in_shear = test.flow == "shear"
-    _require_columns(table, test)
-    time = table.required(units.TIME)
-    strain = table.quantity(units.STRAIN if in_shear else units.HENCKY_STRAIN)
-    rate, derived = _rate(table, test, time, strain, rate_window)
-    stress = table.required(units.SHEAR_STRESS if in_shear else units.TENSILE_STRESS)
+    time, stress, rate, strain, *normal = _columns(table, test)
+    derived = False
+    if rate is None:
+        rate, derived = _rate(table, test, time, strain, rate_window)
     if strain is None and test.step_strain:
         strain = np.full(len(time), test.step_strain)
     if test.control == "rate":
         _check_sign(name, time, rate, stress)
-    normal = table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)
-    second = table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)
     if len(time) > MOST_SAMPLES:
         keep, metadata["thinned"] = thin(time, rate, stress)
         time, rate, stress = time[keep], rate[keep], stress[keep]
-        normal, second, strain = (v if v is None else v[keep] for v in (normal, second, strain))
+        strain, *normal = (v if v is None else v[keep] for v in (strain, *normal))
+    # of a test at a given stress the rate is what the fluid answered
+    measured = rate_is_measured or derived or test.control == "stress"
     if test.control == "stress" and strain is not None:
-        protocol, derived, source = _imposed(name, time, stress), True, "what the fluid answered"
+        protocol, source = _imposed(name, time, stress), "what the fluid answered"
     elif derived:
         protocol = sampled_rate(time, rate)
         source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
+    elif np.ptp(rate) <= _CONSTANT * abs(level := float(np.median(rate))):
+        protocol = start_up(level)
+        source = "measured, constant" if measured else "commanded, constant"
     else:
-        # of a test at a given stress the rate is what the fluid answered
-        rate_is_measured = rate_is_measured or test.control == "stress"
-        protocol, source = _protocol(time, rate, rate_is_measured)
+        protocol = sampled_rate(time, rate)
+        between = "a cubic spline" if len(protocol.table_times) > len(time) else "linear"
+        source = f"read sample by sample, {between} between samples"
     metadata["shear_rate_source"] = source
     run = Run(
         name=name,
@@ -88,41 +183,40 @@ def read_run(
         protocol=in_flow(protocol, test.flow),
         rate=rate,
         stress=stress,
-        first_normal_stress_difference=normal,
-        second_normal_stress_difference=second,
+        first_normal_stress_difference=normal[0],
+        second_normal_stress_difference=normal[1],
         strain=strain,
         clock_factor=float(clock_factor),
-        rate_is_measured=derived or rate_is_measured,
+        rate_is_measured=measured,
         rate_before=test.rate_before,
         metadata=metadata,
     )
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
 
 
-_OF_SHEAR = (units.SHEAR_STRESS, units.SHEAR_RATE, units.STRAIN)
-_OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
-_BESIDE = (units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE)
+def _columns(table: Table, test: DeclaredTest):
+    """Return time, stress, rate, strain, N1 and N2; all but the first two may be None.
 
-
-def _require_columns(table: Table, test: DeclaredTest) -> None:
-    """Refuse a table with all that is wrong in its columns, and not with the first of it."""
+    Raises InputError with all that is wrong in the columns, and not with the first of it.
+    """
     problems = Problems()
-    with problems.collected():
-        _checked_time(table)
     stress, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION
-    absent = []
+    found: dict[units.Quantity, Values | None] = {}
+    with problems.collected():
+        time = found[units.TIME] = table.required(units.TIME)
+        _check_time(table, time)
     for quantity in (*answers, *_BESIDE):
         with problems.collected():
-            if table.quantity(quantity) is None:
-                absent.append(quantity)
+            found[quantity] = table.quantity(quantity)
     with problems.collected():
-        if all(answer in absent for answer in answers):
+        if all(answer in found and found[answer] is None for answer in answers):
             _refuse_another_flow(table, test)  # or a stress of that flow is taken for a slip
-        table.required(stress)
+        found[stress] = table.required(stress)
     problems.require_none(table.name)
+    return [found[quantity] for quantity in (units.TIME, stress, *answers, *_BESIDE)]
 
 
-def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
+def _imposed(name: str, time: Values, stress: Values) -> FlowProtocol:
     try:
         return imposed_stress(time, stress)
     except InputError as error:
@@ -130,19 +224,15 @@ def _imposed(name: str, time: np.ndarray, stress: np.ndarray) -> FlowProtocol:
 
 
 def _rate(
-    table: Table, test: DeclaredTest, time: np.ndarray, strain: np.ndarray | None, window: int
-) -> tuple[Float[np.ndarray, " n"], bool]:
-    """Return the rate of a run, and whether it is derived from its strain."""
-    quantity = units.SHEAR_RATE if test.flow == "shear" else units.HENCKY_RATE
-    rate = table.quantity(quantity)
-    if rate is not None:
-        return rate, False
+    table: Table, test: DeclaredTest, time: Values, strain: Values | None, window: int
+) -> tuple[Values, bool]:
+    """Return the rate of a run that records none, and whether it is derived from its strain."""
     if strain is None:
         if test.step_strain:
             return np.zeros(len(time)), False  # held after the step
         # said in the words of the commoner mistake
-        strain = table.required(quantity)
-    if test.control == "stress" and len(time) < _FEWEST_SMOOTHED:
+        strain = table.required(units.SHEAR_RATE if test.flow == "shear" else units.HENCKY_RATE)
+    if test.control == "stress" and len(time) < _DEGREE + 2:
         # the strain is what is fitted; the rate is only told
         return np.gradient(strain, time) if len(time) > 1 else np.zeros(1), True
     try:
@@ -155,6 +245,38 @@ def _rate(
             "far apart. Check their units."
         )
     return rate, True
+
+
+def differentiate(time: Values, values: Values, window: int = DEFAULT_WINDOW) -> Values:
+    """Return the time derivative of a noisy record, from a moving cubic fit.
+
+    A cubic is fitted by least squares to the `window` samples nearest in order to each sample, 5 or
+    more, and its slope taken there   [Savitzky & Golay 1964, Anal. Chem. 36, 1627, for any
+    spacing]. Raises InputError if window or record are shorter.
+    """
+    if window < _DEGREE + 2:
+        raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")
+    n = len(time)
+    if n < _DEGREE + 2:
+        raise InputError(
+            f"A rate cannot be derived from {n} samples of strain; give at least 5, or a "
+            "column shear_rate_1_s."
+        )
+    window = min(window, n)
+    slopes = []
+    # a window of its own for each sample: in parts, so that a million samples fit in memory
+    for samples in np.split(np.arange(n), np.arange(_CHUNK, n, _CHUNK)):
+        first = np.clip(samples - window // 2, 0, n - window)
+        index = first[:, None] + np.arange(window)
+        offset = time[index] - time[samples, None]
+        # scaled to the window's width: the normal equations stay well conditioned
+        width = np.max(np.abs(offset), axis=1, keepdims=True)
+        powers = (offset / width)[:, :, None] ** np.arange(_DEGREE + 1)
+        basis, triangle = np.linalg.qr(powers)
+        projected = np.einsum("nwk,nw->nk", basis, values[index])
+        coefficients = np.linalg.solve(triangle, projected[:, :, None])[:, :, 0]
+        slopes.append(coefficients[:, 1] / width[:, 0])
+    return np.concatenate(slopes)
 
 
 def _refuse_another_flow(table: Table, test: DeclaredTest) -> None:
@@ -194,66 +316,38 @@ def _begun(run: Run, test: DeclaredTest, where: str) -> Run:
             f"less than one period ({period:.3g} s), so nobody can say what came before. Give a "
             "whole cycle."
         )
-    protocol = _closed(run, period) if missing > 1e-6 * period else run.protocol
+    protocol = run.protocol
+    if missing > 1e-6 * period:  # ended by its first sample
+        by_stress = protocol.control == "stress"
+        imposed = run.stress if by_stress else run.rate
+        cycle = np.append(run.time, run.time[0] + period), np.append(imposed, imposed[0])
+        closed = _imposed(run.name, *cycle) if by_stress else sampled_rate(*cycle)
+        protocol = in_flow(closed, run.flow)
     return replace(run, protocol=after_alternation(protocol, period, run.time))
 
 
-def _closed(run: Run, period: float) -> FlowProtocol:
-    """Return what was imposed in a cycle without its end, ended by its first sample."""
-    time = np.append(run.time, run.time[0] + period)
-    if run.protocol.control == "stress":
-        return in_flow(_imposed(run.name, time, np.append(run.stress, run.stress[0])), run.flow)
-    return in_flow(sampled_rate(time, np.append(run.rate, run.rate[0])), run.flow)
-
-
-def _checked_time(table: Table) -> Float[np.ndarray, " n"]:
-    time = table.required(units.TIME)
+def _check_time(table: Table, time: Values) -> None:
     if time[0] < 0:
         raise InputError(
             f"time in {table.name} must start at or after 0, when the flow starts; line "
             f"{table.lines[0]} holds {time[0]:g} s. Remove what came before the flow."
         )
-    backwards = np.flatnonzero(np.diff(time) <= 0)
+    backwards = np.flatnonzero(np.diff(time) <= 0) + 1
     if backwards.size:
-        row = int(backwards[0]) + 1
+        row = int(backwards[0])
         raise InputError(
             f"time in {table.name} must increase strictly; line {table.lines[row]} holds "
             f"{time[row]:g} s after {time[row - 1]:g} s. Sort the rows and remove repeated "
-            f"times.{table.like_it(backwards + 1)}"
+            f"times.{table.like_it(backwards)}"
         )
-    return time
 
 
-def _check_sign(name: str, time: np.ndarray, rate: np.ndarray, stress: np.ndarray) -> None:
+def _check_sign(name: str, time: Values, rate: Values, stress: Values) -> None:
     """Refuse a record in which the fluid drives the rheometer."""
-    if len(time) < 2:
-        return
     power = rate * stress
     work, size = np.trapezoid(power, time), np.trapezoid(np.abs(power), time)
-    if work < _WRONG_SIGN * size:
+    if len(time) > 1 and work < _WRONG_SIGN * size:
         raise InputError(
             f"The stress in {name} is opposite to the shear rate over most of the run: the fluid "
             "would drive the rheometer. Change the sign of one of the two columns."
         )
-
-
-def _protocol(
-    time: np.ndarray, rate: np.ndarray, rate_is_measured: bool
-) -> tuple[FlowProtocol, str]:
-    level = float(np.median(rate))
-    if np.ptp(rate) <= _CONSTANT * abs(level):
-        return start_up(level), "measured, constant" if rate_is_measured else "commanded, constant"
-    protocol = sampled_rate(time, rate)
-    between = "a cubic spline" if len(protocol.table_times) > len(time) else "linear"
-    return protocol, f"read sample by sample, {between} between samples"
-
-
-def _metadata(index: Table, row: int) -> dict[str, float | str]:
-    metadata: dict[str, float | str] = {}
-    for column, cells in index.columns.items():
-        if column == "file":
-            continue
-        # float() would also read 1_2, nan or inf, which are labels here
-        cell = cells[row]
-        metadata[column] = float(cell) if _NUMBER.fullmatch(cell) else cell
-    return metadata

@@ -6,8 +6,7 @@ from typing import Any
 
 from discover._version import __version__
 from discover.dataset.load import folder_roots, resolve_folder
-from discover.dataset.tables.table import read_bytes
-from discover.dataset.tables.toml_file import read_toml
+from discover.dataset.tables.table import read_bytes, read_toml
 from discover.study.from_result import result_file
 from discover.study.schema import Study
 from discover.validation import validated

@@ -6,7 +6,7 @@ import pytest
 
 import discover as dc
 from discover.dataset import check_folder, load_dataset
-from discover.dataset.records.rates import differentiate
+from discover.dataset.read_run import differentiate
 from discover.errors import InputError, problems_in
 
 GOOD = {

@@ -6,7 +6,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from discover.dataset.tables.toml_file import read_toml
+from discover.dataset.tables.table import read_toml
 from discover.errors import InputError
 from discover.simulate import synthetic_dataset
 from discover.study import parse_study, read_study

@@ -16,7 +16,6 @@ from discover.dataset.checking.linear_theory import (
 from discover.dataset.checking.normal_stress import doubts_of_normal_stress
 from discover.dataset.checking.runs import doubts_among_runs, doubts_of_run, doubts_of_temperature
 from discover.dataset.checking.start import doubts_of_start
-from discover.dataset.kind_of_test import reason_to_set_aside
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
@@ -36,7 +35,7 @@ from discover.dataset.material_functions import (
     TABLES,
     read_material_functions,
 )
-from discover.dataset.read_run import INDEX_FILE, read_run
+from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units

@@ -9,7 +9,7 @@ from urllib.parse import quote, unquote_to_bytes
 from pydantic import Field, Strict, model_validator
 
 from discover.dataset.importing.names import check_names
-from discover.dataset.tables.toml_file import read_toml, toml_string
+from discover.dataset.tables.table import read_toml, toml_string
 from discover.validation import Section, validated
 
 MAPPING_FILE = "import.toml"

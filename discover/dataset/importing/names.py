@@ -14,7 +14,7 @@ from importlib.resources import files
 from itertools import pairwise
 from pathlib import Path
 
-from discover.dataset.tables.toml_file import read_toml
+from discover.dataset.tables.table import read_toml
 from discover.errors import InputError
 from discover.words import unknown_name
 

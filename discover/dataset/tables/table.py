@@ -1,14 +1,16 @@
-"""Text tables, read safely and with errors that name file, column and line."""
+"""Files that users give: tables and TOML, read safely, with errors that name column and line."""
 
 import csv
 import io
+import json
 import os
 import re
 import stat
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -18,20 +20,13 @@ from discover.errors import InputError, Problems
 from discover.inputs_kept import note_input
 from discover.words import did_you_mean, listed, nearest
 
-LARGEST_FILE = 300_000_000
-"""Bytes; some five million samples. More cannot be looked at, let alone fitted."""
-
-_MOST_LINES = 6
-"""Faulty lines of a file that a message names."""
-
-_PIECE = 2**20
-"""Bytes that are read at once."""
-
+LARGEST_FILE = 300_000_000  # bytes; some five million samples, more than can be looked at
+LARGEST_TEXT = 1_000_000  # bytes of TOML; what is written by hand is a page of text
+_MOST_LINES = 6  # faulty lines of a file that a message names
+# no rheometer quantity in SI units is larger; squares of such numbers still compute
 LARGEST_VALUE = 1e15
-"""No rheometer quantity in SI units is larger; squares of such numbers still compute."""
-
+# what is nearer to zero is zero: no instrument tells them apart, and its square is no number
 SMALLEST_VALUE = 1e-100
-"""What is nearer to zero is zero: no instrument tells them apart, and its square is no number."""
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
@@ -40,15 +35,11 @@ _IMPORT = "discover data import"
 
 @dataclass(frozen=True)
 class Table:
-    """A CSV file as text.
+    """A CSV file as text."""
 
-    `name`: name of the file, for messages.
-    `lines`: line of the file on which each row stands; blank lines count but are no rows.
-    """
-
-    name: str
+    name: str  # for messages
     columns: Mapping[str, Sequence[str]]
-    lines: Sequence[int]
+    lines: Sequence[int]  # on which each row stands; blank lines count but are no rows
 
     def __len__(self) -> int:
         return len(self.lines)
@@ -66,24 +57,19 @@ class Table:
         return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
 
     def numbers(self, column: str) -> Float[np.ndarray, " n"]:
-        """Return a column as finite numbers, those next to nothing as 0.
-
-        Raises InputError if a cell is not a finite number, or is larger than any measurement.
-        """
+        """Return a column as finite numbers, those next to nothing as 0; InputError if none."""
         text = self.columns[column]
         # as Python reads them: pandas before 3 drops the last of many digits
         values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
-        finite = np.isfinite(values)
-        if not np.all(finite):
-            rows = np.flatnonzero(~finite)
+        rows = np.flatnonzero(~np.isfinite(values))
+        if rows.size:
             row = int(rows[0])
             raise InputError(
                 f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
                 f"{shown(text[row])}. {_remedy(text[row], row)}{self.like_it(rows)}"
             )
-        large = np.abs(values) > LARGEST_VALUE
-        if np.any(large):
-            row = int(np.argmax(large))
+        row = int(np.argmax(np.abs(values) > LARGEST_VALUE))
+        if abs(values[row]) > LARGEST_VALUE:
             raise InputError(
                 f"{column} in {self.name} holds {values[row]:g} on line {self.lines[row]}, more "
                 f"than any measurement (the limit is {LARGEST_VALUE:g}). Correct or remove that "
@@ -96,10 +82,7 @@ class Table:
         return _like_it([self.lines[row] for row in rows])
 
     def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
-        """Return a known quantity in SI units, or None if no column holds it.
-
-        Raises InputError if its unit or a cell is wrong.
-        """
+        """Return a quantity in SI units, None without a column; InputError if it is wrong."""
         try:
             found = find_column(tuple(self.columns), quantity)
         except InputError as error:
@@ -118,10 +101,7 @@ class Table:
         return values
 
     def required(self, quantity: Quantity) -> Float[np.ndarray, " n"]:
-        """Return a known quantity in SI units.
-
-        Raises InputError if no column holds it, or its unit or a cell is wrong.
-        """
+        """Return a quantity in SI units; InputError if no column holds it, or it is wrong."""
         values = self.quantity(quantity)
         if values is None:
             raise InputError(
@@ -148,24 +128,25 @@ def read_bytes(
     too_large: str = "Keep fewer samples of it.",
     is_input: bool = True,
 ) -> bytes:
-    """Return the content of a regular file of reasonable size.
+    """Return the content of a regular file of reasonable size; InputError if it is none.
 
     `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
-    whether a command that reads it must not write over it; see `discover.inputs_kept`. Raises
-    InputError if it is missing, cannot be read, is no regular file (a pipe would never end), or is
-    larger than it may be.
+    whether a command that reads it must not write over it; see `discover.inputs_kept`.
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
         with open(path, "rb", opener=_at_once) as file:
             status = os.fstat(file.fileno())
+            size = status.st_size
             if not stat.S_ISREG(status.st_mode):
                 raise InputError(
                     f"{name} is a pipe or device, not a file. Save the data in a file."
                 )
             # a file that grows, or says 0 bytes and never ends, is no larger than the limit either
-            content = _read(file, status.st_size, largest) if status.st_size <= largest else b""
-        size = max(status.st_size, len(content))
+            content = file.read(size + 1) if size <= largest else b""
+            if len(content) > size:
+                content += file.read(largest + 1 - len(content))
+        size = max(size, len(content))
         if size > largest:
             raise InputError(
                 f"{name} has {size / 1e6:.0f} MB; the limit is {largest / 1e6:.0f} MB. {too_large}"
@@ -202,29 +183,15 @@ def did_you_mean_file(path: Path) -> str:
     return did_you_mean(path.name, (name for name in there if not name.startswith(".")))
 
 
-def _read(file: BinaryIO, size: int, largest: int) -> bytes:
-    """Return what a file of a size holds; of one that holds more one byte more than the largest."""
-    content = file.read(size + 1)
-    if len(content) <= size:
-        return content
-    grown = bytearray(content)  # it grows, or does not say its size
-    while len(grown) <= largest and (piece := file.read(_PIECE)):
-        grown += piece
-    return bytes(grown)
-
-
 def _at_once(path: str, flags: int) -> int:
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
-    """Return a CSV file with a header line as text.
+    """Return a CSV file with a header line as text; InputError if it is missing, empty or none.
 
     A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
     commas and other encodings are recognised and refused, since guessing at numbers is no help.
-
-    `name`: its name in messages; the file's own by default. Raises InputError if the file is
-    missing, empty or not a table.
     """
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
@@ -232,7 +199,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
     header: list[str] = []
     rows: list[list[str]] = []
     lines: list[int] = []
-    start, ragged, why_ragged = 1, [], ""
+    start, ragged, why = 1, [], ""
     try:
         for cells in reader:
             first, start = start, reader.line_num + 1
@@ -242,7 +209,14 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
                 header = _header(cells, first, name)
                 continue
             if len(cells) != len(header):
-                why_ragged = why_ragged or _ragged(name, cells, len(header), first)
+                of_numbers = all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
+                remedy = "Correct that line."
+                if len(cells) > len(header) and of_numbers:
+                    remedy = "Decimal commas look so too: write decimal points."
+                why = why or (
+                    f"{name} is not a comma-separated table: line {first} has {len(cells)} cells, "
+                    f"the header {len(header)}. {remedy}"
+                )
                 ragged.append(first)
             rows.append(cells)
             lines.append(first)
@@ -251,14 +225,13 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
             f"{name} is not a comma-separated table: line {start} ({error}). Fix the quotes there."
         ) from None
     if ragged:
-        raise InputError(why_ragged + _like_it(ragged))
+        raise InputError(why + _like_it(ragged))
     if not header:
         raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
     if not rows:
         raise InputError(f"{name} has a header but no rows. Add the samples, or remove the file.")
-    return Table(
-        name, {column: [row[i].strip() for row in rows] for i, column in enumerate(header)}, lines
-    )
+    columns = {column: [row[i].strip() for row in rows] for i, column in enumerate(header)}
+    return Table(name, columns, lines)
 
 
 def _decode(content: bytes, name: str) -> str:
@@ -315,17 +288,6 @@ def _like_it(lines: Sequence[int]) -> str:
     return f" (Line{'s' * (len(others) > 1)} {listed(others)} too.)"
 
 
-def _ragged(name: str, cells: list[str], wanted: int, line: int) -> str:
-    if len(cells) > wanted and all(_NUMBER.fullmatch(cell.strip()) for cell in cells):
-        why = " Decimal commas look so too: write decimal points."
-    else:
-        why = " Correct that line."
-    return (
-        f"{name} is not a comma-separated table: line {line} has {len(cells)} cells, the header "
-        f"{wanted}.{why}"
-    )
-
-
 def _remedy(cell: str, row: int) -> str:
     if _DECIMAL_COMMA.fullmatch(cell):
         return f"Write decimal points, not commas, or use {_IMPORT}."
@@ -366,10 +328,9 @@ def shown(cell: str) -> str:
 
 
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
-    """Return finite numbers as an array of shape (n,).
+    """Return a list, an array or a series of finite numbers as an array of shape (n,).
 
-    `values`: A list, an array or a pandas series. Raises InputError if they have a unit of their
-    own, are not numbers, not finite, or of another shape.
+    Raises InputError if they have a unit of their own, or are none.
     """
     if hasattr(values, "magnitude"):
         raise InputError(
@@ -383,7 +344,10 @@ def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
     except (TypeError, ValueError, OverflowError):
         numbers = None
     if numbers is None or numbers.ndim != 1:
-        raise InputError(f"{label} must be a list or an array of numbers; got {_shown(values)}.")
+        got = repr(values) if len(repr(values)) <= 60 else f"{repr(values)[:60]}…"
+        if shape := getattr(values, "shape", None):
+            got = f"an array of shape {shape} of {getattr(values, 'dtype', 'unknown type')}"
+        raise InputError(f"{label} must be a list or an array of numbers; got {got}.")
     if not np.all(np.isfinite(numbers)):
         row = int(np.argmin(np.isfinite(numbers)))
         raise InputError(
@@ -392,9 +356,55 @@ def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
     return numbers
 
 
-def _shown(values: object) -> str:
-    shape = getattr(values, "shape", None)
-    if shape:
-        return f"an array of shape {shape} of {getattr(values, 'dtype', 'unknown type')}"
-    text = repr(values)
-    return text if len(text) <= 60 else f"{text[:60]}…"
+_DEEPEST_KEY = 16
+_PART = r"""(?:[A-Za-z0-9_-]++|"(?:[^"\\\n]|\\[^\n])*+"?|'[^'\n]*+'?)"""
+_LINK = rf"[ \t]*+\.[ \t]*+{_PART}"
+# No value has more than one dot outside strings, so whatever has many is a key. Every token is
+# taken whole, closed or not, so that the time is linear in the text.
+_TOKEN = re.compile(
+    rf"""
+    \#[^\n]*+
+    | \"{{3}} (?: [^"\\] | \\. | "{{1,2}}(?!") )*+ (?:"{{3,5}})?
+    | '{{3}} (?: [^'] | '{{1,2}}(?!') )*+ (?:'{{3,5}})?
+    | (?P<deep> {_PART} (?:{_LINK}){{{_DEEPEST_KEY},}}+ )
+    | {_PART} (?:{_LINK})*+
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+
+
+def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]:
+    """Return the content of a TOML file, and its text; InputError says on which line it is none.
+
+    `kind`: what it should be, such as "study file". `example`: what to do where it is of another
+    kind, as a sentence.
+    """
+    raw = read_bytes(
+        path, str(path), f"Check the path of the {kind}.", largest=LARGEST_TEXT, too_large=example
+    )
+    try:
+        # editors on Windows write a byte order mark, which TOML does not know
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        raise InputError(
+            f"{path} is not UTF-8 text, so it is not a {kind}. Save it as UTF-8."
+        ) from None
+    # the library's time grows with the square of the parts, whether they make a key or not
+    deep = next((token for token in _TOKEN.finditer(text) if token["deep"]), None)
+    if deep is not None:
+        line = text[: deep.start()].count("\n") + 1
+        raise InputError(
+            f"{path} has a key of more than {_DEEPEST_KEY} parts on line {line}, so it is not a "
+            f"{kind}. {example}"
+        )
+    try:
+        return tomllib.loads(text), text
+    except RecursionError:
+        raise InputError(f"{path} is nested too deeply to be a {kind}. {example}") from None
+    except ValueError as error:  # TOML's own error, or a number of thousands of digits
+        raise InputError(f"{path} is not valid TOML: {error}. Fix that line.") from None
+
+
+def toml_string(text: str) -> str:
+    """Return a text as TOML has it, which escapes as JSON does, and DEL besides."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -4,8 +4,8 @@ import math
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
+from typing import NamedTuple
 
 from discover.errors import InputError
 
@@ -14,8 +14,7 @@ from discover.errors import InputError
 # and ``9**9**9`` is not worked out. What a single word means is asked of pint.
 
 _LONGEST = 40  # characters
-
-_SPELLINGS = {
+_SPELLINGS = {  # what pint does not know under this name
     "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
     "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
     "pa": "Pa", "PA": "Pa", "kpa": "kPa",
@@ -34,31 +33,20 @@ _SPELLINGS = {
     "度": "degree", "转": "turn", "轉": "turn", "毫米": "mm", "초": "s", "분": "min",
     "시간": "hour", "도": "degree", "라디안": "rad", "파스칼": "Pa", "헤르츠": "Hz",
 }  # fmt: skip
-"""What pint does not know under this name."""
-
+# products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms
 _JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
-"""Products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms."""
-
 _NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
-
 _DIMENSIONS = ("[mass]", "[length]", "[time]")
-
+# units without a dimension; pint counts constants such as pi among them
 _NUMBERS = ("radian", "degree", "turn", "percent", "ppm")
-"""Units without a dimension; pint counts constants such as pi among them."""
 
 
-@dataclass(frozen=True)
-class Unit:
-    """A unit as its factor to SI and its dimension.
-
-    `factor`: of the SI unit.
-    `dimension`: exponents of kg, m and s. Angles and numbers have none.
-    `cycles`: whether it counts cycles, as Hz does; 1 Hz is 2π rad/s where an angle is meant.
-    """
+class Unit(NamedTuple):
+    """A unit as its factor to SI and its dimension."""
 
     factor: float = 1.0
-    dimension: tuple[int, int, int] = (0, 0, 0)
-    cycles: bool = False
+    dimension: tuple[int, int, int] = (0, 0, 0)  # exponents of kg, m and s; angles have none
+    cycles: bool = False  # it counts them, as Hz does: 2π rad/s where an angle is meant
 
     def times(self, other: "Unit", exponent: int = 1) -> "Unit":
         """Return this unit times a power of another."""
@@ -68,10 +56,9 @@ class Unit:
 
 
 def read_heading(suffix: str) -> Unit | None:
-    """Return the unit at the end of a column's name, or None if it is none.
+    """Return the unit at the end of a column's name, such as ``dyn_cm2``, or None if it is none.
 
-    The first word stands above the fraction line, the others below it: ``1_min``, ``rad_s``,
-    ``dyn_cm2``.
+    The first word stands above the fraction line, the others below it.
     """
     first, *below = suffix.split("_")
     if len(suffix) > _LONGEST or (first == "1" and not below):
@@ -114,14 +101,14 @@ _SIGNS = str.maketrans({**dict.fromkeys("·⋅•∙・×", "*"), **dict.fromkey
 _OPENING = {")": "(", "]": "[", "}": "{", ">": "<"}
 _BRACKETS = str.maketrans("（）［］｛｝＜＞【】〔〕〈〉", "()[]{}<>[][]<>")
 _IN = re.compile(r"(.*\S)\s+(?:in|en|em)\s+(\S.*)")
+# what stands in brackets and is no unit: Time (action), G(t), tan(delta)
 _WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
-"""What stands in brackets and is no unit: Time (action), G(t), tan(delta)."""
 
 
 def name_and_unit(name: str, unit: str) -> tuple[str, str]:
     """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
 
-    `unit`: as it stands beside or below the name; empty if it does not.
+    `unit`: as it stands beside or below the name, or empty.
     """
     name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
     if unit and _OPENING.get(unit[-1]) == unit[0]:
@@ -223,18 +210,12 @@ def _registry():
     return pint.UnitRegistry()
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """A column that the software knows.
+class Quantity(NamedTuple):
+    """A column that the software knows."""
 
-    `stem`: beginning of the column's name, before the unit.
-    `column`: name of the column in SI units.
-    `unit`: that unit; empty for a pure number.
-    """
-
-    stem: str
-    column: str
-    unit: str
+    stem: str  # beginning of its name, before the unit
+    column: str  # its name in SI units
+    unit: str  # that unit; empty for a pure number
 
 
 TIME = Quantity("time", "time_s", "s")
@@ -252,10 +233,9 @@ LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "Pa")
 
 
 def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
-    """Return the factor from the unit of a column's suffix to SI, or None if it is no unit.
+    """Return the factor to SI from what follows the stem in a name, or None if it is no unit.
 
-    `suffix`: what follows the stem in the column's name, such as ``kPa``, ``1_min``, ``rad_s``,
-    ``dyn_cm2`` or ``percent``. Raises InputError if the suffix is a unit of something else.
+    Raises InputError if it is a unit of something else.
     """
     unit = read_heading(suffix)
     if unit is None:
@@ -280,10 +260,9 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
 
 
 def heading_factor(column: str, quantity: Quantity) -> float:
-    """Return the factor to SI of a column whose name is the user's; one where it names no unit.
+    """Return the factor to SI of a column with a name of the user's; one where it ends in no unit.
 
-    `column`: its name, such as ``rate_before_1_min``: the longest ending that is a unit counts.
-    Raises InputError if the name ends in a unit of something else.
+    The longest ending that is a unit counts. Raises InputError if that is one of something else.
     """
     words = column.split("_")
     endings = ["_".join(words[i:]) for i in range(1, len(words))]

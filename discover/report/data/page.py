@@ -11,7 +11,7 @@ from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.dataset.run_table import material_and_temperature, run_line
-from discover.dataset.tables.toml_file import toml_string
+from discover.dataset.tables.table import toml_string
 from discover.errors import InputError
 from discover.report.page import render
 from discover.report.parts import attempt
