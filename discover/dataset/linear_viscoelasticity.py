@@ -17,9 +17,10 @@ from discover.statistics.projection import rms
 from discover.statistics.residual import slow_part
 
 MOST_MODES = 30
+# relative error below which no pattern is worth a word: rheometers are not that accurate
 FLOOR = 0.01
-"""A relative error below which no pattern is worth a word: rheometers are not that accurate."""
-
+# probability that noise leaves such a misfit, up to which it is taken to be none
+_SEEMS_NOISE = 0.05
 _SOLID = (
     "the material is a solid down to {:.4g} rad/s, with an elastic constant of {:.4g} Pa. A law of "
     "a fluid holds it as a mode of {:.3g} s, the shortest that the sweep allows: do not use what "
@@ -28,9 +29,6 @@ _SOLID = (
 
 Constant = float | Literal["fit"] | None
 """A constant that is known, that is fitted, or that evidence asks for."""
-
-_SEEMS_NOISE = 0.05
-"""Probability that noise leaves such a misfit, up to which it is taken to be none."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,11 @@ class LinearSweep:
     def __len__(self) -> int:
         return self.angular_frequency.shape[0]
 
+    @property
+    def measured(self) -> Float[np.ndarray, "2 n"]:
+        """G′ and G″ in Pa, shape (2, n)."""
+        return np.stack([self.storage_modulus, self.loss_modulus])
+
     def __repr__(self) -> str:
         omega = self.angular_frequency
         span = f", {omega[0]:.4g} to {omega[-1]:.4g} rad/s" if len(self) else ""
@@ -93,13 +96,9 @@ class LinearSweep:
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the sweep, one line for each frequency, in the columns of ``lve.csv``."""
-        return pd.DataFrame(
-            {
-                "omega_rad_s": self.angular_frequency,
-                "Gp_Pa": self.storage_modulus,
-                "Gpp_Pa": self.loss_modulus,
-            }
-        )
+        columns = (self.angular_frequency, self.storage_modulus, self.loss_modulus)
+        names = ("omega_rad_s", "Gp_Pa", "Gpp_Pa")
+        return pd.DataFrame(dict(zip(names, columns, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -224,16 +223,17 @@ def relaxation_spectrum(
         raise InputError(
             f"modes must be from 1 to the number of frequencies, {count}; got {modes}."
         )
-    if np.any(sweep.storage_modulus <= 0) or np.any(sweep.loss_modulus <= 0):
+    measured = sweep.measured
+    if np.any(measured <= 0):
         raise InputError(
             "A relaxation spectrum needs moduli that are positive at every frequency. Remove the "
             "others."
         )
     known = {"solvent_viscosity": solvent_viscosity, "elastic_modulus": elastic_modulus}
     for name, value in known.items():
-        if value is not None and value != "fit" and not _is_amount(value):
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if value not in (None, "fit") and not (number and 0.0 <= float(value) < np.inf):
             raise InputError(f'{name} must be a number, not negative, or "fit"; got {value!r}.')
-    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
     search = ModeSearch(sweep.angular_frequency, measured, solvent_viscosity, elastic_modulus)
     held = 0 if elastic_modulus in (None, "fit", 0.0) else 1  # a known constant is a mode too
     fits = list(search.fits(0 if modes is None else modes - held))
@@ -265,21 +265,14 @@ def relaxation_spectrum(
     )
 
 
-def _is_amount(value: object) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool) and 0.0 <= float(value) < np.inf
-
-
-def _value(known: Constant, fitted: float | None) -> float:
-    """Return a constant that was fitted, or else is known, or else is not there."""
-    if fitted is not None:
-        return fitted
-    return 0.0 if known is None or isinstance(known, str) else float(known)
-
-
 def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> RelaxationSpectrum:
     """Return a fit as a spectrum, with a mode in the place of an elastic constant."""
-    solvent = _value(search.solvent_viscosity, fit.solvent_viscosity)
-    elastic = _value(search.elastic_modulus, fit.elastic_modulus)
+    fitted = fit.solvent_viscosity, fit.elastic_modulus
+    known = search.solvent_viscosity, search.elastic_modulus
+    solvent, elastic = (
+        float(value) if one is None and isinstance(value, Real) else one or 0.0
+        for one, value in zip(fitted, known, strict=True)
+    )
     modulus, times = fit.modulus, fit.relaxation_time
     if elastic > 0.0:
         modulus = np.append(modulus, elastic)
@@ -290,12 +283,6 @@ def _as_spectrum(sweep: LinearSweep, search: ModeSearch, fit: ModeFit) -> Relaxa
         solid = _SOLID.format(sweep.angular_frequency[slowest], elastic, times[-1])
     found = RelaxationSpectrum(modulus, times, 0.0, 0.0, {}, None, 0.0, solvent, elastic, solid)
     return replace(found, relative_error=rms(_misfit(sweep, found)))
-
-
-def _relative_moduli(sweep: LinearSweep, found: RelaxationSpectrum, solvent: bool) -> np.ndarray:
-    """Return G′ and G″ of each constant over those measured, shape (2n, constants)."""
-    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
-    return relative_moduli(sweep.angular_frequency, measured, found.relaxation_time, solvent)
 
 
 def _covariance(
@@ -310,7 +297,9 @@ def _covariance(
     """
     has_solvent = found.solvent_viscosity > 0.0
     amounts = np.append(found.modulus, [found.solvent_viscosity] if has_solvent else [])
-    design = _relative_moduli(sweep, found, has_solvent) * amounts
+    design = amounts * relative_moduli(
+        sweep.angular_frequency, sweep.measured, found.relaxation_time, has_solvent
+    )
     variance = np.sum(rows**2) / max(rows.size - design.shape[1], 1)
     if not is_noise:
         variance *= rows.size / sum(independent_samples(row) for row in rows)
@@ -320,8 +309,7 @@ def _covariance(
 def _misfit(sweep: LinearSweep, found: RelaxationSpectrum) -> Float[np.ndarray, "2 n"]:
     """Return what a spectrum misses G′ and G″ by, relative, along increasing frequency."""
     order = np.argsort(sweep.angular_frequency)
-    measured = np.stack([sweep.storage_modulus, sweep.loss_modulus])
-    return (np.stack(found.moduli(sweep.angular_frequency)) / measured - 1.0)[:, order]
+    return (np.stack(found.moduli(sweep.angular_frequency)) / sweep.measured - 1.0)[:, order]
 
 
 def _seems_noise(rows: Float[np.ndarray, "2 n"]) -> bool:
@@ -339,9 +327,8 @@ def _pattern(
     """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
     Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
-    leave less than these by more than the freedom that they have, `coarse`, squared. Of a sweep too
-    short to tell it is all of the misfit. None if no number of modes leaves noise: `left` is of the
-    best.
+    leave less than these by more than the freedom that they have, `coarse`, squared. All of it in a
+    sweep too short to tell; None if no number of modes leaves noise: `left` is of the best.
     """
     error = rms(rows)
     if rows.shape[1] < FEWEST_FAST:

@@ -4,13 +4,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.dataset.linear.linear_spectra import (
+from discover.dataset.linear.linear_tests import (
+    LinearTest,
     creep_compliance,
     linear_agreements,
     modes_of_retardation,
+    read_linear_tests,
     spectrum_of,
 )
-from discover.dataset.linear.linear_tests import LinearTest, read_linear_tests
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.report.data.linear_agreement import agreement_words
 

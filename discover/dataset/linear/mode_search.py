@@ -9,48 +9,48 @@ import numpy as np
 from jaxtyping import Float
 from scipy.optimize import least_squares, nnls
 
+# Decades beyond the window in which a mode may lie. Further out it is a solvent or an elastic
+# constant: at a decade its curvature is 1 % of its modulus
 BEYOND = 1.0
-"""Decades beyond the window in which a mode may lie. Further out it is a solvent or an elastic
-constant: at a decade its curvature is 1 % of its modulus."""
-
+# Relative error of a modulus below which no fit is better than another: that of sound rheometers in
+# repeated sweeps, and of digits in exported files
 REPEATABILITY = 0.002
-"""Relative error of a modulus below which no fit is better than another: that of sound rheometers
-in repeated sweeps, and of digits in exported files."""
-
 _PER_DECADE = 12
-_ROUGHLY, _CLOSELY = (1e-6, 20), (1e-12, 200)
+_ROUGHLY, _CLOSELY = (1e-6, 20), (1e-12, 200)  # tolerance and most evaluations of a fit
 _LONGEST = 1e12
 
 
 @dataclass(frozen=True)
 class ModeFit:
-    """Least-squares fit of modes, a solvent and an elastic constant to a sweep.
+    """Least-squares fit of modes, a solvent and an elastic constant to a sweep."""
 
-    `relaxation_time` in s, shape (k,), increasing.
-    `modulus` in Pa, shape (k,).
-    `solvent_viscosity`, `elastic_modulus` in Pa s and Pa; None where it is not among what was
-        fitted.
-    `squared`: sum of the squared relative misfits of G′ and G″.
-    `criterion`: twice the negative log evidence; the smallest is the best.
-    """
+    relaxation_time: Float[np.ndarray, " k"]  # in s, increasing
+    modulus: Float[np.ndarray, " k"]  # in Pa
+    solvent_viscosity: float | None = None  # in Pa s; None where it was not fitted
+    elastic_modulus: float | None = None  # in Pa; likewise
+    squared: float = np.inf  # sum of the squared relative misfits of G′ and G″
+    criterion: float = np.inf  # twice the negative log evidence; the smallest is the best
 
-    relaxation_time: Float[np.ndarray, " k"]
-    modulus: Float[np.ndarray, " k"]
-    solvent_viscosity: float | None = None
-    elastic_modulus: float | None = None
-    squared: float = np.inf
-    criterion: float = np.inf
+    @property
+    def kinds(self) -> tuple[bool, bool]:
+        """Whether solvent and elastic constant were fitted."""
+        return self.solvent_viscosity is not None, self.elastic_modulus is not None
+
+    @property
+    def extra(self) -> np.ndarray:
+        """Those of the two that were, shape (0 to 2,)."""
+        both = (self.solvent_viscosity, self.elastic_modulus)
+        return np.array([value for value in both if value is not None])
 
     @property
     def n_constants(self) -> int:
         """Number of fitted constants."""
-        both = (self.solvent_viscosity, self.elastic_modulus)
-        return 2 * len(self.modulus) + sum(value is not None for value in both)
+        return 2 * len(self.modulus) + sum(self.kinds)
 
     @property
     def n_modes(self) -> int:
         """Number of modes, that of an elastic constant included."""
-        return len(self.modulus) + (self.elastic_modulus is not None)
+        return len(self.modulus) + self.kinds[1]
 
 
 def relative_moduli(
@@ -64,12 +64,11 @@ def relative_moduli(
 
     Modes and elastic constant are of 1 Pa, the solvent is of 1 Pa s.
     """
-    x = frequency[:, None] * times
+    x, zero = frequency[:, None] * times, np.zeros_like(frequency)
     storage, loss = measured
     columns = [
         np.concatenate([x**2 / (1 + x**2) / storage[:, None], x / (1 + x**2) / loss[:, None]])
     ]
-    zero = np.zeros_like(frequency)
     if solvent:
         columns.append(np.concatenate([zero, frequency / loss])[:, None])
     if elastic:
@@ -84,15 +83,11 @@ class ModeSearch:
     Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
     [Lawson & Hanson 1974]. Their times are then fitted along, and modes merged or left out one by
     one, the least missed first, down to one. Solvent and elastic constant are with and without.
-
-    `frequency` in rad/s, shape (n,).
-    `measured`: G′ and G″ in Pa, shape (2, n).
-    `solvent_viscosity`, `elastic_modulus`: values known beforehand; ``"fit"`` is always fitted,
-        None only where evidence asks for it.
     """
 
-    frequency: Float[np.ndarray, " n"]
-    measured: Float[np.ndarray, "2 n"]
+    frequency: Float[np.ndarray, " n"]  # in rad/s
+    measured: Float[np.ndarray, "2 n"]  # G′ and G″ in Pa
+    # known beforehand, always fitted, or, with None, only where evidence asks for it
     solvent_viscosity: float | Literal["fit"] | None = None
     elastic_modulus: float | Literal["fit"] | None = None
     bounds: tuple[float, float] = field(init=False)
@@ -113,10 +108,7 @@ class ModeSearch:
         return self.solvent_viscosity, self.elastic_modulus
 
     def fits(self, fewest: int = 0) -> Iterator[ModeFit]:
-        """Yield fits of every number of modes, with and without solvent and elastic constant.
-
-        `fewest`: number of modes that there has to be a fit of, though fewer may do.
-        """
+        """Yield fits of so many modes and more, with and without solvent and elastic constant."""
         choices = [
             (True,) if value == "fit" else (False, True) if value is None else (False,)
             for value in self._asked
@@ -132,10 +124,9 @@ class ModeSearch:
     def elastic_time(self, fit: ModeFit) -> float:
         """Return the shortest time in s of a mode that the sweep cannot tell from the constant.
 
-        It raises the misfit by no more than one standard deviation, the other constants fitted
-        along at their times.
+        It raises the misfit by one standard deviation at most, the other amounts fitted along.
         """
-        solvent, target = fit.solvent_viscosity is not None, self._target
+        solvent, target = fit.kinds[0], self._target
         if not isinstance(self.elastic_modulus, str) and self.elastic_modulus is not None:
             column = self._design(np.zeros(0), False, True)[:, 0]
             target = target + column * self.elastic_modulus
@@ -167,7 +158,7 @@ class ModeSearch:
             fit = self._at(times, solvent, elastic)
             if len(times) <= most:
                 fit = self._fitted(fit, _ROUGHLY)
-                if np.all(np.append(fit.modulus, _linear(fit)) > 0.0):
+                if np.all(np.append(fit.modulus, fit.extra) > 0.0):
                     yield fit
             if len(times) <= least:
                 return
@@ -188,11 +179,11 @@ class ModeSearch:
         for i in range(len(times) - 1):
             between = _mean(times[i : i + 2], modulus[i : i + 2])
             trials.append(np.concatenate([times[:i], [between], times[i + 2 :]]))
-        extra = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
         costs = [
-            solved(self._design(t, *extra), self._target)[1] if len(t) or any(extra) else np.inf
+            solved(self._design(t, *fit.kinds), self._target)[1] if len(t) or any(fit.kinds)
+            else np.inf
             for t in trials
-        ]
+        ]  # fmt: skip
         return trials[int(np.argmin(costs))]
 
     def _at(self, times: np.ndarray, solvent: bool, elastic: bool) -> ModeFit:
@@ -200,25 +191,19 @@ class ModeSearch:
         return self._named(np.sort(times), amounts, solvent, elastic, squared)
 
     def _named(self, times, amounts, solvent: bool, elastic: bool, squared: float) -> ModeFit:
-        k = len(times)
-        fit = ModeFit(
-            times,
-            amounts[:k],
-            float(amounts[k]) if solvent else None,
-            float(amounts[-1]) if elastic else None,
-            float(squared),
-        )
+        viscosity = float(amounts[len(times)]) if solvent else None
+        constant = float(amounts[-1]) if elastic else None
+        fit = ModeFit(times, amounts[: len(times)], viscosity, constant, float(squared))
         return replace(fit, criterion=self._criterion(fit))
 
     def _fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
         """Return the fit with the relaxation times fitted along, in logarithms."""
         tolerance, evaluations = limits
-        k, extra = len(fit.modulus), _linear(fit)
+        k, kinds = len(fit.modulus), fit.kinds
         if not k:
             return fit
-        kinds = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
         low, high = np.log(self.bounds)
-        amounts = np.append(fit.modulus, extra)
+        amounts = np.append(fit.modulus, fit.extra)
         amounts = np.maximum(amounts, 1e-6 * np.max(amounts[:k], initial=1e-300))
 
         def misfit(logs: np.ndarray) -> np.ndarray:
@@ -228,25 +213,17 @@ class ModeSearch:
         def slopes(logs: np.ndarray) -> np.ndarray:
             times, amounts = np.exp(np.clip(logs[:k], low, high)), np.exp(logs[k:])
             x = self.frequency[:, None] * times
-            per_time = np.concatenate(
-                [
-                    2 * x**2 / (1 + x**2) ** 2 / self.measured[0][:, None],
-                    x * (1 - x**2) / (1 + x**2) ** 2 / self.measured[1][:, None],
-                ]
-            )
+            storage = 2 * x**2 / (1 + x**2) ** 2 / self.measured[0][:, None]
+            loss = x * (1 - x**2) / (1 + x**2) ** 2 / self.measured[1][:, None]
             inside = (logs[:k] > low) & (logs[:k] < high)
-            return np.hstack(
-                [
-                    np.where(inside, per_time * amounts[:k], 0.0),
-                    self._design(times, *kinds) * amounts,
-                ]
-            )
+            per_time = np.where(inside, np.concatenate([storage, loss]) * amounts[:k], 0.0)
+            return np.hstack([per_time, self._design(times, *kinds) * amounts])
 
         start = np.log(np.concatenate([fit.relaxation_time, amounts]))
         with np.errstate(over="ignore", invalid="ignore"):
-            limits_of = {"ftol": tolerance, "xtol": tolerance, "gtol": tolerance}
+            ends = dict.fromkeys(("ftol", "xtol", "gtol"), tolerance)
             options: dict[str, Any] = {"jac": slopes, "method": "lm", "max_nfev": evaluations}
-            end = least_squares(misfit, start, **limits_of, **options).x
+            end = least_squares(misfit, start, **ends, **options).x
         if not np.all(np.isfinite(misfit(end))):
             return fit
         times, amounts = np.exp(np.clip(end[:k], low, high)), np.exp(end[k:])
@@ -264,22 +241,15 @@ class ModeSearch:
         count = self.measured.size
         variance = self._variance(fit)
         total = count * np.log(variance) + 2 * len(fit.modulus) * np.log(count)
-        extra = _linear(fit)
-        if not len(extra):
+        if not any(fit.kinds):
             return float(total)
-        kinds = fit.solvent_viscosity is not None, fit.elastic_modulus is not None
-        design = self._design(fit.relaxation_time, *kinds)
+        design = self._design(fit.relaxation_time, *fit.kinds)
         scale = np.linalg.norm(design, axis=0)
         inverse = np.linalg.pinv((design / scale).T @ (design / scale), hermitian=True)
         errors = np.sqrt(variance * np.diag(inverse)) / scale
         room = np.array([np.min(self.measured[1] / self.frequency), np.min(self.measured[0])])
-        share = room[np.array(kinds)] / (np.sqrt(2 * np.pi) * errors[-len(extra) :])
+        share = room[np.array(fit.kinds)] / (np.sqrt(2 * np.pi) * errors[-sum(fit.kinds) :])
         return float(total + np.sum(np.maximum(2.0 * np.log(share), np.log(count))))
-
-
-def _linear(fit: ModeFit) -> np.ndarray:
-    both = (fit.solvent_viscosity, fit.elastic_modulus)
-    return np.array([value for value in both if value is not None])
 
 
 def _mean(times: np.ndarray, weights: np.ndarray) -> float:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -16,90 +17,90 @@ from discover.dataset.linear.linear_tests import LinearTest, directions
 from discover.errors import InputError
 from discover.statistics.noise.independent_samples import independent_samples
 
-_FEWEST = 4
-"""Samples of each of two neighbours in their overlap, below which they are not laid over."""
-
+_FEWEST = 4  # samples of each in the overlap, below which neighbours are not laid over
 _STEPS = 241
 _FACTOR_TWO = 0.3
-
+# Of two overlaps whose misfits differ by no more than such noise would in this share of cases, the
+# longer one counts
 _CHANCE = 0.99
-"""Of two overlaps whose misfits differ by no more than such noise would in this share of cases, the
-longer one counts."""
-
-_TURNS = 3
-"""How often a shift is fitted: by it samples come into the overlap or leave it."""
-
+_TURNS = 3  # how often a shift is fitted: by it samples come into the overlap or leave it
+# Largest degree, least distance of knots in decades, and fewest samples for each constant, of the
+# smooth curve: moduli of a broad spectrum bend no faster. Schwarz's criterion says how many
 _CUBIC, _KNOT, _SAMPLES_A_KNOT = 3, 0.5, 2
-"""Largest degree, least distance of knots in decades, and fewest samples for each constant, of the
-smooth curve: moduli of a broad spectrum bend no faster. Schwarz's criterion says how many."""
-
-_UNKNOWN = 2.0
-"""Standard error in decades of a shift of which an overlap says nothing."""
-
-_FLOOR = 0.01
-"""Relative error below which no sample counts for more: no test repeats itself better."""
-
+_UNKNOWN = 2.0  # standard error in decades of a shift of which an overlap says nothing
+_FLOOR = 0.01  # relative error below which no sample counts for more: no test repeats itself better
 _DECADE = np.log(10.0)
 
 
-@dataclass(frozen=True)
-class Overlap:
-    """The shift of one test over another.
+class Overlap(NamedTuple):
+    """The shift of one test over another."""
 
-    `shift`: log10 of a_T and b_T of the warmer over the colder.
-    `covariance`: of both, shape (2, 2); what neighbouring samples share counts once.
-    """
-
-    shift: Float[np.ndarray, " 2"]
-    covariance: Float[np.ndarray, "2 2"]
+    shift: Float[np.ndarray, " 2"]  # log10 of a_T and b_T of the warmer over the colder
+    covariance: Float[np.ndarray, "2 2"]  # what neighbouring samples share counts once
 
 
-@dataclass(frozen=True)
+class _Curve(NamedTuple):
+    """Log values of a test over its log arguments, with weights."""
+
+    x: np.ndarray
+    values: np.ndarray  # shape (k, n)
+    weight: np.ndarray
+
+    @classmethod
+    def of(cls, test: LinearTest, where: str) -> "_Curve":
+        """Return those of a test; InputError if it has too few samples."""
+        argument, first = np.unique(test.argument, return_index=True)
+        if len(first) < _FEWEST:
+            raise InputError(
+                f"Shifting needs {_FEWEST} samples; the {test.name} at {where} has fewer."
+            )
+        weight = _FLOOR / np.hypot(_FLOOR, test.spread[first])
+        return cls(np.log10(argument), np.log10(test.values[:, first]), weight)
+
+
 class _Pair:
     """Log curves of one kind of test at two temperatures."""
 
-    fixed_x: np.ndarray
-    fixed: np.ndarray
-    moving_x: np.ndarray
-    moving: np.ndarray
-    fixed_weight: np.ndarray
-    weight: np.ndarray
-    along: int
-    up: int
+    def __init__(self, cold: LinearTest, warm: LinearTest, where: str):
+        self.fixed, self.moving = _Curve.of(cold, where), _Curve.of(warm, where)
+        self.along, self.up = directions(cold.kind)
 
     @property
     def trials(self) -> np.ndarray:
         """Values of log a_T at which anything overlaps."""
-        ends = self.fixed_x[0] - self.moving_x[-1], self.fixed_x[-1] - self.moving_x[0]
-        return self.along * np.linspace(*ends, _STEPS)
+        (x, *_), (z, *_) = self.fixed, self.moving
+        return self.along * np.linspace(x[0] - z[-1], x[-1] - z[0], _STEPS)
 
     def inside(self, shift: float) -> np.ndarray:
         """Return which samples of the warmer lie in the range of the colder."""
-        moved = self.moving_x + self.along * shift
-        return np.flatnonzero((moved >= self.fixed_x[0]) & (moved <= self.fixed_x[-1]))
+        moved = self.moving.x + self.along * shift
+        return np.flatnonzero((moved >= self.fixed.x[0]) & (moved <= self.fixed.x[-1]))
 
     def off(self, shift: float, rows: np.ndarray) -> np.ndarray:
         """Return what log values of the warmer lie above the colder, shape (k, n)."""
         # a sample may leave the overlap by a little
-        moved = self.moving_x[rows] + self.along * shift
-        return self.moving[:, rows] - self._through_fixed(moved)
+        moved = self.moving.x[rows] + self.along * shift
+        return self.moving.values[:, rows] - self._through_fixed(moved)
 
     @cached_property
     def _through_fixed(self) -> PchipInterpolator:
         """The curve through the colder, made once for all shifts that are tried."""
-        return PchipInterpolator(self.fixed_x, self.fixed, axis=1)
+        return PchipInterpolator(self.fixed.x, self.fixed.values, axis=1)
+
+
+_Used = list[tuple[_Pair, np.ndarray]]
+"""Pairs of which enough overlaps, with the samples that do."""
 
 
 def lay_over(
     cold: Mapping[str, LinearTest], warm: Mapping[str, LinearTest], vertical: bool, where: str
 ) -> Overlap:
-    """Return the one shift that lays tests over those of the same kinds at a lower temperature.
+    """Return the one shift that lays tests by kind over those at a lower temperature.
 
-    `cold`, `warm`: by kind; kinds that both have are laid over each other. `vertical`: whether
-    values too may be moved. `where`: the two temperatures, in words. Raises InputError if nothing
-    overlaps, or only curves of other shapes.
+    `vertical`: whether values too may be moved. `where`: the two temperatures, in words. Raises
+    InputError if nothing overlaps, or only curves of other shapes.
     """
-    pairs = [_pair(cold[kind], warm[kind], where) for kind in cold if kind in warm]
+    pairs = [_Pair(cold[kind], warm[kind], where) for kind in cold if kind in warm]
     # power laws slide along themselves if they may move up too: first without that
     starts = (_longest(pairs, up) for up in ((False, True) if vertical else (False,)))
     shift = next((start for start in starts if start is not None), None)
@@ -115,6 +116,18 @@ def lay_over(
         used = _overlapping(pairs, shift)
         found = _refine(used, shift, vertical) if used else found
     return found
+
+
+def overlap_misfit(cold: LinearTest, warm: LinearTest) -> float | None:
+    """Return the root-mean-square relative misfit of two tests where they overlap.
+
+    Samples count as they do in the fit; None where too few overlap.
+    """
+    used = _overlapping([_Pair(cold, warm, "")], 0.0)
+    if not used:
+        return None
+    off, weight, _ = _stacked(used, 0.0)
+    return float(_DECADE * np.sqrt(np.average(off**2, weights=weight**2)))
 
 
 def _longest(pairs: list[_Pair], up: bool) -> float | None:
@@ -140,72 +153,40 @@ def _longest(pairs: list[_Pair], up: bool) -> float | None:
     return float(trials[alike[np.lexsort((squares[alike], -counts[alike]))[0]]])
 
 
-def overlap_misfit(cold: LinearTest, warm: LinearTest) -> float | None:
-    """Return the root-mean-square relative misfit of two tests where they overlap.
-
-    Samples count as they do in the fit; None where too few overlap.
-    """
-    pair = _pair(cold, warm, "")
-    rows = pair.inside(0.0)
-    if len(rows) < _FEWEST:
-        return None
-    off, weight, _ = _stacked([(pair, rows)], 0.0)
-    return float(_DECADE * np.sqrt(np.average(off**2, weights=weight**2)))
+def _overlapping(pairs: list[_Pair], shift: float) -> _Used:
+    rows = ((pair, pair.inside(shift)) for pair in pairs)
+    return [(pair, inside) for pair, inside in rows if len(inside) >= _FEWEST]
 
 
-def _overlapping(pairs, shift: float) -> list[tuple[_Pair, np.ndarray]]:
-    """Return the pairs of which enough overlaps, with the samples that do."""
-    rows = [pair.inside(shift) for pair in pairs]
-    return [(p, at) for p, at in zip(pairs, rows, strict=True) if len(at) >= _FEWEST]
-
-
-def _pair(cold: LinearTest, warm: LinearTest, where: str) -> _Pair:
-    (x, fixed, heavy), (z, moving, weight) = _curves(cold), _curves(warm)
-    if min(len(x), len(z)) < _FEWEST:
-        raise InputError(f"Shifting needs {_FEWEST} samples; the {cold.name} at {where} has fewer.")
-    return _Pair(x, fixed, z, moving, heavy, weight, *directions(cold.kind))
-
-
-def _curves(test: LinearTest) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    argument, first = np.unique(test.argument, return_index=True)
-    weight = _FLOOR / np.hypot(_FLOOR, test.spread[first])
-    return np.log10(argument), np.log10(test.values[:, first]), weight
-
-
-def _stacked(used, shift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _stacked(used: _Used, shift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return differences, weights and the signs with which log b_T adds to the differences."""
-    off, weight, sign = [], [], []
-    for pair, rows in used:
-        one = pair.off(shift, rows)
-        off.append(one.ravel())
-        weight.append(np.broadcast_to(pair.weight[rows], one.shape).ravel())
+    off = [pair.off(shift, rows) for pair, rows in used]
+    weight, sign = [], []
+    for one, (pair, rows) in zip(off, used, strict=True):
+        weight.append(np.broadcast_to(pair.moving.weight[rows], one.shape).ravel())
         sign.append(np.full(one.size, -float(pair.up)))
-    return np.concatenate(off), np.concatenate(weight), np.concatenate(sign)
+    every = np.concatenate([one.ravel() for one in off])
+    return every, np.concatenate(weight), np.concatenate(sign)
 
 
-def _refine(used, start: float, vertical: bool) -> Overlap:
+def _refine(used: _Used, start: float, vertical: bool) -> Overlap:
     """Return the shift by which one smooth curve goes through both tests of every pair best.
 
     A curve drawn through the samples of one of them would bend with its noise, and seem to know the
     shift from bends that are none.
     """
-    free = 1 + vertical
-
-    def left(shift: np.ndarray) -> list[np.ndarray]:
-        up = shift[1] if vertical else 0.0
-        return [curve.left(shift[0], up) for curve in curves]
-
     off, weight, sign = _stacked(used, start)
     up = float(np.average(sign * off, weights=weight**2)) if vertical else 0.0
     curves = [curve for pair, rows in used for curve in _both(pair, rows, start, up)]
-    found = least_squares(
-        lambda shift: np.concatenate(left(shift)), [start, up][:free], x_scale=0.1
-    )
-    parts = [
-        part
-        for curve, one in zip(curves, left(found.x), strict=True)
-        for part in np.split(one, [curve.cold])
-    ]
+
+    def left(shift: np.ndarray) -> list[np.ndarray]:
+        return [curve.left(shift[0], shift[1] if vertical else 0.0) for curve in curves]
+
+    free = 1 + vertical
+    first = [start, up][:free]
+    found = least_squares(lambda shift: np.concatenate(left(shift)), first, x_scale=0.1)
+    ends = zip(curves, left(found.x), strict=True)
+    parts = [part for curve, one in ends for part in np.split(one, [len(curve.fixed.x)])]
     n, spent = len(found.fun), free + sum(curve.constants for curve in curves)
     alone = min(sum(independent_samples(part) for part in parts), float(n)) * (n - spent) / n
     variance = float(np.sum(found.fun**2)) / max(n - spent, 1)
@@ -225,17 +206,12 @@ def _refine(used, start: float, vertical: bool) -> Overlap:
 class _SmoothCurve:
     """One curve of a test at two temperatures, and the knots of the spline through both."""
 
-    fixed: tuple[np.ndarray, np.ndarray, np.ndarray]
-    moving: tuple[np.ndarray, np.ndarray, np.ndarray]
+    fixed: _Curve  # the colder
+    moving: _Curve
     along: int
     up: int
     knots: np.ndarray
     degree: int
-
-    @property
-    def cold(self) -> int:
-        """Samples of the colder, which come first."""
-        return len(self.fixed[0])
 
     @property
     def constants(self) -> int:
@@ -255,15 +231,14 @@ class _SmoothCurve:
 
 def _both(pair: _Pair, rows: np.ndarray, shift: float, up: float) -> list[_SmoothCurve]:
     """Return the curves of a pair where it overlaps, each as smooth as its samples allow."""
-    moved = pair.moving_x[rows] + pair.along * shift
-    low, high = moved.min(), moved.max()
+    (x, colder, heavy), (z, warmer, weight) = pair.fixed, pair.moving
+    moved = z[rows] + pair.along * shift
     # the samples of the colder on both sides of the end ones are needed to lie between them
-    first = max(int(np.searchsorted(pair.fixed_x, low, "right")) - 1, 0)
-    last = min(int(np.searchsorted(pair.fixed_x, high, "left")), len(pair.fixed_x) - 1)
-    there = np.arange(first, last + 1)
-    x = pair.fixed_x[there]
-    ends = min(x[0], low), max(x[-1], high)
-    n = len(rows) + len(there)
+    first = max(int(np.searchsorted(x, moved.min(), "right")) - 1, 0)
+    last = min(int(np.searchsorted(x, moved.max(), "left")), len(x) - 1)
+    there = slice(first, last + 1)
+    ends = min(x[first], moved.min()), max(x[last], moved.max())
+    n = len(rows) + last + 1 - first
     most = min(int(np.ceil((ends[1] - ends[0]) / _KNOT)), n // _SAMPLES_A_KNOT - _CUBIC)
     forms = [(degree, 1) for degree in range(1, _CUBIC)]
     forms += [(_CUBIC, intervals) for intervals in range(1, max(most, 1) + 1)]
@@ -272,25 +247,14 @@ def _both(pair: _Pair, rows: np.ndarray, shift: float, up: float) -> list[_Smoot
         square = float(np.sum(curve.left(shift, up) ** 2))
         return n * np.log(max(square, 1e-300)) + curve.constants * np.log(n)
 
-    return [
-        min(
-            (
-                _SmoothCurve(
-                    (x, cold[there], pair.fixed_weight[there]),
-                    (pair.moving_x[rows], warm[rows], pair.weight[rows]),
-                    pair.along,
-                    pair.up,
-                    _knots(ends, degree, intervals),
-                    degree,
-                )
-                for degree, intervals in forms
-            ),
-            key=criterion,
-        )
-        for cold, warm in zip(pair.fixed, pair.moving, strict=True)
-    ]
-
-
-def _knots(ends: tuple[float, float], degree: int, intervals: int) -> np.ndarray:
-    inner = np.linspace(*ends, intervals + 1)
-    return np.concatenate([[ends[0]] * degree, inner, [ends[1]] * degree])
+    found = []
+    for cold, warm in zip(colder, warmer, strict=True):
+        fixed = _Curve(x[there], cold[there], heavy[there])
+        moving = _Curve(z[rows], warm[rows], weight[rows])
+        splines = []
+        for degree, intervals in forms:
+            inner = np.linspace(*ends, intervals + 1)
+            knots = np.concatenate([[ends[0]] * degree, inner, [ends[1]] * degree])
+            splines.append(_SmoothCurve(fixed, moving, pair.along, pair.up, knots, degree))
+        found.append(min(splines, key=criterion))
+    return found

@@ -18,8 +18,14 @@ from scipy.optimize import curve_fit
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from discover.dataset.linear.linear_spectra import Agreement, linear_agreements
-from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests, of_sweep
+from discover.dataset.linear.linear_tests import (
+    SWEEP,
+    Agreement,
+    LinearTest,
+    Tests,
+    linear_agreements,
+    of_sweep,
+)
 from discover.dataset.linear.overlap import lay_over, overlap_misfit
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.errors import InputError
@@ -28,18 +34,12 @@ from discover.statistics.projection import rms
 
 @dataclass(frozen=True)
 class ShiftLaw:
-    """Shift factors as a function of temperature.
+    """Shift factors as a function of temperature."""
 
-    `name`: ``WLF`` or ``Arrhenius``.
-    `values`: C1 and C2 in K, or the activation energy in J/mol, by name.
-    `intervals`: 95 % interval of each; None where these shifts do not determine it.
-    `error`: root-mean-square misfit of log10 a_T.
-    """
-
-    name: str
-    values: dict[str, float]
-    intervals: dict[str, tuple[float, float] | None]
-    error: float
+    name: str  # ``WLF`` or ``Arrhenius``
+    values: dict[str, float]  # C1 and C2 in K, or the activation energy in J/mol, by name
+    intervals: dict[str, tuple[float, float] | None]  # 95 %; None where it is not determined
+    error: float  # root-mean-square misfit of log10 a_T
 
     def log_shift(
         self, celsius: Float[np.ndarray, " n"], reference: float
@@ -51,9 +51,9 @@ class ShiftLaw:
 def fit_shift_laws(
     celsius: Float[np.ndarray, " n"], log_shift: Float[np.ndarray, " n"], at: int
 ) -> tuple[ShiftLaw, ...]:
-    """Return WLF and Arrhenius, fitted; fewer where there are too few temperatures.
+    """Return WLF and Arrhenius, fitted to log10 a_T; fewer where there are too few temperatures.
 
-    `celsius` in °C. `log_shift`: log10 a_T. `at`: which of them is the reference.
+    `at`: which of them is the reference.
     """
     fitted = (_fit_law(name, celsius, log_shift, at) for name in _LAWS)
     return tuple(law for law in fitted if law is not None)
@@ -101,36 +101,25 @@ def _fit_law(name: str, celsius, log_shift, at: int) -> ShiftLaw | None:
     return ShiftLaw(name, known, intervals, rms(left))
 
 
+# root-mean-square relative misfit in an overlap up to which tests superpose, about what two
+# loadings of one sample differ by, and from which on they do not
 SUPERPOSED, FAILED = 0.05, 0.1
-"""Root-mean-square relative misfit in an overlap up to which tests superpose, about what two
-loadings of one sample differ by, and from which on they do not."""
-
 _TWO_SIDED = float(norm.ppf(0.975))
 
 
 @dataclass(frozen=True)
 class Superposition:
-    """Tests at several temperatures, moved to one.
+    """Tests at several temperatures, moved to one."""
 
-    `reference` in °C.
-    `celsius`: temperatures, increasing, shape (n,).
-    `tests`: as measured, by kind and temperature.
-    `leading`: the kinds that the shifts were found from.
-    `log_shift`, `log_vertical`: log10 of a_T and b_T, shape (n,).
-    `error`: standard errors of both, shape (n, 2).
-    `laws`: WLF and Arrhenius, fitted to a_T; fewer where there are too few temperatures.
-    `apart`: temperatures in °C whose tests share no kind with the others', and are not moved.
-    """
-
-    reference: float
-    celsius: Float[np.ndarray, " n"]
-    tests: Tests
-    leading: tuple[str, ...]
-    log_shift: Float[np.ndarray, " n"]
-    log_vertical: Float[np.ndarray, " n"]
-    error: Float[np.ndarray, "n 2"]
-    laws: tuple[ShiftLaw, ...]
-    apart: tuple[float, ...] = ()
+    reference: float  # in °C
+    celsius: Float[np.ndarray, " n"]  # temperatures, increasing
+    tests: Tests  # as measured, by kind and temperature
+    leading: tuple[str, ...]  # the kinds that the shifts were found from
+    log_shift: Float[np.ndarray, " n"]  # log10 of a_T
+    log_vertical: Float[np.ndarray, " n"]  # log10 of b_T
+    error: Float[np.ndarray, "n 2"]  # standard errors of both
+    laws: tuple[ShiftLaw, ...]  # fitted to a_T; fewer where there are too few temperatures
+    apart: tuple[float, ...] = ()  # temperatures that share no kind with the others, not moved
 
     def moved(self, kind: str, celsius: float) -> LinearTest:
         """Return the test at a temperature as it would be at the reference."""
@@ -139,15 +128,15 @@ class Superposition:
             float(self.log_shift[at]), float(self.log_vertical[at])
         )
 
+    def _all_moved(self, kind: str) -> dict[float, LinearTest]:
+        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
+        return {celsius: self.moved(kind, celsius) for celsius in there}
+
     def misfits(self, kind: str) -> dict[tuple[float, float], float]:
         """Return the root-mean-square relative misfit of neighbours where they overlap."""
-        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
-        found = {}
-        for cold, warm in pairwise(there):
-            misfit = overlap_misfit(self.moved(kind, cold), self.moved(kind, warm))
-            if misfit is not None:
-                found[cold, warm] = misfit
-        return found
+        moved = self._all_moved(kind)
+        found = {(a, b): overlap_misfit(moved[a], moved[b]) for a, b in pairwise(moved)}
+        return {pair: misfit for pair, misfit in found.items() if misfit is not None}
 
     def verdict_of(self, kind: str) -> str:
         """``superposed``, ``doubtful`` or ``not_superposed``, by the worst overlap of a kind.
@@ -178,20 +167,16 @@ class Superposition:
 
     def master(self, kind: str) -> LinearTest | None:
         """Return all moved tests of a kind as one; None where they do not become one."""
-        there = sorted(set(self.tests.get(kind, ())) & set(self.celsius.tolist()))
-        if not there or "not_superposed" in (self.verdict, self.verdict_of(kind)):
+        moved = list(self._all_moved(kind).values())
+        if not moved or "not_superposed" in (self.verdict, self.verdict_of(kind)):
             return None
-        moved = [self.moved(kind, celsius) for celsius in there]
         argument = np.concatenate([one.argument for one in moved])
         order = np.argsort(argument, kind="stable")
         if kind != SWEEP:  # a table over time has no time twice
             order = order[np.diff(argument[order], prepend=0.0) > 0.0]
-        return LinearTest(
-            kind,
-            argument[order],
-            np.concatenate([one.values for one in moved], axis=1)[:, order],
-            np.concatenate([one.spread for one in moved])[order],
-        )
+        values = np.concatenate([one.values for one in moved], axis=1)
+        spread = np.concatenate([one.spread for one in moved])
+        return LinearTest(kind, argument, values, spread).select(order)
 
 
 def superpose(
@@ -199,13 +184,13 @@ def superpose(
     reference: float | None = None,
     vertical: bool = False,
 ) -> Superposition:
-    """Return tests at several temperatures moved to one of them.
+    """Return tests by kind and temperature, or sweeps by temperature, moved to one of them.
 
-    `tests`: by kind and by temperature in °C; or sweeps by temperature. `reference`: one of them;
-    the middle one if None. `vertical`: whether moduli and compliances too may be moved. Raises
-    InputError if the reference is none of the temperatures, or neighbours share too few values.
+    `reference` in °C; the middle one if None. `vertical`: whether moduli and compliances too may be
+    moved. Raises InputError if there is no test there, or neighbours share too few values.
     """
-    known = _by_kind(tests)
+    sweeps = {t: of_sweep(one) for t, one in tests.items() if isinstance(one, LinearSweep)}
+    known: Tests = {SWEEP: sweeps} if sweeps else tests  # pyright: ignore[reportAssignmentType]
     several = {kind: at for kind, at in known.items() if len(at) > 1}
     if not several:
         raise InputError("Shifting needs tests of one kind at two temperatures; got none.")
@@ -226,11 +211,6 @@ def superpose(
     return Superposition(
         reference, celsius, known, leading, shifts[:, 0], shifts[:, 1], errors, laws, apart
     )
-
-
-def _by_kind(tests: Tests | Mapping[float, LinearSweep]) -> Tests:
-    sweeps = {t: of_sweep(one) for t, one in tests.items() if isinstance(one, LinearSweep)}
-    return {SWEEP: sweeps} if sweeps else tests  # pyright: ignore[reportReturnType]
 
 
 def _walk(several: Tests, reference: float, vertical: bool):
@@ -276,37 +256,27 @@ def shift_table(found: Superposition) -> str:
 
 @dataclass(frozen=True)
 class MovedTests:
-    """What a folder of linear tests at several temperatures becomes.
-
-    `found`: tests and shifts.
-    `own`: what tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
-    `agreements`: how well tests predict one another at each temperature.
-    `files`: moved tests as one, by name of the file; None where they do not become one.
-    """
+    """What a folder of linear tests at several temperatures becomes."""
 
     found: Superposition
+    # what tables over time ask for by themselves, by kind, where the shifts are the sweeps'
     own: Mapping[str, Superposition]
-    agreements: list[Agreement]
-    files: Mapping[str, LinearTest | None]
+    agreements: list[Agreement]  # how well tests predict one another at each temperature
+    files: Mapping[str, LinearTest | None]  # moved tests as one; None where they become none
 
 
 def move_tests(
     tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
 ) -> MovedTests:
-    """Return tests moved to one temperature, with what can be said of them.
+    """Return tests moved to one temperature as in `superpose`, with what can be said of them.
 
-    `tests`: by kind and temperature in °C. `reference`: one of the temperatures; the middle one if
-    None. `vertical`: whether moduli and compliances too may be moved. `between`: only temperatures
-    from one to the other. Raises InputError if too few temperatures are left, or neighbours share
-    too few values.
+    `between`: only temperatures in °C from one to the other.
     """
     if between is not None:
         low, high = min(between), max(between)
-        tests = {
-            kind: chosen
-            for kind, at in tests.items()
-            if (chosen := {t: one for t, one in at.items() if low <= t <= high})
-        }
+        chosen = {k: {t: one for t, one in at.items() if low <= t <= high}
+                  for k, at in tests.items()}  # fmt: skip
+        tests = {kind: at for kind, at in chosen.items() if at}
     found = superpose(tests, reference, vertical)
     own = {}
     for kind, at in tests.items():

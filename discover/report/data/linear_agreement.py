@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from itertools import groupby
 
-from discover.dataset.linear.linear_spectra import Agreement
-from discover.dataset.linear.linear_tests import NAMES
+from discover.dataset.linear.linear_tests import NAMES, Agreement
 from discover.report.wording import percent
 
 

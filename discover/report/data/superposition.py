@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discover.dataset.linear.linear_spectra import Agreement
-from discover.dataset.linear.linear_tests import NAMES, SWEEP
+from discover.dataset.linear.linear_tests import NAMES, SWEEP, Agreement
 from discover.dataset.linear.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
 from discover.report.data.linear_agreement import agreement_lines, agreement_words
 from discover.report.page import render

@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from discover.dataset.linear.linear_spectra import predicted, spectrum_of
-from discover.dataset.linear.linear_tests import CREEP, RELAXATION, SWEEP
+from discover.dataset.linear.linear_tests import CREEP, RELAXATION, SWEEP, predicted, spectrum_of
 from discover.dataset.linear.superposition import Superposition
 from discover.report.plots.style import (
     BEFORE,
