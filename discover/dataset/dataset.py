@@ -69,23 +69,18 @@ class Dataset(NotebookView):
                 "single run in a list."
             )
         object.__setattr__(self, "runs", tuple(self.runs))
-        other = next((run for run in self.runs if not isinstance(run, Run)), None)
-        if other is not None:
+        if others := [run for run in self.runs if not isinstance(run, Run)]:
             raise InputError(
-                f"A data set takes a sequence of Run; one is a {type(other).__name__}. Make runs "
-                "of a table with from_dataframe."
+                f"A data set takes a sequence of Run; one is a {type(others[0]).__name__}. Make "
+                "runs of a table with from_dataframe."
             )
         if not (self.linear_sweep is None or isinstance(self.linear_sweep, LinearSweep)):
             raise InputError(
                 "linear_sweep must be a LinearSweep of frequencies, G' and G''; got a "
                 f"{type(self.linear_sweep).__name__}."
             )
-        names = [run.name for run in self.runs]
-        repeated = {name for name in names if names.count(name) > 1}
-        if repeated:
-            raise InputError(
-                f"The data set {self.name!r} holds the run {sorted(repeated)[0]!r} twice."
-            )
+        if repeated := sorted(name for name in set(self.names) if self.names.count(name) > 1):
+            raise InputError(f"The data set {self.name!r} holds the run {repeated[0]!r} twice.")
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -111,14 +106,14 @@ class Dataset(NotebookView):
         if isinstance(which, slice):
             return replace(self, runs=self.runs[which])
         chosen = np.asarray(which)
+        if chosen.dtype == bool and chosen.shape == (len(self),) and len(self):
+            chosen = np.flatnonzero(chosen)
         if chosen.ndim == 0 and np.issubdtype(chosen.dtype, np.integer):
             return self._numbered(int(chosen))
         if chosen.ndim == 1 and (chosen.size == 0 or chosen.dtype.kind in "iu"):
             return replace(self, runs=tuple(self._numbered(int(i)) for i in chosen))
         if chosen.ndim == 1 and chosen.dtype.kind == "U":
             return self.select([str(name) for name in chosen])
-        if chosen.dtype == bool and chosen.shape == (len(self),):
-            return replace(self, runs=tuple(self.runs[i] for i in np.flatnonzero(chosen)))
         raise InputError(
             f"A run of the data set {self.name!r} is chosen by its name or number, several by a "
             f"slice, by names, by numbers, or by {len(self)} booleans; got {which!r}."
@@ -166,10 +161,10 @@ class Dataset(NotebookView):
         for name, reason in self.set_aside.items():
             reasons.setdefault(reason, []).append(name)
         return " ".join(
-            f"{names[0]} is set aside: {reason}."
-            if len(names) == 1
-            else f"{names[0]} and {len(names) - 1} more runs like it are set aside: {reason}."
-            for reason, names in reasons.items()
+            f"{first} and {len(more)} more runs like it are set aside: {reason}."
+            if more
+            else f"{first} is set aside: {reason}."
+            for reason, (first, *more) in reasons.items()
         )
 
     def table(self) -> pd.DataFrame:
@@ -286,9 +281,9 @@ class Dataset(NotebookView):
             raise InputError(f"The run {sorted(both)[0]!r} is both in fit and in held_out.")
         if not len(train) or not len(test):
             empty = "fit" if not len(train) else "hold out"
+            there = ", ".join(self.names)
             raise InputError(
-                f"No run is left to {empty}; the data set {self.name!r} has "
-                f"{', '.join(self.names)}. Divide them."
+                f"No run is left to {empty}; the data set {self.name!r} has {there}. Divide them."
             )
         return train, test
 

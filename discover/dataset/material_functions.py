@@ -17,10 +17,8 @@ from discover.protocols.control import imposed_stress, oscillations, steady_rate
 from discover.protocols.history import after_step_strain
 from discover.protocols.protocol import start_up
 
+# strain as which a linear material function is looked at: what is not linear is some 1e-4 of it
 LINEAR_STRAIN = 0.01
-"""Strain as which a linear material function is looked at: terms beyond the linear ones are some
-ten thousandth of them."""
-
 COMPLIANCE = units.Quantity("compliance", "compliance_1_Pa", "1/Pa")
 RELAXATION_MODULUS = units.Quantity("relaxation_modulus", "relaxation_modulus_Pa", "Pa")
 
@@ -30,8 +28,7 @@ def read_material_functions(
 ) -> tuple[dict[str, Run], dict[str, str]]:
     """Return the tables of a data folder as runs, by kind, and why others cannot be used, by file.
 
-    `runs`: files that ``runs.csv`` names: they are runs, whatever they are called. `frequency` in
-    rad/s, of an amplitude sweep that does not give its own.
+    What ``runs.csv`` names is a run. `frequency` in rad/s, of a sweep that does not give its own.
     """
     found, aside = {}, {}
     for kind, read in _READERS.items():
@@ -60,59 +57,40 @@ def _flow_curve(table: Table) -> Run:
     rate, stress = table.all_required(units.SHEAR_RATE, units.SHEAR_STRESS)
     _require_positive(table, rate, "shear_rate")
     order = np.argsort(rate, kind="stable")
-
-    def sorted_(values):
-        return None if values is None else values[order]
-
-    return Run(
-        table.name,
-        np.arange(1.0, len(rate) + 1.0),
-        steady_rates(rate[order]),
-        rate[order],
-        stress[order],
-        sorted_(table.quantity(units.FIRST_NORMAL_STRESS_DIFFERENCE)),
-        sorted_(table.quantity(units.SECOND_NORMAL_STRESS_DIFFERENCE)),
-        metadata={"test": "flow curve"},
+    beside = units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE
+    rate, stress, *normal = (
+        None if values is None else values[order]
+        for values in (rate, stress, *map(table.quantity, beside))
     )
+    counts, about = np.arange(1.0, len(order) + 1.0), {"test": "flow curve"}
+    return Run(table.name, counts, steady_rates(rate), rate, stress, *normal, metadata=about)
 
 
 def _relaxation(table: Table) -> Run:
     time, modulus = _over_time(table, RELAXATION_MODULUS)
     still = np.zeros(len(time))
-    return Run(
-        table.name,
-        time,
-        after_step_strain(start_up(0.0), LINEAR_STRAIN, float(time[0])),
-        still,
-        LINEAR_STRAIN * modulus,
-        strain=still + LINEAR_STRAIN,
-        metadata={"test": f"relaxation modulus, at a strain of {LINEAR_STRAIN:g}"},
-    )
+    step = after_step_strain(start_up(0.0), LINEAR_STRAIN, float(time[0]))
+    stress, strain = LINEAR_STRAIN * modulus, still + LINEAR_STRAIN
+    about = {"test": f"relaxation modulus, at a strain of {LINEAR_STRAIN:g}"}
+    return Run(table.name, time, step, still, stress, strain=strain, metadata=about)
 
 
 def _creep(table: Table) -> Run:
     time, compliance = _over_time(table, COMPLIANCE)
     stress = np.full(len(time), LINEAR_STRAIN / np.max(compliance))
     strain = stress * compliance
+    imposed, rate = imposed_stress(time, stress), np.gradient(strain, time)
+    about = {"test": f"creep compliance, at a stress of {stress[0]:.3g} Pa"}
     return Run(
-        table.name,
-        time,
-        imposed_stress(time, stress),
-        np.gradient(strain, time),
-        stress,
-        strain=strain,
-        rate_is_measured=True,
-        metadata={"test": f"creep compliance, at a stress of {stress[0]:.3g} Pa"},
-    )
+        table.name, time, imposed, rate, stress, strain=strain, rate_is_measured=True,
+        metadata=about,
+    )  # fmt: skip
 
 
 def read_over_time(
     path: Path, kind: str
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-    """Return times in s and the material function of a table over time.
-
-    `kind`: ``relaxation``, in Pa, or ``creep``, in 1/Pa. Raises InputError if it is wrong.
-    """
+    """Return times in s and the ``relaxation`` modulus in Pa, or ``creep`` compliance in 1/Pa."""
     quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
     table = read_table(path)
     time, values = table.all_required(units.TIME, quantity)
@@ -122,15 +100,13 @@ def read_over_time(
 
 
 def _amplitude_sweep(table: Table) -> Run:
-    strain, frequency, storage, loss = table.all_required(
+    columns = table.all_required(
         units.STRAIN, units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     )
-    _require_positive(table, strain, "strain")
-    _require_positive(table, frequency, "omega")
-    order = np.lexsort((strain, frequency))
-    return _oscillations(
-        table.name, "amplitude sweep", *(v[order] for v in (strain, frequency, storage, loss))
-    )
+    _require_positive(table, columns[0], "strain")
+    _require_positive(table, columns[1], "omega")
+    order = np.lexsort(columns[:2])
+    return _oscillations(table.name, "amplitude sweep", *(values[order] for values in columns))
 
 
 def linear_sweep_as_run(sweep: LinearSweep) -> Run:
@@ -142,17 +118,10 @@ def linear_sweep_as_run(sweep: LinearSweep) -> Run:
 
 
 def _oscillations(name, what, strain, frequency, storage, loss) -> Run:
-    return Run(
-        name,
-        np.arange(1.0, len(strain) + 1.0),
-        oscillations(strain, frequency),
-        strain * frequency,
-        strain * np.hypot(storage, loss),
-        strain=strain,
-        metadata={"test": what},
-        storage_modulus=storage,
-        loss_modulus=loss,
-    )
+    counts, stress = np.arange(1.0, len(strain) + 1.0), strain * np.hypot(storage, loss)
+    flow, rate = oscillations(strain, frequency), strain * frequency
+    moduli = {"storage_modulus": storage, "loss_modulus": loss}
+    return Run(name, counts, flow, rate, stress, strain=strain, metadata={"test": what}, **moduli)
 
 
 def _over_time(
@@ -179,11 +148,9 @@ def _require_positive(table: Table, values: np.ndarray, what: str) -> None:
 
 
 _READERS: Mapping[str, Callable[[Table], Run]] = {
-    "flow_curve": _flow_curve,
-    "relaxation": _relaxation,
-    "creep": _creep,
+    "flow_curve": _flow_curve, "relaxation": _relaxation, "creep": _creep,
     "amplitude_sweep": _amplitude_sweep,
-}
+}  # fmt: skip
 
 TABLES = tuple(_READERS)
 """Kinds of tables; the file of each is called so. The linear sweep is one more, which gives the

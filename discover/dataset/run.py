@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -20,49 +20,35 @@ from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuan
 from discover.protocols.protocol import FlowProtocol, recording
 from discover.statistics.projection import rms
 
+# Relative error of one run above which two do not differ by their loading: fillings and trimmings
+# of one sample differ by some per cent, and what differs by more, as a run told in minutes does,
+# may not excuse what a law leaves of all others
 LARGEST = 0.1
-"""Relative error of one run above which two do not differ by their loading: fillings and trimmings
-of one sample differ by some per cent, and what differs by more, as a run told in minutes does, may
-not excuse what a law leaves of all others."""
+SLOWEST_RATE = 1e-12  # in 1/s; slower is rest, for any instrument and any experimenter
+# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
+_LEAST_STEADY = 1e-4
+_NEEDED = ("time", "rate", "stress")
+_COLUMNS = (
+    *_NEEDED, "first_normal_stress_difference", "second_normal_stress_difference", "strain",
+    "storage_modulus", "loss_modulus",
+)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Loading:
+class Loading(NamedTuple):
     """By how much one loading of a sample may differ from another.
 
     Filling, trimming and temperature differ by some per cent, as a factor on every stress that is
     recorded of one loading.
-
-    `deviation`: standard deviation of the factor.
-    `noise`: relative noise of the record, where it is known.
     """
 
-    deviation: float
-    noise: float | None = None
-
-
-SLOWEST_RATE = 1e-12
-"""In 1/s; slower is rest, for any instrument and any experimenter."""
-
-# Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
-_LEAST_STEADY = 1e-4
-
-_NEEDED = ("time", "rate", "stress")
-_COLUMNS = (
-    *_NEEDED,
-    "first_normal_stress_difference",
-    "second_normal_stress_difference",
-    "strain",
-    "storage_modulus",
-    "loss_modulus",
-)
+    deviation: float  # standard deviation of the factor
+    noise: float | None = None  # relative noise of the record, where it is known
 
 
 def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
     """Return in units of what a misfit of each of some values is told, shape (n,).
 
-    The root-mean-square of the record; of a flow curve or a sweep, whose noise is in proportion to
-    each value and of which each decade counts, the value itself.
+    The root-mean-square of the record; of states, whose noise is in proportion, the value itself.
     """
     size = np.full(len(values), rms(values))
     if protocol.control in STATES:
@@ -344,21 +330,9 @@ class Run(NotebookView):
 
         The flow's history is unchanged: it is the protocol's, from t = 0.
         """
-
-        def cut(values):
-            return None if values is None else values[keep]
-
-        return replace(
-            self,
-            time=self.time[keep],
-            rate=self.rate[keep],
-            stress=self.stress[keep],
-            first_normal_stress_difference=cut(self.first_normal_stress_difference),
-            second_normal_stress_difference=cut(self.second_normal_stress_difference),
-            strain=cut(self.strain),
-            storage_modulus=cut(self.storage_modulus),
-            loss_modulus=cut(self.loss_modulus),
-        )
+        recorded = {name: getattr(self, name) for name in _COLUMNS}
+        kept = {name: values[keep] for name, values in recorded.items() if values is not None}
+        return replace(self, **kept)
 
 
 def require_signal(runs: Sequence[Run]) -> None:

@@ -26,10 +26,12 @@ def run_line(run: Run) -> dict[str, Any]:
     """
     flow = _flow(run)
     wave = oscillation(run) if flow in (_VARYING, "given stress") else None
+    if wave and flow == _VARYING:
+        flow = "oscillation" if run.from_rest else "steady alternation"
     normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
     return {
         "run": run.name,
-        "flow": _oscillating(run) if wave and flow == _VARYING else flow,
+        "flow": flow,
         "samples": len(run),
         # of states, time counts the samples
         "duration_s": None if run.protocol.control in STATES else float(run.time[-1]),
@@ -64,10 +66,6 @@ def _flow(run: Run) -> str:
     return kind if run.flow == "shear" else f"{run.flow} extension, {kind}"
 
 
-def _oscillating(run: Run) -> str:
-    return "oscillation" if run.from_rest else "steady alternation"
-
-
 def oscillation(run: Run) -> tuple[float, float] | None:
     """Return frequency (rad/s) and amplitude (1/s) of a rate that alternates about zero."""
     return wave_of(run.time, run.rate)
@@ -76,10 +74,7 @@ def oscillation(run: Run) -> tuple[float, float] | None:
 def wave_of(
     time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
 ) -> tuple[float, float] | None:
-    """Return frequency (rad/s) and amplitude (1/s) of a rate in samples, if it alternates.
-
-    `time`, `rate` in s and 1/s.
-    """
+    """Return frequency (rad/s) and amplitude (1/s) of a rate in samples, if it alternates."""
     clear = np.flatnonzero(np.abs(rate) > 0.1 * np.max(np.abs(rate)))  # noise turns often near zero
     turns = np.flatnonzero(np.diff(np.sign(rate[clear])) != 0)
     if not turns.size:
@@ -114,20 +109,15 @@ _TEMPERATURE = ("temperature_C", "temperature_C_measured")
 def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
     """Return material and temperature of some runs in words; empty where neither is told.
 
-    `runs`: with the columns ``material``, ``sample`` or ``sample_label``, and ``temperature_C`` or
-    ``temperature_C_measured``, of runs.csv. `material`: what a study calls the material, in place
-    of the columns.
+    `material`: what a study calls it, in place of the columns of runs.csv.
     """
-    runs = list(runs)
     names, temperatures = [], []
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]
         values = (run.metadata.get(key) for key in _TEMPERATURE)
         temperatures += [round(v, 0) for v in values if isinstance(v, int | float)][:1]
-    parts, told = [material] if material else list(dict.fromkeys(names)), sorted(set(temperatures))
-    spelled = [f"{value:.0f}".replace("-", "−") for value in told]
-    if told:
-        word = " to " if len(told) > 2 else " and "
-        ends = spelled if len(told) < 3 else [spelled[0], spelled[-1]]
-        parts.append(f"{word.join(ends)} °C")
-    return ", ".join(parts)
+    parts = [material] if material else list(dict.fromkeys(names))
+    spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(set(temperatures))]
+    if len(spelled) > 2:
+        spelled = [f"{spelled[0]} to {spelled[-1]}"]
+    return ", ".join([*parts, *([f"{' and '.join(spelled)} °C"] if spelled else [])])

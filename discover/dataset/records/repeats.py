@@ -1,8 +1,9 @@
 """Records of one material held against one another: repeats, copies, loadings, sequences."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -15,29 +16,25 @@ from discover.protocols.protocol import shear_rates
 from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
 
-_SAME = 0.02
-"""Relative difference of rates, and of what runs.csv says of two runs, that is none."""
-
+_SAME = 0.02  # relative difference of rates, and of what runs.csv says of two runs, that is none
 _FEWEST_SAMPLES = 10
-
+# share of the longer run that both must cover for their difference to tell an error of all of it,
+# or for their rates to be held against each other there alone
 _SHARED = 0.5
-"""Share of the longer run that both must cover for their difference to tell an error of all of it,
-or for their rates to be held against each other there alone."""
-
+_FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
+# of what changes from sample to sample: two records of one test differ by √2 of it, one record
+# written with other digits by far less
+_ROUNDED = 0.1
 # What a source counts or sums up of a record, and no condition of the test
 _NO_CONDITION = ("n_points", "final_strain", "max_abs_strain", "start_time_in_sequence_s")
 
 
-@dataclass(frozen=True)
-class Repeats:
-    """Runs that repeat one another, and by how much they differ.
+class Repeats(NamedTuple):
+    """Runs that repeat one another, and by how much they differ."""
 
-    `groups`: names of the runs of each test that was repeated, of those whose difference counts.
-    `error`: relative error of one run: root-mean-square of the difference of two, over √2 and over
-        that of the record; of several tests the root-mean-square.
-    """
-
-    groups: tuple[tuple[str, ...], ...]
+    groups: tuple[tuple[str, ...], ...]  # names of those whose difference counts, by test
+    # relative error of one run: root-mean-square of the difference of two, over √2 and over that of
+    # the record; of several tests the root-mean-square
     error: float
 
 
@@ -65,9 +62,8 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
 
     Two runs are one test if their rates agree, and so does every number that the source gives of
     their conditions. The rates have to agree over all of the longer run, where the shorter would go
-    on as it was told, or over the time that both cover if that is half of it.
-
-    `runs`: runs; those of steady or periodic states and those at a given stress are passed over.
+    on as it was told, or over the time that both cover if that is half of it. States and runs at a
+    given stress are passed over.
     """
     timed = [
         run
@@ -87,9 +83,7 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
 def count_flows(runs: Sequence[Run]) -> int:
     """Return how many different flows were measured.
 
-    A test that was repeated is one flow. Each steady or periodic state of a table is one.
-
-    `runs`: runs; one that is there several times, with other quantities, counts once.
+    A test that was repeated, or is there with other quantities, is one, as is a state of a table.
     """
     named = [*{run.name: run for run in runs}.values()]
     again = sum(len(group) - 1 for group in repeated_tests(named))
@@ -98,17 +92,16 @@ def count_flows(runs: Sequence[Run]) -> int:
 
 
 def _same_test(one: Run, other: Run) -> bool:
-    if one.protocol.flow != other.protocol.flow or one.quantity != other.quantity:
-        return False
-    numbers = [(one.rate_before, other.rate_before), (one.strain_before, other.strain_before)]
+    numbers: list[tuple[object, object]] = [
+        (one.rate_before, other.rate_before), (one.strain_before, other.strain_before),
+    ]  # fmt: skip
     for name in {*one.metadata, *other.metadata} - set(_NO_CONDITION):
         pair = one.metadata.get(name), other.metadata.get(name)
         if any(isinstance(value, int | float) for value in pair):
-            numbers.append(pair)  # pyright: ignore[reportArgumentType]
-    if not all(_alike(*pair) for pair in numbers):
-        return False
+            numbers.append(pair)
+    alike = one.protocol.flow == other.protocol.flow and one.quantity == other.quantity
     times = _common_times(one, other)
-    if times is None:
+    if times is None or not alike or not all(_alike(*pair) for pair in numbers):
         return False
     longer = max((one, other), key=lambda run: run.time[-1])
     if _share(one, other, times) < _SHARED:
@@ -146,23 +139,14 @@ def _difference(one: Run, other: Run) -> float:
     return float(np.sqrt(np.mean((records[0] - records[1]) ** 2) / 2.0)) / size
 
 
-_FEWEST = 8  # samples at the same times; of fewer, equal digits may be chance
-
-_ROUNDED = 0.1
-"""Of what changes from sample to sample: two records of one test differ by √2 of it, one record
-written with other digits by far less."""
-
-
 def is_copy(one: Run, other: Run) -> bool:
-    """Return whether two runs are one record, but for its name, its digits and samples left out.
-
-    `one`, `other`: runs, whatever is told of their rates.
-    """
+    """Return whether two runs are one record, but for its name, its digits and samples left out."""
     if one.quantity != other.quantity or one.flow != other.flow:
         return False
     fewer, more = sorted((one, other), key=len)
     if len(fewer) < _FEWEST:
-        return len(one) == len(other) and _equal(one, other)
+        same = np.array_equal(one.time, other.time)
+        return same and np.array_equal(one.recorded, other.recorded)
     at = np.clip(np.searchsorted(more.time, fewer.time), 0, len(more) - 1)
     at = np.where(
         np.abs(more.time[at - 1] - fewer.time) < np.abs(more.time[at] - fewer.time), at - 1, at
@@ -178,12 +162,9 @@ def is_copy(one: Run, other: Run) -> bool:
 
 
 def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
-    """Refuse to judge by a record that is fitted under another name.
+    """Refuse to judge by a record that is fitted under another name; InputError names both.
 
-    Among fitted runs a copy makes intervals a little too narrow, of which a check of the folder
-    warns.
-
-    Raises InputError that names both.
+    Among fitted runs a copy makes intervals a little too narrow: a check of the folder warns of it.
     """
     for run in held_out:
         copied = next((other.name for other in fitted if is_copy(run, other)), None)
@@ -194,15 +175,11 @@ def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
             )
 
 
-def _equal(one: Run, other: Run) -> bool:
-    return np.array_equal(one.time, other.time) and np.array_equal(one.recorded, other.recorded)
-
-
 def with_loadings(runs: Sequence[Run], deviation: float | None, noise: float | None) -> list[Run]:
     """Return runs each of which is a loading of its own; as they are where nothing is said of it.
 
-    `deviation`: relative standard deviation by which loadings differ. Raises InputError if they
-    cannot differ so, or a stress was imposed, which a factor changes otherwise.
+    `deviation`, by which loadings differ, is relative. Raises InputError if they cannot differ so,
+    or a stress was imposed, which a factor changes otherwise.
     """
     if deviation is None:
         return list(runs)
@@ -224,17 +201,14 @@ def total_strain(run: Run) -> float:
     """Return the strain of a run, added up without regard to its sign."""
     size = np.abs(run.rate)
     # before its first sample a run flows at the rate of that sample
-    early = float(size[0] * run.time[0])
-    return early + float(np.trapezoid(size, run.time))
+    return float(size[0] * run.time[0]) + float(np.trapezoid(size, run.time))
 
 
 def in_sequence(runs: Sequence[Run], order: Float[np.ndarray, " runs"]) -> tuple[Run, ...]:
     """Return the runs with the strain that their sample had seen in earlier ones.
 
     Only strains are added up: what a held-out run did to the sample is known without its stress.
-
-    `order`: start times, or any numbers in the order of the runs; runs of equal number are
-    parallel.
+    Runs of equal number in the `order`, such as start times, are parallel.
     """
     totals = np.array([total_strain(run) for run in runs])
     return tuple(

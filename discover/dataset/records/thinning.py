@@ -12,18 +12,14 @@ from discover.protocols.protocol import in_flow, measured_rate
 from discover.statistics.noise.outliers import isolated
 from discover.words import percent_of
 
+# a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000
-"""A record with more samples is thinned: they cost time and say nothing new about a law."""
-
-
+# a sweep with more is thinned: 40 a decade over ten decades, where instruments give 5 to 20
 MOST_FREQUENCIES = 400
-"""A sweep with more is thinned: 40 a decade over ten decades, where instruments give 5 to 20."""
-
-_FOLLOWED = 1e-3
-"""Error of the strain, over its range, up to which the samples kept follow the rate."""
-
-_FOLLOWED_RATE = 0.05
-"""Error of the rate, over its largest, up to which straight lines follow it."""
+_FOLLOWED = 1e-3  # error of the strain, over its range, up to which samples kept follow the rate
+_FOLLOWED_RATE = 0.05  # error of the rate, over its largest, up to which straight lines follow it
+_CORNER = 0.01  # share of the largest rate, or stress, that was imposed
+_ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
 
 
 def thin(
@@ -37,8 +33,6 @@ def thin(
     its information per decade; samples evenly spaced in time, since an oscillation has it per
     cycle; and the largest and smallest stress and rate. Values are the recorded ones, and all but
     those four are chosen by their time alone, so that noise keeps its size and distribution.
-
-    `time`: sampling times in s, increasing. `shear_rate` in 1/s. `shear_stress` in Pa.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
@@ -69,9 +63,7 @@ def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndar
     """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
 
     Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
-    were recorded.
-
-    `angular_frequency` in rad/s, positive and increasing; some may be repeated.
+    were recorded; some may be repeated.
     """
     n = len(angular_frequency)
     if n <= MOST_FREQUENCIES:
@@ -87,23 +79,17 @@ def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndar
 
 
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
-    """Return which of n samples to keep so that at most so many stay, evenly in their order.
-
-    `most`: how many may stay, 2 or more.
-    """
+    """Return which of n samples to keep so that at most so many, 2 or more, stay in even order."""
     keep = np.zeros(n, dtype=bool)
     keep[np.unique(np.round(np.linspace(0, n - 1, min(n, most))).astype(int))] = True
     return keep
 
 
 def thin_run(run: Run, most: int) -> Run:
-    """Return a run with at most so many of its samples, evenly chosen in their order.
+    """Return a run with at most so many of its samples, 2 or more, evenly chosen in their order.
 
     A rate that was read sample by sample is followed by straight lines between the samples kept,
-    and more where it varies faster than these: see `followed_rate`. What was kept is said under
-    ``thinned`` of its metadata.
-
-    `most`: how many samples may stay, 2 or more.
+    and more where it varies faster (`followed_rate`). Its metadata say so under ``thinned``.
     """
     n = len(run)
     if n <= most:
@@ -115,11 +101,8 @@ def thin_run(run: Run, most: int) -> Run:
     thinned = replace(run.window(keep), metadata={**run.metadata, "thinned": text})
     times, rates = (np.asarray(run.protocol.table_times), np.asarray(run.protocol.table_rates))
     # a smooth rate has knots between its samples
-    if run.protocol.control == "rate" and float(run.protocol.begins) == 0.0:
-        sampled = len(times) >= n and np.all(np.isin(run.time, times))
-    else:
-        sampled = False
-    if sampled:
+    from_rest = run.protocol.control == "rate" and float(run.protocol.begins) == 0.0
+    if from_rest and len(times) >= n and np.all(np.isin(run.time, times)):
         kept = np.isin(times, run.time[keep])
         followed = measured_rate(*followed_rate(times, rates, kept))
         thinned = replace(thinned, protocol=in_flow(followed, run.flow))
@@ -132,11 +115,9 @@ def followed_rate(
     """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
 
     A linear spline that fits all samples by least squares keeps the strain far better than the rate
-    at some of them does. Its knots are the samples kept; intervals are halved until the strain is
-    right to 0.1 % of its range everywhere, and the rate to 5 % of its largest.
-
-    `time`, `shear_rate`: of all samples, in s and 1/s. `keep`: the samples that are knots in any
-    case, the first and the last among them.
+    at some of them does. Its knots are the samples to `keep`, the first and the last among them;
+    intervals are halved until the strain is right to 0.1 % of its range everywhere, and the rate to
+    5 % of its largest.
     """
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)
@@ -179,10 +160,6 @@ def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np
     """Return what samples lie off the straight line between their neighbours, shape (n - 2,)."""
     share = (place[1:-1] - place[:-2]) / (place[2:] - place[:-2])
     return values[1:-1] - (values[:-2] + share * (values[2:] - values[:-2]))
-
-
-_CORNER = 0.01  # share of the largest rate, or stress, that was imposed
-_ABOVE_BENDS = 10.0  # times the median bend: a sine, or a rate that was measured, has none so sharp
 
 
 def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
