@@ -9,12 +9,7 @@ from jaxtyping import Float
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
-from discover.dataset.read_run import (
-    DEFAULT_WINDOW,
-    INDEX_FILE,
-    read_run,
-    reason_to_set_aside,
-)
+from discover.dataset.read_run import DEFAULT_WINDOW, INDEX_FILE, read_run, reason_to_set_aside
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.tables import units

@@ -18,12 +18,7 @@ from jaxtyping import Float, Int
 from discover.dataset.importing.in_time import CONSTANT, every_row_differs, spread, up_and_down
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.names import name_table, plain
-from discover.dataset.importing.quantities import (
-    QUANTITIES,
-    guess_columns,
-    name_rank,
-    to_celsius,
-)
+from discover.dataset.importing.quantities import QUANTITIES, guess_columns, name_rank, to_celsius
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words, said_of
 from discover.dataset.importing.text_rows import Constant, is_number, name_and_unit
