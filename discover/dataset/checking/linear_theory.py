@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.runs import is_start_up, steady_stress, stress_noise
+from discover.dataset.checking.runs import Finding, is_start_up, steady_stress, stress_noise
 from discover.dataset.linear.mode_search import BEYOND, relative_moduli, solved
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
@@ -50,8 +49,8 @@ Values = Float[np.ndarray, " n"]
 
 def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[Finding]:
     """Yield what is doubtful in an amplitude sweep."""
-    strain, moduli = run.strain, (run.storage_modulus, run.loss_modulus)
-    if strain is None or moduli[0] is None or moduli[1] is None:
+    strain, storage, loss = run.strain, run.storage_modulus, run.loss_modulus
+    if strain is None or storage is None or loss is None:
         return
     low, high = float(np.min(strain)), float(np.max(strain))
     if low > _LARGEST_FIRST and high > _LARGEST_STRAIN:
@@ -60,7 +59,7 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
             "rename the column to strain_percent."
         )
         yield Finding("warning", "units", run.name, text)
-    for name, values in zip(("G′", "G″"), moduli, strict=True):
+    for name, values in (("G′", storage), ("G″", loss)):
         if np.any(values <= 0.0):
             text = (
                 f"{np.count_nonzero(values <= 0.0)} values of {name} in {run.name} are not "
@@ -74,7 +73,7 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
     if not np.any(small):
         return
     expected = magnitude_at(linear, omega[small])
-    factor = float(np.median(np.hypot(moduli[0][small], moduli[1][small]) / expected))
+    factor = float(np.median(np.hypot(storage[small], loss[small]) / expected))
     if abs(np.log(factor)) > _APART:
         text = (
             f"At strains up to {_SMALL:g} the modulus in {run.name} is {factor:.2g} times that of "
@@ -179,8 +178,9 @@ def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
     n = len(data)
     gain = n * np.log(max(before, 1e-300) / max(after, 1e-300)) - np.log(n)
     deviation = np.sqrt(after / max(n - 1, 1) / max(float(column @ column), 1e-300))
-    errors = (float(np.sqrt(squared / n)) for squared in (before, after))
-    return SweepInertia(float(amounts[-2] - amounts[-1]), float(deviation), *errors, float(gain))
+    error_before, error_after = (float(np.sqrt(squared / n)) for squared in (before, after))
+    inertia = float(amounts[-2] - amounts[-1])
+    return SweepInertia(inertia, float(deviation), error_before, error_after, float(gain))
 
 
 def against_linear_theory(

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
-from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.runs import is_start_up, local_noise, steady_stress
+from discover.dataset.checking.runs import Finding, is_start_up, local_noise, steady_stress
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,

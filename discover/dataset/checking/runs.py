@@ -1,15 +1,19 @@
-"""Doubts about runs, each alone and held against one another."""
+"""What a check has to say, and doubts about runs, each alone and held against one another."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.checking.finding import Finding
 from discover.dataset.records.thinning import bends, beside_a_step
 from discover.dataset.run import Run
+from discover.notebook_view import NotebookView
 from discover.protocols.kinematics import KINDS
 from discover.statistics.noise.held_values import read_times
+from discover.words import counted
 
 FEWEST_SAMPLES = 10  # runs with fewer say little about a law
 
@@ -28,6 +32,54 @@ _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic flu
 _UNIT_FACTOR = 30.0
 # In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11): within the gain of most records
 _ONE_TEMPERATURE = 2.0
+
+
+Severity = Literal["error", "warning", "note"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that is wrong, doubtful or worth knowing.
+
+    Attributes
+    ----------
+    severity
+        ``error``: the folder cannot be used; ``warning``: it can, but results may mislead;
+        ``note``: how something was understood.
+    subject
+        What it is about, such as ``outliers`` or ``N1``; the same word for the same kind.
+    file
+        The file, or empty if it is about the folder.
+    text
+        A sentence or two in the user's words, with the remedy.
+    """
+
+    severity: Severity
+    subject: str
+    file: str
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+
+class Findings(tuple[Finding, ...], NotebookView):
+    """All that a check has to say, errors first; a tuple that shows itself in a notebook."""
+
+    __slots__ = ()
+
+    def of(self, severity: Severity) -> list[Finding]:
+        """Return the findings of one severity."""
+        return [finding for finding in self if finding.severity == severity]
+
+    @property
+    def counts(self) -> str:
+        """How many there are of each severity, in words."""
+        return ", ".join(counted(len(self.of(one)), one) for one in get_args(Severity))
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.counts}." if self else "Nothing wrong was found."
+        yield pd.DataFrame([asdict(finding) for finding in self])
 
 
 def doubts_of_run(run: Run) -> Iterator[Finding]:

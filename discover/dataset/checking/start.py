@@ -4,8 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from discover.dataset.checking.finding import Finding
-from discover.dataset.checking.runs import stress_noise
+from discover.dataset.checking.runs import Finding, stress_noise
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation

@@ -64,10 +64,10 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
 class ImportedFolder:
     """A data folder, not yet written."""
 
-    files: dict[str, str] = field(default_factory=dict)  # text of every file by name
-    mapping: Mapping = field(default_factory=Mapping)  # all that was used, guesses included
-    said: list[str] = field(default_factory=list)  # what was understood and done, a line each
-    unread: list[str] = field(default_factory=list)  # what could not be read, and why, a line each
+    files: dict[str, str]  # text of every file by name
+    mapping: Mapping  # all that was used, guesses included
+    said: list[str]  # what was understood and done, a line each
+    unread: list[str]  # what could not be read, and why, a line each
 
 
 @dataclass
@@ -96,12 +96,10 @@ class _Import:
 
     def add(self, other: "_Import") -> None:
         """Add what another file holds."""
-        self.found += other.found
-        self.said += other.said
-        self.unread += other.unread
-        self.tests |= other.tests
-        self.named |= other.named
-        self.asked_for |= other.asked_for
+        for name in ("found", "said", "unread"):
+            getattr(self, name).extend(getattr(other, name))
+        for name in ("tests", "named", "asked_for"):
+            getattr(self, name).update(getattr(other, name))
         self.units.found = {**other.units.found, **self.units.found}
         for key, names in other.seen.items():
             self.seen.setdefault(key, set()).update(names)

@@ -221,12 +221,9 @@ def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
         told = tuple(dict.fromkeys((*piece.told_by, *told_by)))
         first = block.cells[int(piece.rows[0])]
         line = block.line + int(piece.rows[0])
-        said = [
-            f"{block.columns[i][0]} {first[i]} {block.columns[i][1]}".strip()
-            if is_number(first[i])
-            else first[i]
-            for i in told[:2]
-        ]
+        named = ((first[i], *block.columns[i]) for i in told[:2])
+        said = (f"{name} {cell} {unit}".strip() if is_number(cell) else cell
+                for cell, name, unit in named)  # fmt: skip
         label = ", ".join(said) or f"from line {line} on"
         part = replace(
             block.rows(piece.rows),
@@ -411,11 +408,12 @@ def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
         return 0
     held = [float(np.median(rate)) if spread(rate) < CONSTANT else 0.0 for rate, _ in ways]
     loops = held[1] and _is_loop(ways[0], ways[2])
-    return 3 if loops or _recovers(*held, ways[0][1], ways[2][1]) else 0
+    return 3 if loops or _recovers(held, ways[0][1], ways[2][1]) else 0
 
 
-def _recovers(first, second, third, before: np.ndarray, after: np.ndarray) -> bool:
+def _recovers(held: Sequence[float], before: np.ndarray, after: np.ndarray) -> bool:
     """Return whether the third rate is the first again, after another, and what it does is not."""
+    first, second, third = held
     if not (first and second and third) or min(first / third, first / second) <= 0.0:
         return False
     again, other = first / third, first / second

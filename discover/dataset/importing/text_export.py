@@ -382,7 +382,8 @@ def _named(words: str) -> SaidTest | None:
     if {"planar", "biaxial"} & set(places):
         places.pop("uniaxial", None)
     # made of ramps or of steps, and relaxing meanwhile
-    found = [t for t in places if t in ("loop", "intervals")] or list(places)
+    of_several = [t for t in places if t in ("loop", "intervals")]
+    found: list[SaidTest] = of_several or [*places]
     if "flow_curve" in found and "ramp" in found:
         return "ramp"
     return found[0] if len(found) == 1 else None

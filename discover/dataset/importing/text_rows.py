@@ -263,12 +263,12 @@ def _constants(cells: Sequence[str]) -> Iterator[Constant]:
         return
     value = _ALONE.fullmatch(" ".join(cells[1:3])) if len(cells) <= 3 else None
     parts = [] if value else [part.strip() for part in " ".join(cells).split(";")]
-    said = [(cells[0], *value.groups())] if value else []
+    said = [(cells[0], value[1], value[2])] if value else []
     for part in parts:
         if unit := _UNIT.fullmatch(part):
             yield Constant(unit[1], "", unit[2])
         elif match := _WITH_KEY.fullmatch(part):
-            said.append(match.groups())
+            said.append((match[1], match[2], match[3]))
     for name, number, unit in said:
         name, unit = name_and_unit(name.strip(" :=#%"), (unit or "").strip())
         yield Constant(name, number.replace(",", "."), unit)

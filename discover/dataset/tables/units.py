@@ -223,6 +223,7 @@ SHEAR_RATE = Quantity("shear_rate", "shear_rate_1_s", "1/s")
 SHEAR_STRESS = Quantity("stress", "stress_Pa", "Pa")
 FIRST_NORMAL_STRESS_DIFFERENCE = Quantity("N1", "N1_Pa", "Pa")
 SECOND_NORMAL_STRESS_DIFFERENCE = Quantity("N2", "N2_Pa", "Pa")
+NORMAL_STRESS_DIFFERENCES = FIRST_NORMAL_STRESS_DIFFERENCE, SECOND_NORMAL_STRESS_DIFFERENCE
 STRAIN = Quantity("strain", "strain", "")
 HENCKY_RATE = Quantity("hencky_rate", "hencky_rate_1_s", "1/s")
 TENSILE_STRESS = Quantity("tensile_stress", "tensile_stress_Pa", "Pa")

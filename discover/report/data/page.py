@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from discover.dataset.checking.finding import Finding
+from discover.dataset.checking.runs import Finding
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
