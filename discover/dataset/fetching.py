@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from discover.dataset.importing.text_rows import is_number
-from discover.dataset.tables.table import read_bytes
+from discover.dataset.tables.table import is_number, read_bytes
 from discover.errors import InputError
 from discover.python_child import python_command
 

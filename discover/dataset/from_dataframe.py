@@ -17,8 +17,7 @@ from discover.words import unknown_name
 
 _KINDS = tuple(name.removesuffix(".csv") for name in DATA_FILES if name != INDEX_FILE)
 
-_LONGEST_NAME = 200
-"""Bytes of a run's name; file systems take 255, and endings are put behind it."""
+_LONGEST_NAME = 200  # bytes of a run's name; file systems take 255, and endings follow
 
 
 def from_dataframe(
@@ -77,12 +76,10 @@ def from_dataframe(
                 f"The columns of {label} must have text for names, on one level; got "
                 f"{short(odd[0])}. Rename them, or flatten them with reset_index()."
             )
-    no_option = [one for one in options if one not in signature(load_dataset).parameters]
-    if no_option:
-        known = list(signature(load_dataset).parameters)[1:]
-        raise InputError(unknown_name("option", no_option[0], known, "from_dataframe"))
-    unknown = [kind for kind in tables or {} if kind not in _KINDS]
-    if unknown:
+    known = list(signature(load_dataset).parameters)
+    if no_option := [one for one in options if one not in known]:
+        raise InputError(unknown_name("option", no_option[0], known[1:], "from_dataframe"))
+    if unknown := [kind for kind in tables or {} if kind not in _KINDS]:
         raise InputError(unknown_name("table", unknown[0], _KINDS))
     by_run = _by_run(samples, name)
     with TemporaryDirectory() as folder:
@@ -118,17 +115,16 @@ def _by_run(samples: pd.DataFrame | None, name: str) -> dict[str, pd.DataFrame]:
     if samples.columns.duplicated().any():
         twice = samples.columns[samples.columns.duplicated()][0]
         raise InputError(f"samples has the column {short(twice)} twice. Leave one of them out.")
-    wrong = [run for run in samples["run"] if not _can_name_a_run(run)]
-    if wrong:
+    if wrong := [run for run in samples["run"] if not _can_name_a_run(run)]:
         raise InputError(
             f"The column run must hold names of runs: text of at most {_LONGEST_NAME} characters "
             f"that can name a file, and not that of a table; got {short(wrong[0])}."
         )
-    found = {}
-    for run, table in samples.groupby("run", sort=False):
+    return {
         # a quantity that this run did not record
-        found[run] = table.drop(columns="run").dropna(axis="columns", how="all")
-    return found
+        str(run): table.drop(columns="run").dropna(axis="columns", how="all")
+        for run, table in samples.groupby("run", sort=False)
+    }
 
 
 def _index(runs: pd.DataFrame, by_run: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -137,8 +133,7 @@ def _index(runs: pd.DataFrame, by_run: Mapping[str, pd.DataFrame]) -> pd.DataFra
         raise InputError(
             f"runs has no column 'file' or 'run'; its columns are {', '.join(map(str, runs))}."
         )
-    missing = [run for run in index["file"] if run not in by_run]
-    if missing:
+    if missing := [run for run in index["file"] if run not in by_run]:
         raise InputError(
             f"runs names {missing[0]!r}, of which there is no sample; samples has "
             f"{', '.join(by_run) or 'none'}."

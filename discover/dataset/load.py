@@ -9,9 +9,16 @@ from jaxtyping import Float
 from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
-from discover.dataset.read_run import DEFAULT_WINDOW, INDEX_FILE, read_run, reason_to_set_aside
+from discover.dataset.read_run import (
+    DEFAULT_WINDOW,
+    INDEX_FILE,
+    read_run,
+    reason_to_set_aside,
+    table_of_run,
+)
 from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
+from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table, shown
 from discover.errors import InputError, Problems
@@ -159,7 +166,8 @@ def load_dataset(
     factors = read_clock_factors(index, clock_factor)
     before = rates_before(index, rate_before)
     aside: dict[str, str] = {}
-    used, runs = [], []
+    used: list[int] = []
+    runs: list[Run] = []
     for row, file in enumerate(names):
         with problems.collected():
             reason = reason_to_set_aside(index, row, before is not None)
@@ -175,11 +183,12 @@ def load_dataset(
         steady = None if before is None else float(before[row])
         with problems.collected():
             factor = float(factors[row])
-            run = read_run(root, index, row, factor, rate_is_measured, rate_window, steady)
+            table = table_of_run(root, names[row])
+            run = read_run(table, index, row, factor, rate_is_measured, rate_window, steady)
             runs.append(run)
     problems.require_none(name)
     if sequence is not None and runs:
-        runs = in_sequence(runs, read_column(index, "sequence", sequence)[used])
+        runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
     return Dataset(name, tuple(runs), sweep, _provenance(root), {**unused, **aside}, tables)
 
 

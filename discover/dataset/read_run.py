@@ -1,7 +1,6 @@
 """Read one run of a data folder: which test it is, its samples, its rate, and what came before."""
 
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from discover.dataset.records.thinning import MOST_SAMPLES, thin
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation, wave_of
 from discover.dataset.tables import units
-from discover.dataset.tables.table import Table, read_table
+from discover.dataset.tables.table import Table, is_number, read_table
 from discover.errors import InputError, Problems
 from discover.protocols.between_samples import sampled_rate
 from discover.protocols.control import imposed_stress
@@ -38,7 +37,6 @@ _CONSTANT = 1e-6
 _WRONG_SIGN = -0.5
 _NEXT_SAMPLE = 1.5  # intervals between samples, and a little, that may be missing of a cycle
 
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _OF_SHEAR = (units.SHEAR_STRESS, units.SHEAR_RATE, units.STRAIN)
 _OF_EXTENSION = (units.TENSILE_STRESS, units.HENCKY_RATE, units.HENCKY_STRAIN)
 
@@ -99,7 +97,7 @@ def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None
 
 def _word(index: Table, row: int, column: str) -> str:
     values, cell = _VALUES[column], _cell(index, row, column)
-    if column == "start" and _is_number(cell):
+    if column == "start" and _is_finite(cell):
         return values[0]  # a time at which the run started, as `sequence` takes it
     if cell and cell not in values:
         raise InputError(
@@ -112,7 +110,7 @@ def _word(index: Table, row: int, column: str) -> str:
 
 def _number(index: Table, row: int, column: str) -> float:
     cell = _cell(index, row, column)
-    if cell and not _is_number(cell):
+    if cell and not _is_finite(cell):
         raise InputError(
             f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}. Write a number, "
             "or leave the cell empty."
@@ -120,7 +118,7 @@ def _number(index: Table, row: int, column: str) -> float:
     return float(cell or 0.0)
 
 
-def _is_number(cell: str) -> bool:
+def _is_finite(cell: str) -> bool:
     try:
         return math.isfinite(float(cell))
     except ValueError:
@@ -131,8 +129,13 @@ def _cell(index: Table, row: int, column: str) -> str:
     return index.columns[column][row].strip() if column in index.columns else ""
 
 
+def table_of_run(root: Path, name: str) -> Table:
+    """Return the samples of a run as text; InputError if its file is missing or no table."""
+    return read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
+
+
 def read_run(
-    root: Path,
+    table: Table,
     index: Table,
     row: int,
     clock_factor: float = 1.0,
@@ -140,13 +143,12 @@ def read_run(
     rate_window: int = DEFAULT_WINDOW,
     rate_before: float | None = None,
 ) -> Run:
-    """Return the run on a line of ``runs.csv``; InputError if its file is missing or wrong."""
-    name = index.columns["file"][row]
-    table = read_table(root / name, name, f"Add it, or take its line out of {INDEX_FILE}.")
+    """Return the run on a line of ``runs.csv`` from its samples; InputError if they are wrong."""
+    name = table.name
     # float() would also read 1_2, nan or inf, which are labels here
     cells = {column: cells[row] for column, cells in index.columns.items() if column != "file"}
     metadata: dict[str, float | str] = {
-        column: float(cell) if _NUMBER.fullmatch(cell) else cell for column, cell in cells.items()
+        column: float(cell) if is_number(cell) else cell for column, cell in cells.items()
     }
     test = declared_test(index, row, rate_before)
     time, stress, (rate, strain, *normal) = _columns(table, test)

@@ -3,6 +3,7 @@
 import hashlib
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -40,7 +41,7 @@ from discover.dataset.material_functions import (
     TABLES,
     read_material_functions,
 )
-from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside
+from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside, table_of_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
 from discover.dataset.tables import units
@@ -89,7 +90,7 @@ def check_folder(
         before = rates_before(index, None)
     except InputError as error:
         return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
-    seen = _Columns(root)
+    seen = _Columns()
     runs: list[Run] = []
     for row, name in enumerate(index.columns["file"]):
         try:
@@ -99,19 +100,21 @@ def check_folder(
                 findings.append(Finding("note", "runs", name, text))
                 continue
             rate = None if before is None else float(before[row])
-            runs.append(read_run(root, index, row, rate_before=rate))
+            table = table_of_run(root, name)
+            runs.append(read_run(table, index, row, rate_before=rate))
         except InputError as error:
             findings += _errors("run", name, error)
             continue
         findings += doubts_of_run(runs[-1])
-        findings += seen.of_run(name)
+        findings += seen.of_run(table)
     for column, files in seen.unused.items():
         text = f"The column {shown(column)} in {_files(files)} is not used."
         findings.append(Finding("note", "columns", files[0], text))
     sweep, spectrum, said = _sweep(root, seen)
     for name in (f"{kind}.csv" for kind in TABLES):
         if name not in index.columns["file"] and (root / name).is_file():
-            seen.note_conversions(name, _TABLE_QUANTITIES)
+            with suppress(InputError):  # said when it is read
+                seen.note_conversions(read_table(root / name), _TABLE_QUANTITIES)
     for text, files in seen.converted.items():
         findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
     findings += said
@@ -183,9 +186,8 @@ def _clock(index: Table, column: str | None) -> Iterator[Finding]:
         yield Finding("error", "clock", INDEX_FILE, str(error))
         return
     if np.all(factors == 1.0):
-        yield Finding(
-            "note", "clock", INDEX_FILE, f"{column} is 1 in every run, so it changes nothing."
-        )
+        text = f"{column} is 1 in every run, so it changes nothing."
+        yield Finding("note", "clock", INDEX_FILE, text)
 
 
 def _before(index: Table) -> Iterator[Finding]:
@@ -212,30 +214,27 @@ def _files(names: list[str]) -> str:
 class _Columns:
     """What the columns of the files are read as, over all of them."""
 
-    def __init__(self, root: Path):
-        self._root = root
+    def __init__(self):
         self.unused: dict[str, list[str]] = {}  # files by column
         self.converted: dict[str, list[str]] = {}  # files by what is done to a column
 
-    def note_conversions(self, name: str, quantities: Sequence[Quantity]) -> dict[Quantity, str]:
+    def note_conversions(self, table: Table, quantities: Sequence[Quantity]) -> dict[Quantity, str]:
         """Keep which columns of a file are converted; return the column of each quantity."""
-        self._all: tuple[str, ...] = ()
-        try:
-            self._all = tuple(read_table(self._root / name, name).columns)
-            found = {one: units.find_column(self._all, one) for one in quantities}
-        except InputError:
-            return {}  # said when it is read
+        found = {one: units.find_column(tuple(table.columns), one) for one in quantities}
         known = {one: column for one, column in found.items() if column is not None}
         for quantity, (column, factor) in known.items():
             if text := units.conversion_note(column, factor, quantity):
-                self.converted.setdefault(text, []).append(name)
+                self.converted.setdefault(text, []).append(table.name)
         return {one: column for one, (column, _) in known.items()}
 
-    def of_run(self, name: str) -> Iterator[Finding]:
+    def of_run(self, table: Table) -> Iterator[Finding]:
         """Yield what looks like a slip in the columns of a run; keep those that nobody reads."""
-        known = self.note_conversions(name, _RUN_QUANTITIES)
+        try:
+            known, name = self.note_conversions(table, _RUN_QUANTITIES), table.name
+        except InputError:  # two columns of a quantity that is not the run's
+            return
         missing = [one for one in _RUN_QUANTITIES if one not in known]
-        for column in self._all if known else ():
+        for column in table.columns:
             if column in known.values():
                 continue
             meant = [q for q in missing if column.lower() in (q.stem.lower(), q.column.lower())]
@@ -269,7 +268,7 @@ def _sweep(
             "declared or fitted, and a wrong one looks like a missing effect."
         )
         return None, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
-    seen.note_conversions(SWEEP_FILE, _SWEEP_QUANTITIES)
+    seen.note_conversions(read_table(root / SWEEP_FILE), _SWEEP_QUANTITIES)
     try:
         spectrum = relaxation_spectrum(sweep)
     except (InputError, RuntimeError, np.linalg.LinAlgError) as error:
@@ -287,9 +286,8 @@ def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
         others = []
     for name in others:
         if name not in listed:
-            yield Finding(
-                "note", "runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used."
-            )
+            text = f"{name} is not named in {INDEX_FILE}, so it is not used."
+            yield Finding("note", "runs", name, text)
     seen: dict[bytes, str] = {}
     for run in runs:
         # what tells runs of different samples apart, however many there are

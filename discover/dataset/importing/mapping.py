@@ -154,12 +154,9 @@ def read_mapping(path: Path) -> Mapping:
 
 def write_mapping(mapping: Mapping) -> str:
     """Return a mapping as TOML."""
-    lines = [
-        "# How this folder was imported. Repeat it with",
-        f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER",
-    ]
-    if mapping.start_time_s:
-        lines.append(f"start_time_s = {mapping.start_time_s!r}")
+    lines = ["# How this folder was imported. Repeat it with"]
+    lines += [f"#   discover data import --mapping {MAPPING_FILE} --out FOLDER"]
+    lines += [f"start_time_s = {mapping.start_time_s!r}"] if mapping.start_time_s else []
     if mapping.temperature_C is not None:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
@@ -171,17 +168,15 @@ def write_mapping(mapping: Mapping) -> str:
         if known:
             lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(known[key])}" for key in known)]
     for source in mapping.source:
-        lines += ["", "[[source]]", _file(source.file)]
-        if source.sha256:
-            lines.append(f"sha256 = {_toml(source.sha256)}")
-        if source.sweep:
-            lines.append("sweep = true")
+        name = key_of(source.file)
+        lines += [
+            "",
+            "[[source]]",
+            f"{'file' if name == source.file else _ENCODED} = {_toml(name)}",
+        ]
+        lines += [f"sha256 = {_toml(source.sha256)}"] if source.sha256 else []
+        lines += ["sweep = true"] if source.sweep else []
     return "\n".join(lines) + "\n"
-
-
-def _file(name: str) -> str:
-    key = key_of(name)
-    return f"file = {_toml(name)}" if key == name else f"{_ENCODED} = {_toml(key)}"
 
 
 def _key(name: str) -> str:

@@ -49,6 +49,7 @@ class Readings:
     used: dict[str, str] = field(default_factory=dict)  # whence each quantity asked for, in words
     unsaid: dict[str, UnsaidUnit] = field(default_factory=dict)  # their units that nobody gives
     notes: dict[str, str] = field(default_factory=dict)  # what it says that cannot be, in words
+    _known: dict[str, tuple[Values, str, UnsaidUnit | None]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
@@ -149,6 +150,15 @@ class Readings:
         )
 
     def _column(self, key: str) -> Values:
+        """Return a column in SI units, read once; it counts as used whenever it is asked for."""
+        if key not in self._known:
+            self._known[key] = self._read(key), self.used[key], self.unsaid.get(key)
+        values, self.used[key], unsaid = self._known[key]
+        if unsaid is not None:
+            self.unsaid[key] = unsaid
+        return values
+
+    def _read(self, key: str) -> Values:
         at = self.columns[key]
         column, unit = self.block.columns[at]
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit else "")

@@ -376,17 +376,21 @@ def said_of(block: Block, file: str) -> Said | None:
 
 
 def _named(words: str) -> SaidTest | None:
-    places = {t: m.start() for t, pattern in _PATTERNS.items() if (m := pattern.search(words))}
-    if {"recovery", "creep"} <= set(places):  # one run, or "recovery after creep"
-        places.pop("creep" if places["recovery"] <= places["creep"] else "recovery")
-    if {"planar", "biaxial"} & set(places):
-        places.pop("uniaxial", None)
-    # made of ramps or of steps, and relaxing meanwhile
-    of_several = [t for t in places if t in ("loop", "intervals")]
-    found: list[SaidTest] = of_several or [*places]
-    if "flow_curve" in found and "ramp" in found:
+    found: dict[SaidTest, int] = {
+        test: match.start()
+        for test, pattern in _PATTERNS.items()
+        if (match := pattern.search(words))
+    }
+    if {"recovery", "creep"} <= set(found):  # one run, or "recovery after creep"
+        found.pop("creep" if found["recovery"] <= found["creep"] else "recovery")
+    if {"planar", "biaxial"} & set(found):
+        found.pop("uniaxial", None)
+    if {"loop", "intervals"} & set(found):  # made of ramps or of steps, and relaxing meanwhile
+        for test in set(found) - {"loop", "intervals"}:
+            found.pop(test)
+    if {"flow_curve", "ramp"} <= set(found):
         return "ramp"
-    return found[0] if len(found) == 1 else None
+    return next(iter(found)) if len(found) == 1 else None
 
 
 def _titles(lines: Sequence[Sequence[str]]) -> Iterator[str]:

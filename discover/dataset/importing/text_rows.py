@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing.names import code_page_of
-from discover.dataset.tables.table import read_bytes
+from discover.dataset.tables.table import is_number, read_bytes
 from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
 
@@ -97,12 +97,6 @@ _FEWER = "Export fewer samples, or one test a file."
 
 _POINT = re.compile(r"[+-]?[0-9]+\.[0-9]+([eE][+-]?[0-9]+)?")
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+([eE][+-]?[0-9]+)?")
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-
-
-def is_number(cell: str) -> bool:
-    """Return whether a cell is a number."""
-    return _NUMBER.fullmatch(cell) is not None
 
 
 def read_rows(

@@ -33,6 +33,11 @@ _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]+,[0-9]+([eE][+-]?[0-9]+)?")
 _IMPORT = "discover data import"
 
 
+def is_number(cell: str) -> bool:
+    """Return whether a cell is a number."""
+    return _NUMBER.fullmatch(cell) is not None
+
+
 @dataclass(frozen=True)
 class Table:
     """A CSV file as text."""
@@ -60,7 +65,7 @@ class Table:
         """Return a column as finite numbers, those next to nothing as 0; InputError if none."""
         text = self.columns[column]
         # as Python reads them: pandas before 3 drops the last of many digits
-        values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
+        values = np.array([float(c) if is_number(c) else np.nan for c in text])
         rows = np.flatnonzero(~np.isfinite(values))
         if rows.size:
             row = int(rows[0])
@@ -209,7 +214,7 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
                 header = _header(cells, first, name)
                 continue
             if len(cells) != len(header):
-                of_numbers = all(_NUMBER.fullmatch(cell.strip()) for cell in cells)
+                of_numbers = all(is_number(cell.strip()) for cell in cells)
                 remedy = "Correct that line."
                 if len(cells) > len(header) and of_numbers:
                     remedy = "Decimal commas look so too: write decimal points."
@@ -258,7 +263,7 @@ def _decode(content: bytes, name: str) -> str:
 
 def _header(cells: list[str], line: int, name: str) -> list[str]:
     columns = [cell.strip() for cell in cells]
-    if all(_NUMBER.fullmatch(column) for column in columns):
+    if all(map(is_number, columns)):
         raise InputError(
             f"{name} begins with numbers on line {line}, not with the names of its columns. Add a "
             "header such as time_s,shear_rate_1_s,stress_Pa."
@@ -296,7 +301,7 @@ def _remedy(cell: str, row: int) -> str:
             "That looks like a row of units: put them into the header, as in time_s, and remove "
             f"the row, or use {_IMPORT}."
         )
-    if cell and _NUMBER.fullmatch(cell):
+    if is_number(cell):
         return "That is beyond what a computer holds as a number; correct that line."
     return "Correct that line or remove it."
 

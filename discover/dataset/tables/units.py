@@ -233,24 +233,6 @@ STORAGE_MODULUS = Quantity("Gp", "Gp_Pa", "Pa")
 LOSS_MODULUS = Quantity("Gpp", "Gpp_Pa", "Pa")
 
 
-def conversion_factor(suffix: str, quantity: Quantity) -> float | None:
-    """Return the factor to SI from what follows the stem in a name, or None if it is no unit.
-
-    Raises InputError if it is a unit of something else.
-    """
-    unit = read_heading(suffix)
-    if unit is None:
-        return None
-    factor = factor_to(unit, quantity)
-    if factor is None:
-        raise InputError(
-            f"The column {quantity.stem}_{suffix} has the unit {suffix.replace('_', '/')}, which "
-            f"is not a unit of {quantity.stem}. Name the column {quantity.column}, or give another "
-            f"unit of {quantity.unit or 'a pure number'} after the underscore."
-        )
-    return factor
-
-
 def factor_to(unit: Unit, quantity: Quantity) -> float | None:
     """Return the factor from a unit to the SI unit of a quantity, or None if it is another's."""
     wanted = read_unit(quantity.unit)
@@ -307,9 +289,17 @@ def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] |
         if name == quantity.column:
             found.append((name, 1.0))
         elif name.startswith(quantity.stem + "_"):
-            factor = conversion_factor(name[len(quantity.stem) + 1 :], quantity)
-            if factor is not None:
-                found.append((name, factor))
+            suffix = name[len(quantity.stem) + 1 :]
+            if (unit := read_heading(suffix)) is None:
+                continue
+            factor = factor_to(unit, quantity)
+            if factor is None:
+                raise InputError(
+                    f"The column {name} has the unit {suffix.replace('_', '/')}, which is not a "
+                    f"unit of {quantity.stem}. Name the column {quantity.column}, or give another "
+                    f"unit of {quantity.unit or 'a pure number'} after the underscore."
+                )
+            found.append((name, factor))
     if len(found) > 1:
         raise InputError(
             f"Both {found[0][0]} and {found[1][0]} hold {quantity.stem}. Keep one of them."
