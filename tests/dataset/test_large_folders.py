@@ -6,6 +6,7 @@ import pytest
 from discover.dataset import check_folder, load_dataset
 from discover.dataset.checking.runs import doubts_among_runs
 from discover.dataset.run import Run
+from discover.dataset.tables import table
 from discover.protocols.protocol import start_up
 
 
@@ -41,6 +42,24 @@ def test_a_sweep_of_a_common_length_is_kept_whole(tmp_path):
     np.testing.assert_array_equal(data.linear_sweep.angular_frequency, omega)
     assert data.thinned == ""
     assert not [f for f in check_folder(tmp_path) if "frequencies" in str(f)]
+
+
+def test_a_check_reads_the_samples_of_each_run_once(tmp_path, monkeypatch):
+    time = np.linspace(0.1, 5.0, 12)
+    for name in ("a.csv", "b.csv"):
+        lines = [f"{t:.6g},0.5,{50 * -np.expm1(-t):.6g}" for t in time]
+        (tmp_path / name).write_text("\n".join(["time_s,shear_rate_1_s,stress_Pa", *lines]))
+    (tmp_path / "runs.csv").write_text("file\na.csv\nb.csv\n")
+    read = []
+    whole = table.read_bytes
+
+    def counted(path, *args, **kwargs):
+        read.append(path.name)
+        return whole(path, *args, **kwargs)
+
+    monkeypatch.setattr(table, "read_bytes", counted)
+    assert not check_folder(tmp_path).of("error")
+    assert read.count("a.csv") == read.count("b.csv") == 1
 
 
 def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.records.thinning import bends, beside_a_step
+from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, beside_a_step
 from discover.dataset.run import Run
 from discover.notebook_view import NotebookView
 from discover.protocols.kinematics import KINDS
@@ -23,8 +23,6 @@ _SPIKE_SIGMAS, _SPIKE_SHARE = 10.0, 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
-# The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
-_SPREAD_OF_BENDS = 1.4826 / np.sqrt(1.5)
 _NEIGHBOURHOOD = 31
 _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic fluid
 # Units differ by 60, 100 or 1000; what fluids do beyond the bounds below (they thicken, yield or
@@ -170,7 +168,7 @@ def spikes(run: Run) -> Float[np.ndarray, " k"]:
 def stress_noise(run: Run) -> float:
     """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
     off = bends(run.time, run.stress)
-    return float(_SPREAD_OF_BENDS * np.median(np.abs(off))) if len(off) else 0.0
+    return float(SPREAD_OF_BENDS * np.median(np.abs(off))) if len(off) else 0.0
 
 
 def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
@@ -180,7 +178,7 @@ def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
         return np.zeros(len(values))
     width = min(_NEIGHBOURHOOD, len(off))
     around = np.median(np.lib.stride_tricks.sliding_window_view(off, width), axis=1)
-    return _SPREAD_OF_BENDS * np.pad(around, (width // 2 + 1, width - width // 2), mode="edge")
+    return SPREAD_OF_BENDS * np.pad(around, (width // 2 + 1, width - width // 2), mode="edge")
 
 
 def _outliers(run: Run) -> Doubt:

@@ -16,6 +16,7 @@ from discover.dataset.importing.folder_files import (
     nothing,
     unread_columns,
 )
+from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
 from discover.dataset.importing.names import name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
@@ -23,7 +24,7 @@ from discover.dataset.importing.quantities import UnsaidUnits, guess_columns
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
-from discover.dataset.importing.stacked import joined_intervals, tests_in_rows, tests_side_by_side
+from discover.dataset.importing.stacked import tests_in_rows, tests_side_by_side
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import read_rows
 from discover.dataset.tables.table import read_bytes, shown

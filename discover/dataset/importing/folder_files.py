@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from discover.dataset.importing.quantities import SAME_TEMPERATURE
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
@@ -20,7 +21,6 @@ TABLES = {
     "relaxation": "relaxation", "creep": "creep",
 }  # fmt: skip
 _TAKEN = (INDEX_FILE, TESTS_FILE, *(f"{table}.csv" for table in TABLES.values()))
-_SAME = 1.5  # difference in °C up to which two temperatures are one
 _NO_TEMPERATURE = (
     "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
     "FILE:2=60 for a block. To exchange the two, rename them."
@@ -43,7 +43,7 @@ class NamedRecord:
     def near(self, celsius: float | None) -> bool:
         """Return whether it is at a temperature, or nobody says one of the two."""
         has = self.record.temperature
-        return has is None or celsius is None or abs(has - celsius) <= _SAME
+        return has is None or celsius is None or abs(has - celsius) <= SAME_TEMPERATURE
 
 
 def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:

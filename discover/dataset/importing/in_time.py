@@ -2,10 +2,13 @@
 
 What words say of the test is believed before the numbers are asked; where the two exclude each
 other nothing is taken. Numbers tell what was imposed by its course: a command is held, in one step
-or several, or follows a straight line, and an answer does neither.
+or several, or follows a straight line, and an answer does neither. Intervals of a thixotropy test
+are one run: what a structured fluid does in one depends on those before it   [Mewis & Wagner 2009,
+Adv. Colloid Interface Sci. 147-148, 214].
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
@@ -14,10 +17,13 @@ import numpy as np
 from jaxtyping import Float
 from scipy.interpolate import PchipInterpolator
 
-from discover.dataset.importing.mapping import TestName
+from discover.dataset.importing.mapping import Mapping, TestName
 from discover.dataset.importing.oscillations import alternates, purer
-from discover.dataset.importing.text_export import Said
-from discover.dataset.records.thinning import bends
+from discover.dataset.importing.readings import Readings
+from discover.dataset.importing.text_export import Block, Said, said_of
+from discover.dataset.importing.text_rows import is_number
+from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends
+from discover.errors import InputError
 
 CONSTANT = 0.03  # spread of the middle nine tenths up to which an imposed quantity is constant
 AT_REST = 0.02  # rate or stress over the largest, below which it is none
@@ -32,12 +38,15 @@ _MOVES = 0.2  # share of the largest strain by which one that was held does not 
 APART = 0.1
 _ABOVE_SCATTER = 4.0
 _FEWEST_OF_BRANCH = 4
+_SAME_RATE, _ANOTHER_RATE = 1.3, 5.0
+_SAME_STRESS = 0.1  # over the stress: an interval repeats another, and starts as that did
 _WITHOUT_CREEP = (
     "and the creep before it, from which it starts, is not in the file: give both in one file, one "
     "after the other"
 )
 
 Values = Float[np.ndarray, " n"]
+Numbered = tuple[int, Block]
 
 
 @dataclass(frozen=True)
@@ -236,8 +245,7 @@ def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
     left = np.abs(np.concatenate(off)) if off else np.empty(0)
     if not found or not len(left):
         return None
-    scatter = 1.4826 * float(np.median(left)) / np.sqrt(1.5)
-    return UpAndDown(np.concatenate(found), scatter)
+    return UpAndDown(np.concatenate(found), float(SPREAD_OF_BENDS * np.median(left)))
 
 
 def _in_order(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -304,3 +312,95 @@ def _rougher(time: Values, answer: Values, imposed: Values) -> bool:
         return np.median(np.abs(values[1:-1] - middle)) / (np.ptp(values) or 1.0)
 
     return bool(roughness(answer) > 10.0 * roughness(imposed))
+
+
+def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) -> list[Numbered]:
+    """Return numbered blocks of a file, those that are intervals of one thixotropy test as one.
+
+    Words say that they are, or three rates of which the last is the first again, or rates that go
+    up and then down with stresses that differ. A block that the user names a test for is left.
+    """
+    left, found = list(blocks), []
+    while left:
+        number, first = left[0]
+        several: list[Block] = []
+        for at, block in left:  # as many as have the same columns and are nobody's choice
+            chosen = mapping.test_of(file, at)
+            # an import that is repeated knows the whole by the number of its first interval
+            free = chosen is None or (not several and chosen == "run")
+            if not free or (several and block.apart) or block.columns != first.columns:
+                break
+            several.append(block)
+        count = _how_many(several, mapping, file)
+        found.append((number, first if count < 2 else _as_one(several[:count], mapping, file)))
+        left = left[max(count, 1) :]
+    return found
+
+
+def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
+    """Return how many of these blocks, from the first on, are one test."""
+    if len(blocks) < 2:
+        return 0
+    said = said_of(blocks[0], file)
+    all_are = said is not None and said.test in ("loop", "intervals")
+    ways: list[tuple[np.ndarray, np.ndarray]] = []  # rates and stresses
+    for block in blocks if all_are else blocks[:3]:
+        try:
+            readings = Readings.of(block, mapping, file)
+            rate, stress = readings.get("shear_rate"), readings.get("stress")
+        except InputError:  # said where the block is read
+            break
+        if rate is None or stress is None or readings.has("omega", "Gp"):
+            break
+        kept = np.isfinite(rate) & np.isfinite(stress)
+        if np.sum(kept) < 3:
+            break
+        ways.append((rate[kept], stress[kept]))
+    if all_are:
+        return len(ways)
+    if len(ways) > 1 and _is_loop(*ways[:2]):
+        return 2
+    if len(ways) < 3:
+        return 0
+    held = [float(np.median(rate)) if spread(rate) < CONSTANT else 0.0 for rate, _ in ways]
+    loops = held[1] and _is_loop(ways[0], ways[2])
+    return 3 if loops or _recovers(held, ways[0][1], ways[2][1]) else 0
+
+
+def _recovers(held: Sequence[float], before: np.ndarray, after: np.ndarray) -> bool:
+    """Return whether the third rate is the first again, after another, and what it does is not."""
+    first, second, third = held
+    if not (first and second and third) or min(first / third, first / second) <= 0.0:
+        return False
+    again, other = first / third, first / second
+    if max(again, 1.0 / again) > _SAME_RATE or max(other, 1.0 / other) < _ANOTHER_RATE:
+        return False
+    both = min(len(before), len(after))
+    apart = np.median(np.abs(before[:both] - after[:both]))
+    return bool(apart > _SAME_STRESS * np.max(np.abs(before)))
+
+
+def _is_loop(up: tuple[np.ndarray, np.ndarray], down: tuple[np.ndarray, np.ndarray]) -> bool:
+    """Return whether rates go up and then down with other stresses."""
+    if not (every_row_differs(up[0]) and every_row_differs(down[0])):
+        return False
+    both = up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))
+    return both is not None and both.apart
+
+
+def _as_one(blocks: Sequence[Block], mapping: Mapping, file: str) -> Block:
+    """Return intervals one after the other; a clock that starts again goes on."""
+    first = blocks[0]
+    at = Readings.of(first, mapping, file).columns.get("time")
+    cells: list[tuple[str, ...]] = []
+    last = 0.0
+    for block in blocks:
+        times = [float(row[at]) for row in block.cells if at is not None and is_number(row[at])]
+        begin = last if times and cells and times[0] <= last else 0.0
+        for row in block.cells:
+            if at is not None and is_number(row[at]):
+                last = begin + float(row[at])
+                row = (*row[:at], repr(last), *row[at + 1 :])
+            cells.append(row)
+    name = " to ".join(dict.fromkeys(block.name for block in (first, blocks[-1]) if block.name))
+    return replace(first, name=name, cells=tuple(cells))

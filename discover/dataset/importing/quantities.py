@@ -47,6 +47,7 @@ QUANTITIES: dict[str, Quantity] = {
 }
 """What a column may hold: quantities of data folders, and in SI units those of exports alone."""
 
+SAME_TEMPERATURE = 1.5  # °C up to which two temperatures are one
 _SHORT = 3  # letters of a name that says too little without its unit
 
 

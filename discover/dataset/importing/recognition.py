@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float
 from discover.dataset.importing.in_time import APART, Course, kind_of_course, up_and_down
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates
+from discover.dataset.importing.quantities import SAME_TEMPERATURE
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import Said, said_of
 from discover.dataset.tables.table import shown
@@ -18,7 +19,6 @@ from discover.words import percent_of
 
 _SAME_FREQUENCY = 1.02
 _SAME_AMPLITUDE = 1.2
-_SAME_TEMPERATURE = 1.5
 _FEWEST = 3
 _OF_TENSION = {
     "stress": "tensile_stress", "shear_rate": "hencky_rate", "strain": "hencky_strain",
@@ -95,7 +95,7 @@ def _oscillatory(readings: Readings, rows: Rows) -> tuple[TestName, str]:
     if several:
         return "amplitude_sweep", f"{at_one}, and strains from {low} to {high}"
     temperature = readings.get("temperature")
-    if temperature is not None and np.ptp(temperature[rows]) > _SAME_TEMPERATURE:
+    if temperature is not None and np.ptp(temperature[rows]) > SAME_TEMPERATURE:
         return "none", f"a temperature sweep: {at_one}, and temperature varies"
     return "none", f"a time sweep: {at_one}, and no strain that varies"
 

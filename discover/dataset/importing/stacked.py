@@ -1,9 +1,7 @@
-"""The tests that one table holds, apart, and the intervals of one test, together.
+"""The tests that one table holds: side by side, one below the other, or row by row in turn.
 
-Tests stand side by side, one below the other, or row by row in turn. What repeats tells them apart:
-a word or number in a column of its own, a temperature, a set value, a clock or a series of rates
-that starts again. Intervals of a thixotropy test are one run: what a structured fluid does in one
-depends on those before it   [Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214].
+What repeats tells them apart: a word or number in a column of its own, a temperature, a set value,
+a clock or a series of rates that starts again.
 """
 
 import re
@@ -15,12 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
-from discover.dataset.importing.in_time import CONSTANT, every_row_differs, spread, up_and_down
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.names import name_table, plain
-from discover.dataset.importing.quantities import QUANTITIES, guess_columns, name_rank, to_celsius
+from discover.dataset.importing.quantities import (
+    QUANTITIES,
+    SAME_TEMPERATURE,
+    guess_columns,
+    name_rank,
+    to_celsius,
+)
 from discover.dataset.importing.readings import Readings
-from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words, said_of
+from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
 from discover.dataset.importing.text_rows import Constant, is_number, name_and_unit
 from discover.dataset.tables import units
 from discover.dataset.tables.units import read_unit
@@ -176,7 +179,6 @@ def _name_of(unit: str) -> str | None:
 
 
 _FEWEST = 3  # rows of a test
-_SAME_TEMPERATURE = 1.5  # °C up to which neighbouring readings are of one temperature
 _DRIFT = 3.0  # spread in °C, up to which readings without a gap are one temperature, and no ramp
 _BACK = 0.1  # share of the way so far, within which a clock is back at its start
 _MOSTLY = 0.6  # share of steps in one direction, from which on values go that way
@@ -258,7 +260,7 @@ def _by_temperature(readings: Readings, piece: _Piece) -> list[_Piece]:
     if time is not None and np.all(np.diff(time) > 0.0) and not _sweeps(readings, piece):
         return [piece]
     order = np.sort(degrees[known])
-    cuts = order[1:][np.diff(order) > _SAME_TEMPERATURE] - 0.5 * _SAME_TEMPERATURE
+    cuts = order[1:][np.diff(order) > SAME_TEMPERATURE] - 0.5 * SAME_TEMPERATURE
     group = np.searchsorted(cuts, degrees)
     # a row without a reading is at the temperature of that before it
     group = group[np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))]
@@ -350,101 +352,3 @@ def _strain_varies(readings: Readings) -> bool:
         return False
     size = np.empty(0) if strain is None else np.abs(strain[np.isfinite(strain)])
     return bool(len(size) and np.max(size) > 1.2 * np.min(size))
-
-
-_SAME_RATE, _ANOTHER_RATE = 1.3, 5.0
-_SAME_STRESS = 0.1  # over the stress: an interval repeats another, and starts as that did
-
-Numbered = tuple[int, Block]
-
-
-def joined_intervals(blocks: Sequence[Numbered], mapping: Mapping, file: str) -> list[Numbered]:
-    """Return numbered blocks of a file, those that are intervals of one thixotropy test as one.
-
-    Words say that they are, or three rates of which the last is the first again, or rates that go
-    up and then down with stresses that differ. A block that the user names a test for is left.
-    """
-    left, found = list(blocks), []
-    while left:
-        number, first = left[0]
-        several: list[Block] = []
-        for at, block in left:  # as many as have the same columns and are nobody's choice
-            chosen = mapping.test_of(file, at)
-            # an import that is repeated knows the whole by the number of its first interval
-            free = chosen is None or (not several and chosen == "run")
-            if not free or (several and block.apart) or block.columns != first.columns:
-                break
-            several.append(block)
-        count = _how_many(several, mapping, file)
-        found.append((number, first if count < 2 else _as_one(several[:count], mapping, file)))
-        left = left[max(count, 1) :]
-    return found
-
-
-def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
-    """Return how many of these blocks, from the first on, are one test."""
-    if len(blocks) < 2:
-        return 0
-    said = said_of(blocks[0], file)
-    all_are = said is not None and said.test in ("loop", "intervals")
-    ways: list[tuple[np.ndarray, np.ndarray]] = []  # rates and stresses
-    for block in blocks if all_are else blocks[:3]:
-        try:
-            readings = Readings.of(block, mapping, file)
-            rate, stress = readings.get("shear_rate"), readings.get("stress")
-        except InputError:  # said where the block is read
-            break
-        if rate is None or stress is None or readings.has("omega", "Gp"):
-            break
-        kept = np.isfinite(rate) & np.isfinite(stress)
-        if np.sum(kept) < 3:
-            break
-        ways.append((rate[kept], stress[kept]))
-    if all_are:
-        return len(ways)
-    if len(ways) > 1 and _is_loop(*ways[:2]):
-        return 2
-    if len(ways) < 3:
-        return 0
-    held = [float(np.median(rate)) if spread(rate) < CONSTANT else 0.0 for rate, _ in ways]
-    loops = held[1] and _is_loop(ways[0], ways[2])
-    return 3 if loops or _recovers(held, ways[0][1], ways[2][1]) else 0
-
-
-def _recovers(held: Sequence[float], before: np.ndarray, after: np.ndarray) -> bool:
-    """Return whether the third rate is the first again, after another, and what it does is not."""
-    first, second, third = held
-    if not (first and second and third) or min(first / third, first / second) <= 0.0:
-        return False
-    again, other = first / third, first / second
-    if max(again, 1.0 / again) > _SAME_RATE or max(other, 1.0 / other) < _ANOTHER_RATE:
-        return False
-    both = min(len(before), len(after))
-    apart = np.median(np.abs(before[:both] - after[:both]))
-    return bool(apart > _SAME_STRESS * np.max(np.abs(before)))
-
-
-def _is_loop(up: tuple[np.ndarray, np.ndarray], down: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Return whether rates go up and then down with other stresses."""
-    if not (every_row_differs(up[0]) and every_row_differs(down[0])):
-        return False
-    both = up_and_down(*(np.concatenate(pair) for pair in zip(up, down, strict=True)))
-    return both is not None and both.apart
-
-
-def _as_one(blocks: Sequence[Block], mapping: Mapping, file: str) -> Block:
-    """Return intervals one after the other; a clock that starts again goes on."""
-    first = blocks[0]
-    at = Readings.of(first, mapping, file).columns.get("time")
-    cells: list[tuple[str, ...]] = []
-    last = 0.0
-    for block in blocks:
-        times = [float(row[at]) for row in block.cells if at is not None and is_number(row[at])]
-        begin = last if times and cells and times[0] <= last else 0.0
-        for row in block.cells:
-            if at is not None and is_number(row[at]):
-                last = begin + float(row[at])
-                row = (*row[:at], repr(last), *row[at + 1 :])
-            cells.append(row)
-    name = " to ".join(dict.fromkeys(block.name for block in (first, blocks[-1]) if block.name))
-    return replace(first, name=name, cells=tuple(cells))

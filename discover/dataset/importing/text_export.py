@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -312,12 +312,8 @@ def _name(rows: Rows, data: int) -> str:
     return ", ".join(dict.fromkeys(word for word in reversed(found) if word)) or title
 
 
-SaidTest = Literal[
-    "creep", "recovery", "relaxation", "start_up", "ramp", "loop", "intervals", "flow_curve",
-    "oscillation", "uniaxial", "planar", "biaxial",
-]  # fmt: skip
-
-_WORDS: dict[SaidTest, str] = {
+# which test words say that it is
+_WORDS = {
     "creep": r"creep|kriech|fluage|retardation|retardaci|fluencia|scorrimento viscoso|クリープ|蠕变"
     r"|蠕變|크리프",
     "recovery": r"recover[ey]|recoil|rückstell|kriecherholung|rückkriech|recouvrance|recuperaci"
@@ -343,9 +339,7 @@ _WORDS: dict[SaidTest, str] = {
     "planar": r"planar (ext|elong)\w*",
     "biaxial": r"(equi)?biax\w*",
 }  # fmt: skip
-_PATTERNS: dict[SaidTest, re.Pattern[str]] = {
-    test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()
-}
+_PATTERNS = {test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()}
 _SAY_THE_TEST = re.compile(
     r"test|type|mode|experiment|method|procedure|measurement|title|name|step|segment|action"
     r"|result|versuch|messung|art|essai|ensayo|prova|interval+e?|task|試験|测试|測定",
@@ -358,7 +352,7 @@ _LONGEST = 8  # words of a line beyond which it is prose, of which nothing is ta
 class Said(NamedTuple):
     """What words say of a test."""
 
-    test: SaidTest
+    test: str  # of `_WORDS`
     words: str  # as the file has them
     by_file_name: bool = False  # nothing else says so, and the numbers overrule it
 
@@ -375,19 +369,14 @@ def said_of(block: Block, file: str) -> Said | None:
     return None if test is None else Said(test, file, by_file_name=True)
 
 
-def _named(words: str) -> SaidTest | None:
-    found: dict[SaidTest, int] = {
-        test: match.start()
-        for test, pattern in _PATTERNS.items()
-        if (match := pattern.search(words))
-    }
+def _named(words: str) -> str | None:
+    found = {t: m.start() for t, pattern in _PATTERNS.items() if (m := pattern.search(words))}
     if {"recovery", "creep"} <= set(found):  # one run, or "recovery after creep"
         found.pop("creep" if found["recovery"] <= found["creep"] else "recovery")
     if {"planar", "biaxial"} & set(found):
         found.pop("uniaxial", None)
     if {"loop", "intervals"} & set(found):  # made of ramps or of steps, and relaxing meanwhile
-        for test in set(found) - {"loop", "intervals"}:
-            found.pop(test)
+        found = {test: at for test, at in found.items() if test in ("loop", "intervals")}
     if {"flow_curve", "ramp"} <= set(found):
         return "ramp"
     return next(iter(found)) if len(found) == 1 else None

@@ -156,6 +156,10 @@ def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float
     return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
 
 
+# The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
+SPREAD_OF_BENDS = 1.4826 / np.sqrt(1.5)
+
+
 def bends(place: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]) -> np.ndarray:
     """Return what samples lie off the straight line between their neighbours, shape (n - 2,)."""
     share = (place[1:-1] - place[:-2]) / (place[2:] - place[:-2])
