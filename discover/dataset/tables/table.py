@@ -65,7 +65,7 @@ class Table:
         """Return a column as finite numbers, those next to nothing as 0; InputError if none."""
         text = self.columns[column]
         # as Python reads them: pandas before 3 drops the last of many digits
-        values = np.array([float(c) if is_number(c) else np.nan for c in text])
+        values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
         rows = np.flatnonzero(~np.isfinite(values))
         if rows.size:
             row = int(rows[0])
