@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from fewer_hypotheses import few_candidates
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -53,6 +54,7 @@ def trained(monkeypatch):
         return result, Fluid.dimensionless(law)
 
     monkeypatch.setattr("discover.comparison.learning.train", train)
+    few_candidates(monkeypatch, ("giesekus_mobility", "stress_gain"))
     return calls
 
 

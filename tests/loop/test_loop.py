@@ -54,6 +54,9 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
     return Dataset("made", tuple(runs))
 
 
+pytestmark = pytest.mark.usefixtures("without_curves")
+
+
 def loop(dataset, **options):
     # other explanations, which change neither verdict nor stages, are carried where asked for
     settings = {"held_out": ["late"], "effects": EFFECTS, "max_effects": 2, "explanations": 1}
