@@ -1,0 +1,286 @@
+"""What learners are given of the data: thinned, without spikes, side by side, in a range."""
+
+import threading
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from independent import Giesekus, start_up
+from independent.noise import white
+from scipy.integrate import cumulative_trapezoid
+
+from discover.comparison import compare
+from discover.comparison.at_once import at_once
+from discover.comparison.description import data_in_words
+from discover.comparison.flows import Flow
+from discover.comparison.placement import place
+from discover.comparison.prepared import thinned_to, without_spikes_in_fit
+from discover.dataset import Dataset, Run
+from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
+from discover.progress import Stopped, require_wanted, silent
+from discover.protocols import measured_rate
+from discover.protocols import start_up as protocol
+from discover.protocols.protocol import in_flow, oscillatory_shear
+from discover.protocols.protocol import start_up as start_up_range
+from discover.study import parse_study
+from discover.study.data import StudyData
+
+
+class _Seen(Exception):
+    """What a learner was given; nothing is trained."""
+
+
+def oscillations(samples: int, count: int = 2) -> StudyData:
+    """Return a record of a linear fluid to fit and one to judge: stress in phase and out of it."""
+    times = np.linspace(0.01, 20.0, samples)
+    runs = []
+    for i in range(count):
+        rates = (1.0 + i) * np.cos(times)
+        flow = measured_rate(times, rates)
+        runs.append(Run(f"{i}.csv", times, flow, rates, 0.5 * (rates + (1.0 + i) * np.sin(times))))
+    dataset = Dataset("waves", tuple(runs))
+    return StudyData(dataset, dataset.select(["0.csv"]), dataset.select(["1.csv"]))
+
+
+@pytest.mark.parametrize(("options", "expected"), [({}, 1000), ({"most_samples": 150}, 150)])
+def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, options, expected):
+    def given(learner, study, model, runs, *rest):
+        raise _Seen([len(run) for run in runs])
+
+    monkeypatch.setattr("discover.comparison.learning.train", given)
+    # what else could explain the runs is not looked for: it changes no run
+    monkeypatch.setattr("discover.comparison.hypotheses.MOST_EFFECTS", 0)
+    monkeypatch.setattr("discover.comparison.run_comparison.simple_result", lambda *_: None)
+    study = parse_study(
+        {
+            "data": {"synthetic": {"law": "ucm", "samples": 2001, "noise": 0.01}},
+            "compare": {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options},
+        }
+    )
+    with pytest.raises(_Seen) as seen:
+        compare(study)
+    assert set(seen.value.args[0]) == {expected}
+
+
+def test_a_thinned_record_is_said_and_follows_the_same_strain():
+    data = oscillations(3000)
+    study = parse_study({"data": {"folder": "waves"}})
+    assert "3000 samples" in data_in_words(data, study)
+    thinned = thinned_to(data, 400)
+    assert "0.csv, 1.csv: kept 400 of 3,000 samples" in data_in_words(thinned, study)
+    for run in (*thinned.fit, *thinned.held_out):
+        strain = float(run.protocol.strain(jnp.asarray(run.time[-1])))
+        amplitude = float(run.name[0]) + 1.0
+        # before the first sample, the first rate
+        assert strain == pytest.approx(amplitude * np.sin(20.0), abs=1e-3)
+    whole = data.fit["0.csv"]
+    kept = np.isin(whole.time, thinned.fit["0.csv"].time)
+    np.testing.assert_array_equal(whole.recorded[kept], thinned.fit["0.csv"].recorded)
+
+
+def test_what_was_thinned_when_it_was_read_is_still_said():
+    run = replace(oscillations(600).fit["0.csv"], metadata={"thinned": "kept 600 of 9,000 samples"})
+    said = thin_run(thin_run(run, 300), 100).metadata["thinned"]
+    assert said == (
+        "kept 600 of 9,000 samples; of these kept 300 of 600 samples, evenly in their order; "
+        "of these kept 100 of 300 samples, evenly in their order"
+    )
+
+
+def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
+    times = np.linspace(0.0, 20.0, 4001)
+    ringing = np.cos(times) + np.exp(-5.0 * times) * np.cos(60.0 * times)
+    strain = np.sin(times) + np.real((np.exp((-5.0 + 60.0j) * times) - 1.0) / (-5.0 + 60.0j))
+    keep = evenly_chosen(len(times), 150)
+    knots, rates = followed_rate(times, ringing, keep)
+    followed = cumulative_trapezoid(rates, knots, initial=0.0)
+    # 0.1 % of the range is what it may be off at all samples; at every 27th alone it is off by 1 %
+    assert np.max(np.abs(followed - np.interp(knots, times, strain))) < 1e-3 * np.ptp(strain)
+    some = cumulative_trapezoid(ringing[keep], times[keep], initial=0.0)
+    assert np.max(np.abs(some - strain[keep])) > 5e-3 * np.ptp(strain)
+    assert np.sum(keep) < len(knots) < 500
+    # where it rings, twice as close as spread evenly
+    assert np.mean(knots < 1.0) > 2.0 / 20.0
+
+
+def test_a_rate_that_is_all_noise_is_followed_all_but_sample_by_sample():
+    times = np.linspace(0.0, 1.0, 500)
+    rates = np.random.default_rng(0).normal(size=times.size)
+    knots, followed = followed_rate(times, rates, evenly_chosen(times.size, 50))
+    assert len(knots) > 450
+    apart = np.interp(times, knots, followed) - rates
+    assert np.max(np.abs(apart)) <= 0.05 * np.max(np.abs(rates))
+
+
+def test_a_short_record_is_left_as_it_is():
+    data = oscillations(400)
+    thinned = thinned_to(data, 400)
+    assert all(one is other for one, other in zip(data.fit, thinned.fit, strict=True))
+    assert "kept" not in data_in_words(thinned, parse_study({"data": {"folder": "waves"}}))
+
+
+TIMES = np.linspace(0.1, 8.0, 80)
+KNOCKS = [20, 45]
+
+
+def run(rate, knocked):
+    exact = Giesekus(0.3, 100.0).respond(start_up(rate), TIMES).sigma12
+    stress = white(exact, 0.01, np.random.default_rng(int(10 * rate)))
+    stress[KNOCKS] += knocked * np.sqrt(np.mean(exact**2)) * np.array([1.0, -0.6])
+    return Run(f"{rate}.csv", TIMES, protocol(rate), np.full(80, rate), stress)
+
+
+def data(knocked):
+    runs = tuple(run(rate, knocked) for rate in (0.5, 2.0, 3.0))
+    fit, held = Dataset("fit", runs[:2]), Dataset("held", runs[2:])
+    return StudyData(Dataset("all", runs), fit, held)
+
+
+def test_knocks_are_left_out_of_the_fitted_runs_and_told():
+    left, told = without_spikes_in_fit(data(0.8))
+    for one in left.fit.runs:
+        np.testing.assert_array_equal(one.time, np.delete(TIMES, KNOCKS))
+    assert "2 of 0.5.csv, 2 of 2.0.csv" in told
+    # what judges is whole
+    assert len(left.held_out.runs[0]) == len(TIMES)
+
+
+@pytest.mark.parametrize("knocked", [0.0, 0.01])
+def test_of_a_record_without_a_knock_nothing_is_left_out(knocked):
+    whole = data(knocked)
+    left, told = without_spikes_in_fit(whole)
+    assert left is whole
+    assert told == ""
+
+
+def test_each_part_returns_under_its_name_though_another_ends_first():
+    first_may_end = threading.Event()
+
+    def first(say):
+        assert first_may_end.wait(30)
+        return 1
+
+    def second(say):
+        first_may_end.set()
+        return 2
+
+    found = at_once({"first": first, "second": second}, silent)
+    assert list(found.items()) == [("first", 1), ("second", 2)]
+
+
+def test_progress_is_told_in_the_thread_of_the_caller_and_never_falls():
+    heard = []
+
+    def part(say):
+        for fraction in (0.5, 0.2, 1.0):
+            say("at work", fraction)
+
+    def hear(text, fraction):
+        heard.append((threading.current_thread(), text, fraction))
+
+    at_once({"one": part, "other": part}, hear)
+    assert {thread for thread, _, _ in heard} == {threading.current_thread()}
+    fractions = [fraction for _, _, fraction in heard]
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert {text for _, text, _ in heard} == {"one: at work", "other: at work"}
+
+
+@pytest.mark.parametrize("says", [True, False])
+def test_when_one_part_fails_the_others_end_where_they_say_or_ask_something(says):
+    ended = []
+
+    def fails(say):
+        raise ValueError("no law")
+
+    def goes_on(say):
+        try:
+            for _ in range(100_000):
+                threading.Event().wait(0.001)
+                say("at work", 0.0) if says else require_wanted()
+        except Stopped:
+            ended.append(True)
+            raise
+
+    with pytest.raises(ValueError, match="no law"):
+        at_once({"goes on": goes_on, "fails": fails}, silent)
+    assert ended == [True]
+
+
+def test_an_interrupt_of_the_caller_ends_all_parts():
+    def goes_on(say):
+        while True:
+            threading.Event().wait(0.001)
+            say("at work", 0.0)
+
+    def interrupted(text, fraction):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        at_once({"one": goes_on, "other": goes_on}, interrupted)
+
+
+def test_a_part_alone_runs_where_it_is_asked_for():
+    assert at_once({"one": lambda say: threading.current_thread()}, silent) == {
+        "one": threading.current_thread()
+    }
+    require_wanted()  # nobody asked this thread to stop
+
+
+TIME = np.linspace(0.0, 20.0, 201)
+
+
+def oscillation(weissenberg, deborah):
+    rate = weissenberg * np.cos(deborah * TIME)
+    return Flow("osc", "test", oscillatory_shear(weissenberg, deborah), TIME, rate, {})
+
+
+def started(rate, duration=20.0):
+    times = np.linspace(0.0, duration, 201)
+    return Flow("start", "test", start_up_range(rate), times, np.full(201, rate), {})
+
+
+PAPER = [oscillation(wi, de) for de in (0.25, 0.5, 0.75, 1.0) for wi in (1.0, 2.0)]
+
+
+def test_a_fitted_flow_is_inside():
+    assert place(PAPER[3], PAPER).inside
+    assert place(oscillation(0.1, 0.9), PAPER).inside
+
+
+def test_a_faster_oscillation_is_beyond_in_rate_and_frequency():
+    placed = place(oscillation(3.0, 1.5), PAPER)
+    assert placed.beyond == pytest.approx({"shear rate": 1.5, "frequency": 1.5})
+    assert placed.text.startswith("beyond the fitted range: shear rate (Wi) 1.5 times")
+
+
+def test_a_start_up_is_beyond_in_strain_though_its_rate_was_fitted():
+    # strain 40 against the largest of the eight series, 2/0.25
+    placed = place(started(2.0), PAPER)
+    assert placed.beyond == pytest.approx({"strain": 5.0}, rel=0.01)
+    assert place(started(2.0, duration=3.0), PAPER).inside
+
+
+def test_a_step_of_the_rate_excites_every_frequency():
+    assert place(oscillation(1.0, 5.0), [started(2.0)]).inside
+    assert not place(oscillation(1.0, 5.0), PAPER).inside
+
+
+def test_runs_at_rest_leave_every_flow_beyond():
+    placed = place(started(1.0), [started(0.0)])
+    assert set(placed.beyond) == {"shear rate", "strain"}
+
+
+def test_an_extension_is_beyond_wherever_only_shear_was_fitted():
+    pull = replace(started(0.1), protocol=in_flow(start_up_range(0.1), "uniaxial"))
+    placed = place(pull, [started(2.0)])
+    assert not placed.inside
+    assert placed.text == (
+        "beyond the fitted range: uniaxial extension, of which nothing was fitted"
+    )
+    assert placed.to_json()["new_flow"] == "uniaxial"
+    # among extensions of its own kind it is held against those, whatever the shear was
+    faster = replace(started(0.3), protocol=in_flow(start_up_range(0.3), "uniaxial"))
+    assert place(pull, [started(0.01), faster]).inside
+    assert place(faster, [started(9.0), pull]).beyond["Hencky rate"] == pytest.approx(3.0)
