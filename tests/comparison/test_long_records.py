@@ -1,0 +1,110 @@
+"""Of a long record, learners are given as many samples as a study allows, and the page says so."""
+
+from dataclasses import replace
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import cumulative_trapezoid
+
+from discover.comparison import compare
+from discover.comparison.description import data_in_words
+from discover.comparison.prepared import thinned_to
+from discover.dataset import Dataset, Run
+from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
+from discover.protocols import measured_rate
+from discover.study import parse_study
+from discover.study.data import StudyData
+
+
+class _Seen(Exception):
+    """What a learner was given; nothing is trained."""
+
+
+def oscillations(samples: int, count: int = 2) -> StudyData:
+    """Return a record of a linear fluid to fit and one to judge: stress in phase and out of it."""
+    times = np.linspace(0.01, 20.0, samples)
+    runs = []
+    for i in range(count):
+        rates = (1.0 + i) * np.cos(times)
+        flow = measured_rate(times, rates)
+        runs.append(Run(f"{i}.csv", times, flow, rates, 0.5 * (rates + (1.0 + i) * np.sin(times))))
+    dataset = Dataset("waves", tuple(runs))
+    return StudyData(dataset, dataset.select(["0.csv"]), dataset.select(["1.csv"]))
+
+
+@pytest.mark.parametrize(("options", "expected"), [({}, 1000), ({"most_samples": 150}, 150)])
+def test_learners_are_given_no_more_samples_than_a_study_allows(monkeypatch, options, expected):
+    def given(learner, study, model, runs, *rest):
+        raise _Seen([len(run) for run in runs])
+
+    monkeypatch.setattr("discover.comparison.learning.train", given)
+    # what else could explain the runs is not looked for: it changes no run
+    monkeypatch.setattr("discover.comparison.hypotheses.MOST_EFFECTS", 0)
+    monkeypatch.setattr("discover.comparison.run_comparison.simple_result", lambda *_: None)
+    study = parse_study(
+        {
+            "data": {"synthetic": {"law": "ucm", "samples": 2001, "noise": 0.01}},
+            "compare": {"learners": ["tensor_sindy"], "high_deborah": [1.5], **options},
+        }
+    )
+    with pytest.raises(_Seen) as seen:
+        compare(study)
+    assert set(seen.value.args[0]) == {expected}
+
+
+def test_a_thinned_record_is_said_and_follows_the_same_strain():
+    data = oscillations(3000)
+    study = parse_study({"data": {"folder": "waves"}})
+    assert "3000 samples" in data_in_words(data, study)
+    thinned = thinned_to(data, 400)
+    assert "0.csv, 1.csv: kept 400 of 3,000 samples" in data_in_words(thinned, study)
+    for run in (*thinned.fit, *thinned.held_out):
+        strain = float(run.protocol.strain(jnp.asarray(run.time[-1])))
+        amplitude = float(run.name[0]) + 1.0
+        # before the first sample, the first rate
+        assert strain == pytest.approx(amplitude * np.sin(20.0), abs=1e-3)
+    whole = data.fit["0.csv"]
+    kept = np.isin(whole.time, thinned.fit["0.csv"].time)
+    np.testing.assert_array_equal(whole.recorded[kept], thinned.fit["0.csv"].recorded)
+
+
+def test_what_was_thinned_when_it_was_read_is_still_said():
+    run = replace(oscillations(600).fit["0.csv"], metadata={"thinned": "kept 600 of 9,000 samples"})
+    said = thin_run(thin_run(run, 300), 100).metadata["thinned"]
+    assert said == (
+        "kept 600 of 9,000 samples; of these kept 300 of 600 samples, evenly in their order; "
+        "of these kept 100 of 300 samples, evenly in their order"
+    )
+
+
+def test_a_ringing_rate_keeps_the_knots_that_it_needs_and_no_more():
+    times = np.linspace(0.0, 20.0, 4001)
+    ringing = np.cos(times) + np.exp(-5.0 * times) * np.cos(60.0 * times)
+    strain = np.sin(times) + np.real((np.exp((-5.0 + 60.0j) * times) - 1.0) / (-5.0 + 60.0j))
+    keep = evenly_chosen(len(times), 150)
+    knots, rates = followed_rate(times, ringing, keep)
+    followed = cumulative_trapezoid(rates, knots, initial=0.0)
+    # 0.1 % of the range is what it may be off at all samples; at every 27th alone it is off by 1 %
+    assert np.max(np.abs(followed - np.interp(knots, times, strain))) < 1e-3 * np.ptp(strain)
+    some = cumulative_trapezoid(ringing[keep], times[keep], initial=0.0)
+    assert np.max(np.abs(some - strain[keep])) > 5e-3 * np.ptp(strain)
+    assert np.sum(keep) < len(knots) < 500
+    # where it rings, twice as close as spread evenly
+    assert np.mean(knots < 1.0) > 2.0 / 20.0
+
+
+def test_a_rate_that_is_all_noise_is_followed_all_but_sample_by_sample():
+    times = np.linspace(0.0, 1.0, 500)
+    rates = np.random.default_rng(0).normal(size=times.size)
+    knots, followed = followed_rate(times, rates, evenly_chosen(times.size, 50))
+    assert len(knots) > 450
+    apart = np.interp(times, knots, followed) - rates
+    assert np.max(np.abs(apart)) <= 0.05 * np.max(np.abs(rates))
+
+
+def test_a_short_record_is_left_as_it_is():
+    data = oscillations(400)
+    thinned = thinned_to(data, 400)
+    assert all(one is other for one, other in zip(data.fit, thinned.fit, strict=True))
+    assert "kept" not in data_in_words(thinned, parse_study({"data": {"folder": "waves"}}))

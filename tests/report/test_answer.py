@@ -1,0 +1,88 @@
+"""The answer: its first line, its tolerance, and the first screen that shows it."""
+
+from dataclasses import replace
+
+import pytest
+from test_loop_report import few_pictures, loop_result  # noqa: F401
+
+from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
+from discover.answer.naming import named_law
+from discover.answer.sentences import tolerance
+from discover.equations import Equation
+from discover.errors import InputError
+from discover.report.answer_screen import answer_screen
+from discover.report.loop.report import write_loop
+from discover.report.page import render
+from discover.study import RunFolder
+from discover.study.schema import Verdict
+from discover.validation import validated
+from tensor_library.law_terms import LawTerm
+
+MELT = Answer(
+    "linear PTT", "ptt_linear", (Constant("epsilon", 0.82, (0.58, 1.07)),),
+    (Mode(1000.0, 1.0), Mode(100.0, 10.0)), error=0.06, noise=0.0025,
+    discrepancy=Discrepancy(0.06, (0.04, 0.07), {"a.csv": 0.08, "b.csv": 0.03}),
+    range=Range(rate_1_s=(0.003, 3.0)),
+    expected_error={
+        "sigma12": ExpectedError(0.057),
+        "N1": ExpectedError(missing="not determined", note="laws differ by 40 %"),
+    },
+    suspects=(Suspect("stress_gain", (Constant("gain_error", -0.11, (-0.36, 0.02)),)),),
+    next_test="Repeat one shear run on a second filling.",
+    equation=Equation((LawTerm("tr(sigma)*sigma", 0.82),), (1000.0, 100.0), (1.0, 10.0)),
+)  # fmt: skip
+
+
+def test_the_first_line_has_law_constants_error_and_range():
+    assert MELT.headline == (
+        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7) "
+        "plus 0.25 % noise. Fitted in shear, 0.003–3 1/s."
+    )
+    exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
+    assert "Fits to the noise (1 %)." in exact.headline
+
+
+@pytest.mark.parametrize(
+    ("asked", "adequate", "said"),
+    [(0.05, False, "5 %: missed for σ12; exceeded"), (0.1, True, "10 %: met for σ12.")],
+)
+def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
+    answer = replace(MELT, tolerance=asked)
+    assert answer.adequate is adequate
+    assert tolerance(answer).startswith(f"Tolerance of {said}")
+    assert ("a.csv (8 %)" in tolerance(answer)) is not adequate
+    assert answer.to_json()["use"]["expected_error"]["N1"] is None
+    assert Answer("", instead="No signal.").adequate is None
+
+
+@pytest.mark.parametrize("given", [0.0, -0.1, 2.0])
+def test_a_tolerance_that_is_none_is_refused(given):
+    with pytest.raises(InputError):
+        validated(Verdict, {"tolerance": given}, "[verdict]")
+    assert validated(Verdict, {}, "[verdict]").tolerance == 0.05
+
+
+def test_a_sum_of_terms_is_known_by_its_name():
+    slip = Equation((LawTerm("sigma.gammadot+gammadot.sigma", 0.2),))
+    name, constants = named_law(slip)
+    assert name == "johnson_segalman"
+    assert constants["xi"] == pytest.approx(0.4, rel=1e-6)
+    assert named_law(Equation((LawTerm("gammadot.gammadot", 1.0),))) is None
+
+
+def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
+    screen = answer_screen(MELT)
+    prose = [screen["headline"], screen["quality"], *screen["lines"], screen["next_test"]]
+    words = [one for one in " ".join(prose).split() if any(c.isalpha() for c in one)]
+    assert len(words) <= 60
+    page = render("answer.html", screen=screen)
+    order = ("Linear PTT", "<math", "answer-table", 'id="modes"', "Next:", "data-copy")
+    places = [page.index(text) for text in order]
+    assert places == sorted(places)
+    assert all(one["text"] for one in screen["copies"])
+    assert render("answer.html").strip() == ""  # a page without an answer
+
+
+def test_a_loop_page_begins_with_its_answer(tmp_path, few_pictures):  # noqa: F811
+    page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
+    assert page.index('id="answer"') < page.index('id="verdict"')
