@@ -20,6 +20,7 @@ To say `unexplained` of what could be explained is no falsehood; it is noted.
 """
 
 import ast
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -27,8 +28,7 @@ from pathlib import Path
 from typing import Any
 
 import hostile_benches
-import hostile_changes
-import hostile_materials
+import hostile_fluids
 import hostile_noises
 import hostile_records
 import hostile_tests
@@ -36,10 +36,11 @@ import independent
 import numpy as np
 import product
 from hostile_records import FILE, SAMPLED, SCALE, Runs
-from independent import authors
+from independent import authors, noise
 from independent import named as by_name
 from independent.folders import write_table
 from independent.noise import rms
+from scipy.ndimage import median_filter
 
 QUESTIONS, SEED, LIMIT = ("compare", "close-loop"), 0, 1200.0
 DETECTABLE, HELD_OUT_DETECTABLE = 0.5, 1.0
@@ -53,6 +54,14 @@ QUANTITY = {"stress_Pa": "sigma12", "tensile_stress_Pa": "tensile_stress"}
 GROUPS = {name: [n for n in cases if n != "all"] for name, cases in FILE["sets"].items()}
 
 
+OPERATIONS: dict[type, Callable] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
+    ast.BitOr: operator.or_, ast.Lt: operator.lt, ast.Gt: operator.gt, ast.NotEq: operator.ne,
+    ast.Eq: operator.eq, ast.In: lambda one, many: one in many,
+}  # fmt: skip
+
+
 def _named(law: str):
     return by_name.material(law, by_name.CONSTANTS[law], **SCALE)
 
@@ -60,35 +69,49 @@ def _named(law: str):
 @cache
 def words() -> dict[str, Any]:
     """Return what the expressions of the file may name."""
-    known: dict[str, Any] = {}
-    own = (hostile_materials, hostile_benches, hostile_records, hostile_tests, hostile_changes)
-    for module in (authors, independent, *own):
+    known: dict[str, Any] = {name: getattr(np, name) for name in np.__all__}
+    own = (hostile_fluids, hostile_benches, hostile_records, hostile_tests, hostile_noises)
+    for module in (authors, independent, noise, *own):
         known |= vars(module)
-    known |= SAMPLED
-    for tables in (hostile_changes, hostile_noises):
-        known |= {k: v for table in tables.OF_NAMES for k, v in table.items()}
-    known |= {"linspace": np.linspace, "material": by_name.material, "named": _named}
+    known |= SAMPLED | {"material": by_name.material, "named": _named, "len": len}
+    known |= {"median_filter": median_filter}
     for name, text in FILE["names"].items():
         known[name] = evaluated(ast.parse(text, mode="eval").body, known)
     return known
 
 
 def evaluated(node: ast.AST, known: Mapping[str, Any]) -> Any:
-    """Return the value of an expression of numbers, names and calls; nothing else is in one."""
+    """Return the value of an expression of numbers, names, calls and functions."""
+
+    def value(one: ast.AST) -> Any:
+        return evaluated(one, known)
+
     match node:
-        case ast.Constant(value):
-            return value
+        case ast.Constant(constant):
+            return constant
         case ast.Name(name):
             return known[name]
         case ast.List(items) | ast.Tuple(items):
-            return [evaluated(one, known) for one in items]
+            return [value(one) for one in items]
         case ast.Dict(keys, values):
-            pairs = zip(keys, values, strict=True)
-            return {evaluated(k, known): evaluated(v, known) for k, v in pairs}
+            return {value(k): value(v) for k, v in zip(keys, values, strict=True) if k}
         case ast.UnaryOp(ast.USub(), one):
-            return -evaluated(one, known)
-        case ast.BinOp(left, ast.Mult(), right):
-            return evaluated(left, known) * evaluated(right, known)
+            return -value(one)
+        case ast.BinOp(left, how, right) | ast.Compare(left, [how], [right]):
+            if type(how) in OPERATIONS:
+                return OPERATIONS[type(how)](value(left), value(right))
+        case ast.IfExp(test, this, that):
+            return value(this if value(test) else that)
+        case ast.Subscript(whole, at):
+            return value(whole)[value(at)]
+        case ast.Attribute(whole, name) if not name.startswith("_"):
+            return getattr(value(whole), name)
+        case ast.Lambda(arguments, body):
+            names, defaults = [one.arg for one in arguments.args], map(value, arguments.defaults)
+            own = dict(zip(reversed(names), reversed(list(defaults)), strict=False))
+            return lambda *given, **more: evaluated(
+                body, {**known, **own, **dict(zip(names, given, strict=False)), **more}
+            )
         case ast.Call():
             function, given, named = called(node, known)
             return function(*given, **named)
@@ -111,10 +134,10 @@ def called(node: ast.Call, known: Mapping[str, Any]) -> tuple[Callable, list, di
 def bound(text: str) -> Callable:
     """Return the call of an expression, for which what comes first is still to be given."""
     node = ast.parse(text, mode="eval").body
-    if isinstance(node, ast.Name):
-        return words()[node.id]
 
     def call(*first):
+        if not isinstance(node, ast.Call):
+            return evaluated(node, words())(*first)
         function, given, named = called(node, words())
         return function(*first, *given, **named)
 

@@ -1,9 +1,10 @@
-"""Fluids on benches that are not what is told of them: cells, slip, age; a source with each."""
+"""Fluids on benches that are not what is told of them: geometry, slip, age; a source with each."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from hostile_fluids import without_normal
 from independent import Flow, Material, RateLaw, Stresses
 from independent.material import Rate, integrate
 
@@ -27,8 +28,7 @@ class PlatePlate(Material):
                 lambda t, x=x: x * flow.rate(t), lambda t, x=x: x * flow.strain(t), flow.jumps
             )
             apparent = apparent + 4 * weight * x**2 * self.law.respond(inner, times).sigma12
-        rim = self.law.respond(flow, times)
-        return Stresses(apparent, rim.N1, rim.N2)
+        return replace(self.law.respond(flow, times), sigma12=apparent)
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class _OneMore(RateLaw):
     """A law whose state has one number more, before those of another law: zero at rest."""
 
     law: RateLaw
+    modulus = 100.0
 
     def rest(self) -> np.ndarray:
         return np.append(0.0, self.law.rest())
@@ -49,7 +50,6 @@ class Networked(_OneMore):
     """A law beside a permanent neo-Hookean network: σ12 = E γ and N1 = E γ² more."""
 
     network: float = 15.0
-    modulus: float = 100.0
 
     def change(self, state: np.ndarray, rate: float) -> np.ndarray:
         return np.append(rate, self.law.change(state[1:], rate))
@@ -62,48 +62,21 @@ class Networked(_OneMore):
 
 @dataclass(frozen=True)
 class Aged(_OneMore):
-    """A law that changes with its age since the start of a run: it dries, warms or grows."""
+    """A law whose constants change with its age: by a factor of it in s for each, of `grows`."""
 
-    at: Callable[[RateLaw, float], RateLaw]
+    grows: Mapping[str, Callable[[float], float]]
     begin: float = 0.0  # s
-    modulus: float = 100.0
 
     def rest(self) -> np.ndarray:
         return np.append(self.begin, self.law.rest())
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        return np.append(1.0, self.at(self.law, state[0]).change(state[1:], rate))
+        factors = {name: factor(state[0]) for name, factor in self.grows.items()}
+        now = {name: getattr(self.law, name) * factor for name, factor in factors.items()}
+        return np.append(1.0, replace(self.law, **now).change(state[1:], rate))
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         return self.law.stress(state[1:], rate)
-
-
-def ageing(law: RateLaw, growth: float = 0.03) -> Aged:
-    def at(law, age):
-        return replace(law, relaxation_time=law.relaxation_time * (1 + growth * age))
-
-    return Aged(law, at)
-
-
-def warming(law: RateLaw, share: float = 0.1, time: float = 3.0) -> Aged:
-    """Return a law whose time is longer by a share at first, which dies out."""
-
-    def at(law, age):
-        now = law.relaxation_time * (1 + share * np.exp(-age / time))
-        return replace(law, relaxation_time=now)
-
-    return Aged(law, at)
-
-
-def evaporating(law: RateLaw, begin: float, of_modulus: float, of_time: float) -> Aged:
-    """Return a law whose modulus and time grow with its age, as its solvent goes."""
-
-    def at(law, age):
-        modulus = law.modulus * (1 + of_modulus * age)
-        time = law.relaxation_time * (1 + of_time * age)
-        return replace(law, modulus=modulus, relaxation_time=time)
-
-    return Aged(law, at, begin)
 
 
 @dataclass(frozen=True)
@@ -116,7 +89,6 @@ class CriticalSlip(_OneMore):
     slip: float = 0.006  # 1/(Pa s)
     critical: float = 60.0
     memory: float = 1.0
-    modulus: float = 100.0
 
     def _felt(self, state: np.ndarray, rate: float) -> float:
         return rate - self.slip * state[0] * self.law.stress(state[1:], rate)[0, 1]
@@ -154,23 +126,18 @@ class Couette(Material):
             layers = states.reshape(self.layers, size)
             still = np.array([law.change(s, 0.0) for s in layers])
             sheared = np.array([law.change(s, 1.0) for s in layers]) - still
-            # of the nine components of a stress the second is σ12
-            own, driven = still[:, 1], sheared[:, 1]
+            own, driven = still[:, 1], sheared[:, 1]  # of the nine components the second is σ12
             turn = flow.rate(t) * (self.ratio**2 - 1) / (self.ratio**2 + 1)
-            torque = (turn + np.sum(weights * own / driven / radii)) / np.sum(
-                weights / driven / radii**3
-            )
+            torque = turn + np.sum(weights * own / driven / radii)
+            torque = torque / np.sum(weights / driven / radii**3)
             rates = (torque / radii**2 - own) / driven
             return (still + rates[:, None] * sheared).ravel()
 
-        scale = np.tile(law.scale(), self.layers)
-        states = integrate(
-            change, np.tile(law.rest(), self.layers), times, flow.jumps, scale
-        ).reshape(len(times), self.layers, size)
-        torque = np.mean(states[:, :, 1] * radii**2, axis=1)
-        told = torque * (1 + 1 / self.ratio**2) / 2
-        inside = law.respond(flow, times)
-        return Stresses(told, inside.N1, inside.N2)
+        start, scale = (np.tile(one, self.layers) for one in (law.rest(), law.scale()))
+        states = integrate(change, start, times, flow.jumps, scale)
+        shear = states.reshape(len(times), self.layers, size)[:, :, 1]
+        told = np.mean(shear * radii**2, axis=1) * (1 + 1 / self.ratio**2) / 2
+        return replace(law.respond(flow, times), sigma12=told)
 
 
 @dataclass(frozen=True)
@@ -201,23 +168,20 @@ class Banding(RateLaw):
         return (total * shape - shear) / self.viscosity, total
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        first, second, shear = state.reshape(3, -1)
+        layers, a = state.reshape(3, -1), 1 - self.slip
+        first, second, shear = layers
         local, _ = self._rates(shear, float(rate))
-        a = 1 - self.slip
-        own = np.array([
-            local * (1 + a) * shear,
-            -local * (1 - a) * shear,
-            local * (self.modulus + (1 + a) / 2 * second - (1 - a) / 2 * first),
-        ])  # fmt: skip
-        padded = np.pad(state.reshape(3, -1), ((0, 0), (1, 1)), mode="edge")
+        lifted = self.modulus + (1 + a) / 2 * second - (1 - a) / 2 * first
+        own = np.array([local * (1 + a) * shear, -local * (1 - a) * shear, local * lifted])
+        padded = np.pad(layers, ((0, 0), (1, 1)), mode="edge")
         spread = self.diffusion * self.layers**2 * np.diff(padded, 2, axis=1)
-        return (own - state.reshape(3, -1) / self.relaxation_time + spread).ravel()
+        return (own - layers / self.relaxation_time + spread).ravel()
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         first, second, shear = state.reshape(3, -1)
-        _, total = self._rates(shear, float(rate))
         means = np.diag([np.mean(first), np.mean(second), 0.0])
-        means[0, 1] = means[1, 0] = total
+        _, means[0, 1] = self._rates(shear, float(rate))
+        means[1, 0] = means[0, 1]
         return means
 
 
@@ -239,12 +203,9 @@ class Waves(Material):
         def change(t, state):
             speed, stress = state[: n - 1], state[n - 1 :]
             whole = np.concatenate([[0.0], speed, [float(flow.rate(t))]])
-            return np.append(
-                np.diff(stress) * n / self.inertia,
-                self.modulus * np.diff(whole) * n - stress / self.relaxation_time,
-            )
+            sheared = self.modulus * np.diff(whole) * n - stress / self.relaxation_time
+            return np.append(np.diff(stress) * n / self.inertia, sheared)
 
-        start = np.zeros(2 * n - 1)
         scale = np.append(np.ones(n - 1), np.full(n, self.modulus))
-        shear = integrate(change, start, times, flow.jumps, scale)[:, n - 1]
-        return Stresses(shear, np.full_like(shear, np.nan), np.full_like(shear, np.nan))
+        states = integrate(change, np.zeros(2 * n - 1), times, flow.jumps, scale)
+        return without_normal(states[:, n - 1])

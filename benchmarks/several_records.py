@@ -1,6 +1,7 @@
 """Records of every test that a rheometer makes, as folders written by hand."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -61,18 +62,13 @@ class Folder:
         return self.path
 
 
-def at_rates(folder, material, name, rate: Rate, times, jumps=(), keep=None, **cells) -> None:
-    """Write a run in shear at a given rate; `keep` is the sample from which it is recorded."""
-    stress = followed(material, rate, times, jumps=jumps)[:, 0, 1]
-    kept = slice(keep, None)
-    begins = 0.0 if keep is None else times[keep]
+def at_rates(folder, material, name, rate: Rate, times, jumps=(), before=(), told=None, **cells):
+    """Write a run in shear at a given rate, recorded after some times before it."""
+    whole = np.append(before, times)
+    stress = followed(material, rate, whole, jumps=jumps)[len(before) :, 0, 1]
     rates = np.array([rate(t) for t in times])
-    columns = {
-        "time_s": times[kept] - begins,
-        "shear_rate_1_s": rates[kept],
-        "stress_Pa": folder.noisy(stress[kept]),
-    }
-    folder.run(name, columns, **cells)
+    columns = {"time_s": times - told if told else times, "shear_rate_1_s": rates}
+    folder.run(name, {**columns, "stress_Pa": folder.noisy(stress)}, **cells)
 
 
 def start_up(folder, material):
@@ -81,12 +77,12 @@ def start_up(folder, material):
 
 
 def cessation(folder, material):
-    stop, after = 20.0, np.linspace(0.0, 5.0, 80)
+    stop, before = 20.0, np.linspace(1.0, 19.0, 4)
     for rate in (1.0, 4.0):
-        times = np.append(np.linspace(1.0, 19.0, 4), stop + after)
         at_rates(
-            folder, material, f"after_{rate:g}", lambda t, r=rate: r if t < stop else 0.0, times,
-            (stop,), keep=4, start="steady", rate_before_1_s=rate,
+            folder, material, f"after_{rate:g}", lambda t, r=rate: r if t < stop else 0.0,
+            stop + np.linspace(0.0, 5.0, 80), (stop,), before, stop,
+            start="steady", rate_before_1_s=rate,
         )  # fmt: skip
 
 
@@ -97,62 +93,55 @@ def step_rates(folder, material):
     at_rates(folder, material, "steps", rate, np.linspace(0.05, 12.0, 160), (4.0, 8.0))
 
 
-def laos(folder, material):
+_TWO_CYCLES = np.linspace(0.0, 4.0 * np.pi, 121)
+
+
+def laos(folder, material, times=_TWO_CYCLES, **more):
     for strain in (1.0, 4.0):
-        at_rates(
-            folder, material, f"strain_{strain:g}", lambda t, a=strain: a * np.cos(t),
-            np.linspace(0.0, 4.0 * np.pi, 121),
-        )  # fmt: skip
+        name = f"strain_{strain:g}"
+        at_rates(folder, material, name, lambda t, a=strain: a * np.cos(t), times, **more)
 
 
 def laos_periodic(folder, material):
-    for strain in (1.0, 4.0):
-        times = np.concatenate([[1.0], 12.0 * np.pi + np.linspace(0.0, 2.0 * np.pi, 65)])
-        at_rates(
-            folder, material, f"strain_{strain:g}", lambda t, a=strain: a * np.cos(t), times,
-            keep=1, start="periodic",
-        )  # fmt: skip
+    begin = 12.0 * np.pi
+    times = begin + np.linspace(0.0, 2.0 * np.pi, 65)
+    laos(folder, material, times, before=[1.0], told=begin, start="periodic")
 
 
 def step_strain(folder, material):
     put_on = 0.01
+    times = put_on + np.geomspace(0.02, 5.0, 60)
     for strain in (0.5, 1.5, 3.0):
-        times = np.append([0.5 * put_on], put_on + np.geomspace(0.02, 5.0, 60))
         rate = strain / put_on
-        stress = followed(
-            material, lambda t, r=rate: r if t < put_on else 0.0, times, jumps=(put_on,)
-        )[1:, 0, 1]
-        columns = {
-            "time_s": times[1:] - put_on,
-            "shear_rate_1_s": np.zeros(60),
-            "stress_Pa": folder.noisy(stress),
-        }
-        folder.run(f"step_{strain:g}", columns, step_strain=strain, step_time_s=put_on)
+        at_rates(
+            folder, material, f"step_{strain:g}", lambda t, r=rate: r if t < put_on else 0.0,
+            times, (put_on,), [0.5 * put_on], put_on, step_strain=strain, step_time_s=put_on,
+        )  # fmt: skip
+
+
+def crept(folder, material, name, times, stress: np.ndarray, levels):
+    strain = folder.noisy(strain_at(material, levels, SOLVENT, times))
+    columns = {"time_s": times, "stress_Pa": stress, "strain": strain}
+    folder.run(name, columns, control="stress")
 
 
 def creep(folder, material):
     times = np.append(np.geomspace(0.02, 10.0, 50), 10.0 + np.geomspace(0.02, 10.0, 40))
     for stress in (30.0, 60.0, 90.0):
-        strain = strain_at(material, [(0.0, stress), (10.0, 0.0)], SOLVENT, times)
-        applied = np.array([stress if t <= 10.0 else 0.0 for t in times])
-        columns = {"time_s": times, "stress_Pa": applied, "strain": folder.noisy(strain)}
-        folder.run(f"creep_{stress:g}", columns, control="stress")
+        levels = [(0.0, stress), (10.0, 0.0)]
+        applied = np.where(times <= 10.0, stress, 0.0)
+        crept(folder, material, f"creep_{stress:g}", times, applied, levels)
 
 
 def laos_stress(folder, material):
     times = np.linspace(0.0, 4.0 * np.pi, 161)[1:]
     for stress in (40.0, 100.0):
-        imposed = [(0.0, lambda t, s=stress: s * np.sin(t))]
-        strain = strain_at(material, imposed, SOLVENT, times)
-        columns = {
-            "time_s": times, "stress_Pa": stress * np.sin(times), "strain": folder.noisy(strain)
-        }  # fmt: skip
-        folder.run(f"stress_{stress:g}", columns, control="stress")
+        levels = [(0.0, lambda t, s=stress: s * np.sin(t))]
+        crept(folder, material, f"stress_{stress:g}", times, stress * np.sin(times), levels)
 
 
 def flow_curve(folder, material):
-    rates = np.geomspace(0.05, 20.0, 40)
-    ends = np.array([0.0, 30.0, 60.0])
+    rates, ends = np.geomspace(0.05, 20.0, 40), np.array([0.0, 30.0, 60.0])
     stress = [followed(material, lambda t, r=rate: r, ends)[-1, 0, 1] for rate in rates]
     columns = {"shear_rate_1_s": rates, "stress_Pa": folder.noisy(np.array(stress), even=False)}
     write_table(folder.path / "flow_curve.csv", columns)
@@ -164,51 +153,36 @@ def harmonics(material, strain: float, frequency: float) -> complex:
     return modulus_of(material, strain, frequency, cycles) + 1j * frequency * SOLVENT
 
 
+def sweep(folder, material, file, columns, strains, frequencies):
+    """Write a table of moduli at strains and frequencies."""
+    pairs = np.broadcast(strains, frequencies)
+    found = np.array([harmonics(material, strain, w) for strain, w in pairs])
+    moduli = {"Gp_Pa": folder.noisy(found.real, False), "Gpp_Pa": folder.noisy(found.imag, False)}
+    write_table(folder.path / file, {**columns, **moduli})
+
+
 def frequency_sweep(folder, material):
     omega = np.geomspace(0.05, 50.0, 20)
-    found = np.array([harmonics(material, 0.01, w) for w in omega])
-    columns = {
-        "omega_rad_s": omega,
-        "Gp_Pa": folder.noisy(found.real, even=False),
-        "Gpp_Pa": folder.noisy(found.imag, even=False),
-    }
-    write_table(folder.path / "lve.csv", columns)
+    sweep(folder, material, "lve.csv", {"omega_rad_s": omega}, 0.01, omega)
 
 
 def amplitude_sweep(folder, material):
     strains = np.geomspace(0.05, 10.0, 24)
-    found = np.array([harmonics(material, strain, 1.0) for strain in strains])
-    columns = {
-        "strain": strains,
-        "omega_rad_s": np.ones(24),
-        "Gp_Pa": folder.noisy(found.real, even=False),
-        "Gpp_Pa": folder.noisy(found.imag, even=False),
-    }
-    write_table(folder.path / "amplitude_sweep.csv", columns)
+    columns = {"strain": strains, "omega_rad_s": np.ones(24)}
+    sweep(folder, material, "amplitude_sweep.csv", columns, strains, 1.0)
 
 
-def extension(kind: str):
-    """Return the test of start-ups in one extension."""
-
-    def test(folder, material):
-        times = np.linspace(0.05, 5.0, 80)
-        for rate in (0.2, 0.4):
-            stress = followed(material, lambda t, r=rate: r, times, kind)
-            tensile = stress[:, 0, 0] - stress[:, 1, 1]
-            columns = {
-                "time_s": times,
-                "hencky_rate_1_s": np.full(80, rate),
-                "tensile_stress_Pa": folder.noisy(tensile),
-            }
-            folder.run(f"at_{rate:g}", columns, flow=kind)
-
-    return test
+def extension(folder, material, kind: str):
+    times = np.linspace(0.05, 5.0, 80)
+    for rate in (0.2, 0.4):
+        stress = followed(material, lambda t, r=rate: r, times, kind)
+        columns = {"time_s": times, "hencky_rate_1_s": np.full(80, rate)}
+        columns["tensile_stress_Pa"] = folder.noisy(stress[:, 0, 0] - stress[:, 1, 1])
+        folder.run(f"at_{rate:g}", columns, flow=kind)
 
 
-TESTS = {
-    "start_up": start_up, "cessation": cessation, "step_rates": step_rates, "laos": laos,
-    "laos_periodic": laos_periodic, "step_strain": step_strain, "creep": creep,
-    "laos_stress": laos_stress, "flow_curve": flow_curve, "frequency_sweep": frequency_sweep,
-    "amplitude_sweep": amplitude_sweep, "uniaxial": extension("uniaxial"),
-    "planar": extension("planar"), "biaxial": extension("biaxial"),
-}  # fmt: skip
+_ALL = (start_up, cessation, step_rates, laos, laos_periodic, step_strain, creep, laos_stress,
+        flow_curve, frequency_sweep, amplitude_sweep)  # fmt: skip
+TESTS: dict[str, Callable] = {test.__name__: test for test in _ALL} | {
+    kind: partial(extension, kind=kind) for kind in ("uniaxial", "planar", "biaxial")
+}

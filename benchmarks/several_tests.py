@@ -103,7 +103,7 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     if tests in TOGETHER or not len(data):
         data = data.with_material_functions()
     base = dc.Fluid(dc.make_law("ucm"), *map(list, FLUIDS[fluid].modes), SOLVENT)
-    row: dict[str, Any] = {"named": [], "constants": [], "false": [], "notes": [], "unseen": {}}
+    row = empty()
     alone = tests not in TOGETHER
     if question == "close-loop":
         loop, open_ = dc.close_loop(data, base), ["N1", "N2"]
@@ -124,6 +124,11 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
         exact = unseen(fluid, 2.0 if alone else 3.0)
         _unseen(row, said, *exact, claimed, ["sigma12", "N2", *open_] if alone else open_)
     return row
+
+
+def empty() -> dict[str, Any]:
+    """Return a row of which nothing is said yet."""
+    return {"named": [], "constants": [], "false": [], "notes": [], "unseen": {}}
 
 
 def of_loop(row: dict, fluid: Fluid, loop) -> None:
@@ -193,18 +198,25 @@ def _unseen(row, said, rate, times, exact: Stresses, claimed: bool, open_) -> No
 
 def line(row: dict) -> str:
     """Return one answer as it stands in a table."""
-    own = {*FLUIDS[row["case"].split(" ")[1]].effects, *FLUIDS[row["case"].split(" ")[1]].terms}
-    said = []
-    for first, *aliases in row["named"]:
-        also = next(iter(own & set(aliases)), None)
-        said.append(f"`{first}`" + (f" or `{also}`" if also and first not in own else ""))
     told = ", ".join(f"{n} {v:.3g} ({a:.3g} to {b:.3g})" for n, _, v, a, b in row["constants"])
-    parts = [", ".join(said or ["nothing"]) + (f": {told}" if told else "")]
+    named = ", ".join(" or ".join(f"`{one}`" for one in names[:3]) for names in row["named"])
+    parts = [(named or "nothing") + (f": {told}" if told else "")]
     parts += ["*unexplained*"] if row["verdict"] == "unexplained" else []
     if row.get("undetermined"):
         parts.append(f"open: {', '.join(row['undetermined'])}")
-    misses = (f"{q} {100 * miss:.2g} %" for q, miss in row["unseen"].items())
-    return "; ".join([*parts, *([", ".join(misses)] if row["unseen"] else [])])
+    if row["unseen"]:
+        parts.append(", ".join(f"{q} {100 * miss:.2g} %" for q, miss in row["unseen"].items()))
+    return "; ".join(parts)
+
+
+def counted(question: str, rows: list[dict]) -> str:
+    """Return how many answers hold something false, and how many intervals their constant."""
+    held = [a <= v <= b for r in rows if r["verdict"] != "unexplained"
+            for _, v, _, a, b in r.get("constants", ())]  # fmt: skip
+    false = sum(bool(r.get("false")) for r in rows)
+    explained = sum(r["verdict"] not in ("unexplained", "no_signal") for r in rows)
+    return (f"{question}: {len(rows)} answers, {explained} explained, {false} with something "
+            f"false; intervals {sum(held)} of {len(held)}")  # fmt: skip
 
 
 def table(rows: list[dict]) -> str:
@@ -212,11 +224,7 @@ def table(rows: list[dict]) -> str:
     lines = []
     for question in QUESTIONS:
         some = {r["case"]: r for r in rows if r["question"] == question}
-        false = sum(bool(r.get("false")) for r in some.values())
-        held = [a <= v <= b for r in some.values() if r["verdict"] != "unexplained"
-                for _, v, _, a, b in r.get("constants", ())]  # fmt: skip
-        counts = f"{len(some)} answers, {false} with something false"
-        lines += ["", f"{question}: {counts}; intervals {sum(held)} of {len(held)}", ""]
+        lines += ["", counted(question, list(some.values())), ""]
         lines += [f"| test | {' | '.join(FLUIDS)} |", "|---" * (1 + len(FLUIDS)) + "|"]
         for test in (*TESTS, *TOGETHER):
             found = [some.get(f"{test} {fluid}") for fluid in FLUIDS]

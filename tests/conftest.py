@@ -22,8 +22,11 @@ threadpool_limits(1, "blas")
 # Tracing makes millions of small objects, and each full collection walks all that JAX remembers.
 gc.set_threshold(100_000, 50, 100)
 
-# the mutations of files are the benchmark's
-sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "benchmarks")]
+# helper modules, for tests are imported by path and not as packages; the mutations of files are the
+# benchmark's
+_HERE = Path(__file__).parent
+sys.path += [str(folder) for folder in (_HERE, *_HERE.iterdir()) if folder.is_dir()]
+sys.path.append(str(_HERE.parent / "benchmarks"))
 
 first_calls = importlib.import_module("first_calls")
 
@@ -157,6 +160,18 @@ def optimised():
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(program, "compiled", slower_to_compile)
+        yield
+
+
+@pytest.fixture(scope="module")
+def without_curves() -> Iterator[None]:
+    """Let loops of a module try no free curves, which are half of their time.
+
+    Where candidates explain the records none is found; `tests/inference/test_engine_worlds.py` has
+    records in which there are some.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("discover.loop.loop.free_functions", lambda posterior: [])
         yield
 
 

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import jaxtyping
 
-CALLS = 20
+CALLS = 5
 """How many calls of a function are checked in each file of tests."""
 
 _seen: Counter = Counter()

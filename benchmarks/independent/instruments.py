@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from independent.flow import Flow, oscillation, start_up, step_strain
+from independent.flow import Flow, oscillation, step_strain
 from independent.material import Material, RateLaw, Stresses, differences, integrate
 
 _STEP = 1e-6  # of a finite difference, relative
@@ -283,18 +283,3 @@ def nothing(recording: Recording, level: float) -> Recording:
     flat = np.full_like(recording.stress, level)
     zero = np.zeros_like(flat)
     return replace(recording, stress=flat, true=Stresses(zero, zero, zero), N1=None, N2=None)
-
-
-NOISE = 0.01
-JUDGE = "judge.csv"
-FLOWS = {
-    "up.csv": (start_up(1.5), 6.0),
-    "swing.csv": (oscillation(2.0, 1.0), 10.0),
-    "wide.csv": (oscillation(4.0, 0.5), 12.0),
-    JUDGE: (oscillation(3.0, 0.8), 10.0),
-}
-
-
-def as_it_is(run: Recording, flow: Flow) -> np.ndarray:
-    """Return the stress as it is recorded."""
-    return run.stress

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
+from scipy.linalg import get_lapack_funcs
 from scipy.optimize import least_squares
 from scipy.stats import t as student
 
@@ -174,11 +175,11 @@ def _relaxing(run: Run, time: float) -> Float[np.ndarray, " n"]:
     before = np.concatenate([run.rate[:1], run.rate[:-1]])
     kept = np.exp(-step / time)
     gained = 0.5 * (before + run.rate) * time * (-np.expm1(-step / time))
-    found, stress = np.zeros(len(step)), 0.0
-    for i, (keep, gain) in enumerate(zip(kept, gained, strict=True)):
-        stress = stress * keep + gain
-        found[i] = stress
-    return found
+    # each value less what is kept of the one before: two diagonals
+    bands = np.stack([np.ones(len(step)), -np.append(kept[1:], 0.0)])
+    (solve,) = get_lapack_funcs(("tbtrs",), (bands,))
+    stress, _ = solve(bands, gained[:, None], uplo="L")
+    return stress[:, 0]
 
 
 # fits ---------------------------------------------------------------------------------------------

@@ -260,14 +260,9 @@ def test_a_killed_worker_loses_nothing_and_does_nothing_twice(studies, calm, tmp
 
 def test_a_scheduler_that_exists_is_used(studies, calm, tmp_path):
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1,
-        threads_per_worker=2,
-        processes=False,
-        host="127.0.0.1",
-        protocol="tcp://",
-        dashboard_address=None,
-    ) as cluster:
+    options = {"n_workers": 1, "threads_per_worker": 2, "processes": False}
+    local = {"host": "127.0.0.1", "protocol": "tcp://", "dashboard_address": None}
+    with distributed.LocalCluster(**options, **local) as cluster:
         address = cluster.scheduler_address
         assert address.startswith("tcp://127.0.0.1")
         result = batch.run_batch(studies, tmp_path / "out", scheduler=address)
@@ -386,17 +381,6 @@ def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_p
     assert "one file system" in status.text
 
 
-def test_a_scheduler_that_does_not_answer_is_the_users_mistake(studies, tmp_path, monkeypatch):
-    distributed = pytest.importorskip("distributed")
-
-    def no_answer(address, timeout):
-        raise OSError(f"Timed out trying to connect to {address}")
-
-    monkeypatch.setattr(distributed, "Client", no_answer)
-    with pytest.raises(InputError, match=r"tcp://127\.0\.0\.1:9"):
-        batch.run_batch(studies, tmp_path / "out", scheduler="tcp://127.0.0.1:9")
-
-
 @pytest.mark.parametrize(
     ("address", "protected"),
     [
@@ -409,7 +393,7 @@ def test_a_scheduler_that_does_not_answer_is_the_users_mistake(studies, tmp_path
         ("ucx://10.0.0.1:8786", False),
     ],
 )
-def test_a_connection_that_others_can_use_is_warned_of(
+def test_a_scheduler_that_does_not_answer_is_told_and_a_connection_that_others_can_use_warned_of(
     studies, tmp_path, monkeypatch, address, protected
 ):
     distributed = pytest.importorskip("distributed")
@@ -421,7 +405,7 @@ def test_a_connection_that_others_can_use_is_warned_of(
     said = (
         contextlib.nullcontext() if protected else pytest.warns(UserWarning, match="not encrypted")
     )
-    with said, pytest.raises(InputError):
+    with said, pytest.raises(InputError, match=re.escape(address)):
         batch.run_batch(studies, tmp_path / "out", scheduler=address)
 
 

@@ -1,21 +1,16 @@
 """Comparing learners: errors, what stays open, what is kept, what JSON holds."""
 
 import json
-import time
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
-from discover.comparison.truth import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
-from discover.laws.expansion import law_of_terms
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.study import RunFolder, parse_study
-from tensor_library.law_terms import LawTerms
+from discover.study import parse_study
 
 
 def fake_study(**compare_options):
@@ -89,46 +84,6 @@ def test_an_outcome_comes_back_from_its_state_unchanged():
     assert again.predictions["test/b"] is None
     for quantity, values in wave.items():
         np.testing.assert_array_equal(again.predictions["test/a"][quantity], values)
-
-
-@pytest.mark.slow
-def test_a_finished_learner_is_not_trained_again(tmp_path, monkeypatch):
-    calls, kept = [], tmp_path / "state" / "tensor_sindy.json"
-
-    def counting(learner, *args, **kwargs):
-        calls.append(learner)
-        if calls.count("tbnn_ude") == 1 and learner == "tbnn_ude":
-            # the two are trained side by side: stopped once the other one has ended
-            deadline = time.monotonic() + 60.0
-            while not kept.is_file() and time.monotonic() < deadline:
-                time.sleep(0.01)
-            raise KeyboardInterrupt
-        return trained(learner, *args, **kwargs)
-
-    monkeypatch.setattr("discover.comparison.learning.train", counting)
-    study = fake_study()
-    with pytest.raises(KeyboardInterrupt):
-        compare(study, store=RunFolder(tmp_path, "x"))
-    compare(study, store=RunFolder(tmp_path, "x"))
-    assert sorted(calls[:2]) == ["tbnn_ude", "tensor_sindy"]
-    assert calls[2:] == ["tbnn_ude"]
-
-
-def test_true_terms_make_the_true_law():
-    parameters = {
-        "ucm": {},
-        "johnson_segalman": {"xi": 0.4},
-        "giesekus": {"alpha": 0.2},
-        "ptt_linear": {"epsilon": 0.3},
-        "ptt_exponential": {"epsilon": 0.3},
-    }
-    stress, rate = jnp.array([1.7, -0.2, 0.1, 0.6]), jnp.asarray(1.3)
-    for name, values in parameters.items():
-        wanted = make_law(name, values).stress_rate(stress, rate)
-        for known in (True, False):
-            terms = true_terms(name, values, known)
-            law = law_of_terms(LawTerms.of(terms), known)
-            assert np.allclose(law.stress_rate(stress, rate), wanted, rtol=1e-12), name
 
 
 def test_a_sweep_has_no_instrument():

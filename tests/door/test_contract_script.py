@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from fewer_hypotheses import few_candidates
 from independent_folder import MOBILITY, write_folder
 
 import discover as dc
@@ -48,6 +49,7 @@ def after(request, tmp_path_factory):
         patch.setattr(dc, "close_loop", partial(in_memory.close_loop, **loop))
         few = partial(in_memory.run_loop_on, effects=["giesekus_mobility", "stress_gain"])
         patch.setattr(in_memory, "run_loop_on", few)
+        few_candidates(patch, ("giesekus_mobility", "ptt_linear", "stress_gain"))
         left: dict = {"folder": folder, "said": said}
         exec(compile(script(), "docs/python.md", "exec"), left)
         yield left

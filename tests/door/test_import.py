@@ -1,4 +1,4 @@
-"""``import discover`` is light, and everything it names is there."""
+"""``import discover`` is light, and what processes that use it first find and say."""
 
 import ast
 import importlib
@@ -8,8 +8,16 @@ import subprocess
 import sys
 
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 import discover as dc
+from discover import linear_algebra_threads
+from discover.accelerators import use_the_processor_from_the_start
+from discover.comparison import run_comparison
+from discover.learners import distillation
+from discover.learners.run_prediction import RunPrediction
+from discover.linear_algebra_threads import in_one_thread, use_one_thread_from_the_start
+from discover.loop import loop
 
 HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "equinox")
 
@@ -134,3 +142,124 @@ def test_python_m_discover_is_the_command():
     assert done.returncode == 0
     assert "discover [OPTIONS] COMMAND" in done.stdout
     assert "__main__" not in done.stdout
+
+
+FIRST_CALL = """
+import discover as dc
+flows = {"a": dc.start_up(1.0), "b": dc.oscillatory_shear(2.0, 1.0)}
+data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, flows, noise=0.01, n_samples=31)
+dc.close_loop(data, max_effects=1, effects=["giesekus_mobility"])
+"""
+
+# XLA raises an alarm where it takes more than a second to compute a constant
+SLOW = """
+import discover as dc
+dc.Fluid
+import jax, jax.numpy as jnp
+def constant():
+    ones = jnp.ones((60, 60))
+    return jax.lax.reduce_window(ones, 0.0, jax.lax.add, (25, 25), (1, 1), "SAME")
+jax.jit(constant)().block_until_ready()
+"""
+
+
+def errors_of(code, **environment):
+    """What a fresh process without kept programs writes to standard error."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("TF_CPP", "JAX_COMPILATION"))}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300,
+        env={**kept, "DISCOVER_NO_CACHE": "1", **environment},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stderr
+
+
+def test_a_first_call_and_an_alarm_of_xla_write_nothing_but_for_those_who_ask_for_it():
+    assert errors_of(FIRST_CALL + SLOW) == ""
+    # negative control: XLA had something to say
+    assert "Constant folding" in errors_of(SLOW, TF_CPP_MIN_LOG_LEVEL="0")
+
+
+_SAYS_WHERE = "; ".join(
+    (
+        "import sys",
+        "sys.argv = ['discover', '--version']",
+        "from discover.cli import main",
+        "import atexit",
+        "atexit.register(lambda: print(__import__('os').environ['JAX_PLATFORMS']))",
+        "main()",
+    )
+)
+
+
+def test_a_command_computes_on_the_processor():
+    plain = {k: v for k, v in os.environ.items() if not k.startswith("JAX_PLATFORM")}
+    ran = subprocess.run(
+        [sys.executable, "-c", _SAYS_WHERE], env=plain, capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.split()[-1] == "cpu"
+
+
+@pytest.mark.parametrize("name", ["JAX_PLATFORMS", "JAX_PLATFORM_NAME"])
+def test_what_the_user_chose_stays(monkeypatch, name):
+    for one in ("JAX_PLATFORMS", "JAX_PLATFORM_NAME"):
+        monkeypatch.delenv(one, raising=False)
+    monkeypatch.setenv(name, "cuda")
+    use_the_processor_from_the_start()
+    assert os.environ[name] == "cuda"
+    assert os.environ.get("JAX_PLATFORMS", "cuda") == "cuda"
+
+
+TWO = pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="a library takes no more than cores")
+
+
+def threads() -> set[int]:
+    return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+
+@pytest.fixture
+def two_threads(monkeypatch):
+    for name in linear_algebra_threads._CHOSEN:
+        monkeypatch.delenv(name, raising=False)
+    with threadpool_limits(2, "blas"):
+        yield
+
+
+@TWO
+@pytest.mark.usefixtures("two_threads")
+def test_a_product_takes_one_thread_inside_and_what_it_took_before_afterwards():
+    assert threads() == {2}
+    assert in_one_thread(threads)() == {1}
+    assert threads() == {2}
+    with pytest.raises(ZeroDivisionError):
+        in_one_thread(lambda: 1 / 0)()
+    assert threads() == {2}
+
+
+@TWO
+@pytest.mark.usefixtures("two_threads")
+def test_a_number_that_the_user_chose_stays(monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    assert in_one_thread(threads)() == {2}
+    use_one_thread_from_the_start()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "2"
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS")
+    use_one_thread_from_the_start()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "1"
+
+
+@TWO
+@pytest.mark.usefixtures("two_threads")
+def test_a_fit_runs_in_one_thread(monkeypatch):
+    seen = []
+    monkeypatch.setattr(dc.TensorSINDy, "_learn", lambda self, runs, known: seen.append(threads()))
+    run = dc.synthetic_dataset("ucm", noise=0.01)[0]
+    dc.TensorSINDy(base=dc.Fluid(dc.make_law("ucm"), 1.0, 1.0)).fit([run])
+    assert seen == [{1}]
+
+
+@pytest.mark.parametrize(
+    "function", [loop.run_loop, run_comparison.compare, distillation.distil, RunPrediction.fit]
+)
+def test_what_fits_many_times_is_limited(function):
+    assert hasattr(function, "__wrapped__")

@@ -28,8 +28,6 @@ from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate
 from tensor_library import LawTerm
-from tensor_library.library import build_library
-from tensor_library.terms import CandidateTerm
 
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 SATURATING = "(tr(sigma)/(1+kappa*abs(tr(sigma))))*sigma"
@@ -100,94 +98,11 @@ def test_the_python_function_simulates_what_the_package_simulates(tmp_path, simu
     assert "discover" not in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.M)
 
 
-def test_the_sympy_module_simulates_what_the_package_simulates(tmp_path, simulated):
-    import sympy
-
-    path = tmp_path / "law.py"
-    path.write_text(write_equation(MIXED, "sympy"), encoding="utf-8")
-    module = load(path)
-    in_shear = {s: 0 for s in module.gradient_symbols} | {sympy.Symbol("s13"): 0}
-    shear_rate = sympy.Symbol("rate")
-    in_shear |= {sympy.Symbol("s23"): 0, sympy.Symbol("L12"): shear_rate}
-    matrix = module.stress_rate.subs(in_shear)
-    components = [matrix[0, 0], matrix[1, 1], matrix[2, 2], matrix[0, 1]]
-    symbols = [*sympy.symbols("s11 s22 s33 s12"), shear_rate]
-    function = sympy.lambdify(symbols, components, "math")
-    total = np.zeros((len(TIMES), 4))
-    for modulus, time in module.modes:
-        states = runge_kutta(
-            lambda s, time=time: np.array(function(*s, time * RATE)) / time, np.zeros(4), TIMES, 40
-        )
-        total += modulus * states
-    total[:, 3] += module.solvent_viscosity_Pa_s * RATE
-    found = np.array([total[:, 3], total[:, 0] - total[:, 1], total[:, 1] - total[:, 2]])
-    assert agree(found, simulated)
-
-
 def test_json_gives_back_the_same_equation():
     text = write_equation(MIXED, "json")
     again = equation_from_json(json.loads(text))
     assert again == MIXED
     assert write_equation(again, "json") == text
-
-
-@pytest.mark.slow
-def test_what_json_and_rheotool_give_back_simulates_what_the_package_simulates(simulated):
-    from_json = equation_from_json(json.loads(write_equation(MIXED, "json")))
-    assert agree(by_stress_rate(from_json.fluid()), simulated)
-    known = Equation((LawTerm("sigma.sigma", 0.2),), (9.0, 3.0), (0.5, 5.0), True, 1.5)
-    again = read_rheotool(write_equation(known, "rheotool"))
-    stress = simulate(known.fluid(), start_up(RATE), TIMES)
-    assert agree(by_stress_rate(again.fluid())[0], stress.shear_stress)
-
-
-def read_latex(text):
-    """Read the law and its modes from LaTeX that `equation_latex` wrote."""
-    number = r"([\d.]+)(?: \\times 10\^\{(-?\d+)\})?"
-
-    def value(match):
-        return float(match[1]) * 10.0 ** int(match[2] or 0)
-
-    letters = {"epsilon", "kappa"}
-    law = text.split(r"\begin{equation}")[1].split(r"\end{equation}")[0].strip()
-    law, *inner = law.split(r", \qquad ")
-    assigned = [re.fullmatch(r"\\(\w+) = (.+)", one) for one in inner]
-    parameters = {m[1]: value(re.fullmatch(number, m[2])) for m in assigned}
-    assert set(parameters) <= letters
-    library = build_library(degree=2, closed_forms=("exp", "saturating"))
-    names = {term.latex(): term for term in library.terms}
-    head = r"\overset{\nabla}{\boldsymbol{\sigma}} + \boldsymbol{\sigma}"
-    assert law.startswith(head)
-    rest = law[len(head) :]
-    tail = r" = \dot{\boldsymbol{\gamma}}"
-    assert rest.endswith(tail)
-    terms, rest = [], rest.removesuffix(tail)
-    while rest:
-        match = re.match(rf" ([+-]) {number} \\, ", rest)
-        rest = rest[match.end() :]
-        latex = max((name for name in names if rest.startswith(name)), key=len)
-        rest = rest[len(latex) :]
-        term: CandidateTerm = names[latex]
-        size = float(match[2]) * 10.0 ** int(match[3] or 0)
-        sign = 1.0 if match[1] == "+" else -1.0
-        terms.append(LawTerm(term.name, sign * size, {n: parameters[n] for n in term.inner_names}))
-    modes = re.findall(rf"(G|\\lambda)_\{{\d+\}} &= {number}", text)
-    values = {"G": [], r"\lambda": []}
-    for letter, mantissa, exponent in modes:
-        values[letter].append(float(mantissa) * 10.0 ** int(exponent or 0))
-    solvent = re.search(rf"\\eta_\\mathrm\{{s\}} &= {number}", text)
-    return Equation(
-        tuple(terms), tuple(values["G"]), tuple(values[r"\lambda"]), True, value(solvent)
-    )
-
-
-def test_latex_can_be_read_and_simulated(simulated):
-    text = write_equation(MIXED, "latex")
-    read = read_latex(text)
-    assert [t.term for t in read.terms] == [t.term for t in MIXED.terms]
-    stress = simulate(read.fluid(), start_up(RATE), TIMES)
-    assert agree(stress.shear_stress, simulated[0])
-    assert agree(stress.second_normal_stress_difference, simulated[2])
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -1,7 +1,4 @@
-"""A structure of the whole fluid leaves with its equation, and is read back from every format.
-
-The references are `independent.structured` and `independent.thixotropic`, on full tensors by scipy.
-"""
+"""Exports of laws with states of their own, of laws with a name, and in a solver."""
 
 import json
 
@@ -16,14 +13,22 @@ from scipy.integrate import solve_ivp
 
 from discover.effects import StateEffect, make_effect, named_effects
 from discover.equations import (
+    Box,
     Equation,
+    NamedPart,
     StatePart,
     equation_from_json,
     equation_to_json,
+    law_terms,
     write_equation,
 )
+from discover.equations import Tested as Where
+from discover.equations.formats.in_a_solver import in_a_solver
 from discover.errors import InputError
+from discover.laws import LibraryExpansion, TensorBasisNetwork, make_law
 from tensor_library import LawTerm
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
 
 ALPHA, MODULUS, TIME = 0.2, 100.0, 1.5
 CRITICAL = {"inverse_critical_rate": 0.5, "build_up_time": 2.0}
@@ -252,3 +257,132 @@ def test_rheotool_and_a_simulation_of_one_mode_are_refused_in_words():
 def test_what_is_no_state_is_refused(effect, values, said):
     with pytest.raises(InputError, match=said):
         StatePart(effect, values)
+
+
+EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
+NAMED = {
+    "ucm": {},
+    "giesekus": {"alpha": 0.3},
+    "johnson_segalman": {"xi": 0.4},
+    "ptt_linear": {"epsilon": 0.2},
+    "ptt_exponential": {"epsilon": 0.2},
+    "fene_p": {"L2": 12.0},
+}
+
+
+def same_stress_rate(first, second):
+    generator = np.random.default_rng(0)
+    for _ in range(5):
+        stress = generator.normal(size=(3, 3))
+        stress = jnp.asarray(0.5 * (stress + stress.T))
+        gradient = jnp.asarray(generator.normal(size=(3, 3)))
+        gradient = gradient - jnp.trace(gradient) / 3 * jnp.eye(3)
+        np.testing.assert_allclose(
+            first.stress_rate(stress, gradient), second.stress_rate(stress, gradient), rtol=1e-9
+        )
+
+
+@pytest.mark.parametrize("name", NAMED)
+def test_a_named_law_and_its_terms_are_the_same_law_in_any_flow(name):
+    law = make_law(name, NAMED[name])
+    same_stress_rate(Equation(law_terms(law)).law(), law)
+
+
+def test_one_parameter_with_two_values_keeps_both():
+    terms = tuple(LawTerm(EXPONENTIAL, c, {"epsilon": e}) for c, e in ((1.0, 0.1), (0.5, 0.3)))
+    stress = jnp.asarray([0.7, 0.1, 0.2, 0.4])
+    trace = 1.0
+    wanted = (np.expm1(0.1 * trace) + 0.5 * np.expm1(0.3 * trace)) * np.asarray(stress)
+    extra = Equation(terms).law().extra_term(stress, jnp.zeros(4))
+    np.testing.assert_allclose(extra, wanted, rtol=1e-12)
+    assert r"\epsilon = 0.1" in Equation(terms).latex()
+    assert r"e^{0.3 " in Equation(terms).latex()
+
+
+def test_a_network_that_is_more_than_constants_is_refused():
+    import equinox as eqx
+    import jax
+
+    network = TensorBasisNetwork.initialise(jax.random.key(0))
+    with pytest.raises(InputError, match="projection"):
+        law_terms(network)
+    constants = jnp.zeros(8).at[3].set(0.2)
+    network = eqx.tree_at(
+        lambda n: (n.network_mask, n.constants), network, (jnp.zeros(8), constants)
+    )
+    assert law_terms(network) == (LawTerm("sigma.sigma", float(constants[3])),)
+
+
+def test_a_known_law_below_is_part_of_what_is_written():
+    base = make_law("giesekus", {"alpha": 0.1})
+    library = TermLibrary((parse_term("sigma.sigma"), parse_term("tr(sigma)*sigma")))
+    law = LibraryExpansion(jnp.asarray([0.2, 0.3]), jnp.zeros(0), library, base=base)
+    found = {t.term: t.coefficient for t in law_terms(law)}
+    assert found == pytest.approx({"sigma.sigma": 0.3, "tr(sigma)*sigma": 0.3})
+
+
+WI = 3.0
+# oscillation so fast that start-up goes furthest
+TESTED = Where(Box((0.5, WI), (20.0, 20.0)))
+
+
+def test_a_maxwell_fluid_has_the_eigenvalue_of_its_start_up_and_twice_its_shortest_time():
+    """σ12 = Wi (1 − e^−t), σ11 = 2 Wi² (1 − (1 + t) e^−t)   [Bird, Armstrong & Hassager 1987]."""
+    found = in_a_solver(Equation((), (10.0,), (2.0,), tested=TESTED))
+    assert found is not None
+    t = np.linspace(0.0, 10.0, 200)
+    s12, s11 = WI * (1 - np.exp(-t)), 2 * WI**2 * (1 - (1 + t) * np.exp(-t))
+    wanted = min(
+        np.linalg.eigvalsh([[1 + a, b], [b, 1.0]])[0] for a, b in zip(s11, s12, strict=True)
+    )
+    # rtol 1e-6 of the integration, of an eigenvalue that is a small difference of large numbers
+    assert found.smallest_eigenvalue == pytest.approx(wanted, rel=1e-3)
+    # four eigenvalues of -1 that are one Jordan block come out within the fourth root of 1e-16
+    assert found.largest_step == pytest.approx(4.0, rel=1e-3)
+
+
+def test_the_step_follows_the_relaxation_that_the_flow_quickens():
+    """White & Metzner's relaxation rate in shear is that of the rate alone."""
+    k, n, times = 0.8, 0.4, (2.0, 0.3)
+    named = NamedPart("white_metzner", ({"k": k, "n": n},))
+    equation = Equation((), (10.0, 5.0), times, tested=TESTED, named=named)
+    found = in_a_solver(equation)
+    assert found is not None
+    assert found.limiting_mode == 2
+    rate = WI / equation.mean_relaxation_time * times[1]
+    quickened = (1 + (k * rate) ** 2) ** ((1 - n) / 2)
+    assert found.largest_step == pytest.approx(2 * times[1] / quickened, rel=1e-3)
+
+
+def test_a_law_that_loses_its_conformation_and_one_that_runs_away_say_so():
+    # h = 3 γ̇ turns the sign of σ around; h = −tr(σ) σ lets the trace grow on itself
+    beyond = Equation((LawTerm("gammadot", 3.0),), tested=TESTED)
+    text = write_equation(beyond, "python")
+    assert "no conformation any more" in text
+    runaway = Equation((LawTerm("tr(sigma)*sigma", -1.0),), tested=TESTED)
+    assert "mode 1 diverges" in write_equation(runaway, "ufl")
+    # negative controls: UCM does neither, and without a box nothing is said
+    text = write_equation(Equation((), tested=TESTED), "python")
+    assert "smallest eigenvalue" in text
+    assert "conformation any" not in text
+    assert "smallest eigenvalue" not in write_equation(Equation(()), "python")
+
+
+@pytest.mark.parametrize(
+    ("terms", "modulus", "times", "wi"),
+    [
+        ((LawTerm("sigma.sigma", -1e300),), (1.0,), (1.0,), 3.0),
+        ((), (1.0,) * 1000, tuple(np.geomspace(1e-9, 1e9, 1000)), 3.0),
+        ((LawTerm("sigma.sigma", 0.3),), (1.0,), (1.0,), 1e308),
+    ],
+    ids=["coefficient", "modes", "rate"],
+)
+def test_a_check_that_would_not_end_is_given_up_and_the_export_says_so(
+    terms, modulus, times, wi, monkeypatch
+):
+    # the same limit as in use, reached sooner
+    monkeypatch.setattr("discover.equations.formats.in_a_solver._MOST_EVALUATIONS", 3000)
+    tested = Where(Box((0.5, wi), (20.0, 20.0)))
+    equation = Equation(terms, modulus, times, tested=tested)
+    text = write_equation(equation, "python")
+    assert "not checked" in text or "diverges" in text

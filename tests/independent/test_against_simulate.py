@@ -24,6 +24,7 @@ LAWS = {
     "giesekus": ({"alpha": 0.3}, Giesekus(0.3, **SCALE)),
     "ptt_linear": ({"epsilon": 0.4}, PhanThienTanner(0.4, **SCALE)),
     "ptt_exponential": ({"epsilon": 0.4}, PhanThienTanner(0.4, "exponential", **SCALE)),
+    "fene_p": ({"L2": 30.0}, FenePeterlin(30.0, **SCALE)),
 }
 TOLERANCE = 1e-6
 """Of the largest stress; both integrate to 1e-8 or better at each step."""

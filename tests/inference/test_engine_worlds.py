@@ -84,14 +84,6 @@ def test_bands_hold_runs_that_no_fit_saw(asked, world):
     assert width < (4.0 if world == POM_POM else 0.2) * typical
 
 
-def test_the_same_records_are_given_the_same_answer(asked, tmp_path):
-    first, *_ = asked[MAXWELL]
-    second, *_ = ask(tmp_path, *MAXWELL)
-    assert first.unexplained == second.unexplained
-    assert first.explanations == second.explanations
-    assert first.discrepancy() == second.discrepancy()
-
-
 def test_one_explanation_alone_asks_for_no_test_to_tell_it_from_another(asked):
     posterior, *_ = asked[MAXWELL]
     tests = design(posterior)

@@ -15,7 +15,7 @@ from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.laws.textbook.pom_pom import _FADES
 from discover.loop.loop import Task
-from discover.protocols import imposed_stress, in_flow, oscillations, start_up, steady_rates
+from discover.protocols import in_flow, oscillations, start_up, steady_rates
 from discover.simulate import simulate
 
 ARMS, RATIO = 4.0, 0.3
@@ -95,17 +95,6 @@ def test_the_error_of_fixed_steps_falls_with_their_fourth_power():
         errors.append(np.max(np.abs(state[0, :4] - wanted)))
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert np.all(orders > 3.5)
-
-
-@pytest.mark.slow
-@both
-def test_the_stress_of_a_flow_brings_its_strain_back(name):
-    times = np.linspace(0.02, 3.0, 150)
-    stress = exact(name, 2.0 * UNIT["shear"], times)[:, 0, 1]
-    protocol, rate = imposed_stress(times, stress), np.full(150, 2.0)
-    found = predicted(name, protocol, times, rate, strain=2.0 * times)
-    # the stress is taken to be straight between samples
-    np.testing.assert_allclose(found, 2.0 * times, atol=0.02 * 6.0)
 
 
 @pytest.mark.parametrize(

@@ -144,14 +144,6 @@ def test_a_base_from_a_sweep_brings_the_covariance_of_its_moduli(monkeypatch):
         dc.TensorSINDy(base=base, modulus_covariance=np.eye(3)).fit(records(0))
 
 
-@pytest.mark.slow
-def test_an_interval_beside_a_base_from_a_sweep_holds_the_mobility():
-    base = dc.Fluid.from_sweep(sweep(0))
-    sparse = dc.TensorSINDy(base=base, library=MOBILITY_TERM).fit(records(0))
-    low, high = sparse.terms_[0].ci95
-    assert low <= MOBILITY <= high
-
-
 def test_a_study_hands_every_learner_what_it_knows(monkeypatch):
     """Each of the three that are built in takes the arguments of a comparison."""
     met = {}

@@ -1,6 +1,5 @@
 """Constants of the declared law that differ from mode to mode; stresses by scipy."""
 
-import json
 from functools import cache
 
 import numpy as np
@@ -22,6 +21,7 @@ from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
+pytestmark = pytest.mark.usefixtures("without_curves")
 
 
 @cache
@@ -158,20 +158,6 @@ def test_a_flow_curve_tells_each_constant(tmp_path):
     for mode, mobility in zip(found.modes, mobilities, strict=True):
         low, high = mode.ci95
         assert low - 0.5 * (high - low) <= mobility <= high + 0.5 * (high - low)
-
-
-class Interrupted(BaseException):
-    """Ctrl-C, when the effect is in."""
-
-
-class Store(dict):
-    def load(self, part):
-        return json.loads(self[part]) if part in self else None
-
-    def save(self, part, content):
-        self[part] = json.dumps(content)
-        if content["active"]:
-            raise Interrupted
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from discover.protocols import start_up as commanded
 
 MOBILITY, GAIN = 0.3, -0.1
 CANDIDATES = ["giesekus_mobility", "ptt_linear", "stress_gain"]
+pytestmark = pytest.mark.usefixtures("without_curves")
 
 
 @pytest.fixture(scope="module")

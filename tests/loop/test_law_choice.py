@@ -12,6 +12,7 @@ from discover.report.loop.verdict import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005
+pytestmark = pytest.mark.usefixtures("without_curves")
 
 
 def runs(law, rates, seed=0, end=8.0):

@@ -13,11 +13,11 @@ from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus
 from discover.loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.protocols import measured_rate, start_up
-from discover.report.loop.verdict import loop_verdict
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)
 EFFECTS = ("giesekus_mobility", "rate_rise_time", "rate_gain", "stress_offset")
+pytestmark = pytest.mark.usefixtures("without_curves")
 
 
 def start_ups(alpha, rates=(0.5, 1.0, 2.0), noise=0.01):
@@ -56,19 +56,6 @@ def test_strain_is_counted_from_the_start_of_the_run_and_not_of_the_flow_before_
     times = jnp.array([-2.0, -1.0, 0.0, 1.0, 2.0])
     record = Record(times, jnp.array([9.0, 9.0, 1.0, 1.0, 1.0]), jnp.zeros(5), jnp.asarray(1.0))
     np.testing.assert_allclose(record.total_strain, [0.0, 0.0, 0.0, 1.0, 2.0])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("measured", [False, True])
-def test_what_shapes_a_command_is_no_candidate_where_the_rate_was_measured(measured):
-    runs = [replace(run, rate_is_measured=measured) for run in start_ups(0.3)]
-    dataset = Dataset("start-ups", tuple(runs))
-    declared = DeclaredModel.maxwell(100.0, 1.0)
-    result = run_loop(dataset, declared, effects=EFFECTS, max_effects=1, explanations=1)
-    ranked = {candidate.effect for stage in result.rankings for candidate in stage}
-    assert ("rate_rise_time" in ranked) == (not measured)
-    # a wrong gap is between the tool and the fluid
-    assert "rate_gain" in ranked
 
 
 def test_constants_of_the_declared_law_come_back_with_units_from_a_guess_far_off():
@@ -111,40 +98,6 @@ def test_one_run_cannot_be_held_out_of_itself():
     dataset = start_ups(0.3, rates=(1.0,))
     with pytest.raises(InputError, match="at least 2 are needed; got 1"):
         run_loop_on_each(dataset, DeclaredModel.maxwell(100.0, 1.0))
-
-
-@pytest.mark.slow
-def test_steps_that_grow_in_steady_flow_change_nothing_that_could_be_seen():
-    times = np.geomspace(1e-3, 60.0, 60)
-    noise = 1.0 + 1e-4 * np.random.default_rng(0).standard_normal(60)
-    rates = np.where(times < 0.01, 5.0, 20.0) * noise
-    rates[times > 20.0] *= 0.01
-    flow = measured_rate(times, rates)
-    run = Run("steps", times, flow, rates, np.ones(60))
-    batch = make_batch([run])
-    # steps of 1/80 s, which the turn from 5 to 20 1/s wants, would be 4800; middles count too
-    assert batch.parts[0].times.shape[1] < 0.35 * 2 * 4800
-    declared = DeclaredModel.named("giesekus", {"alpha": 0.2}, 100.0, 0.5)
-    model = AugmentedModel(declared, [make_effect("stress_offset")])
-    predicted = model.predict(model.zero(), batch)[0]
-    fluid = Fluid(Giesekus(0.2), jnp.asarray(100.0), jnp.asarray(0.5))
-    exact = simulate(fluid, flow, times).shear_stress
-    np.testing.assert_allclose(predicted, exact, atol=2e-3 * np.max(exact))
-
-
-@pytest.mark.slow
-def test_records_of_noise_alone_are_called_so_and_no_effect_is_added():
-    generator = np.random.default_rng(0)
-    runs = [
-        Run(str(r), TIMES, start_up(r), np.full(80, r), generator.standard_normal(80))
-        for r in (0.5, 1.0, 2.0)
-    ]
-    declared = DeclaredModel.named("ucm", {}, 1.0, 1.0, free=("modulus_Pa", "relaxation_time_s"))
-    result = run_loop(Dataset("noise", tuple(runs)), declared, effects=EFFECTS)
-    assert result.verdict == "no_signal"
-    assert result.stages == ()
-    assert "without any fluid, are as likely" in result.remaining["description"]
-    assert "No signal" in loop_verdict(result)[0]
 
 
 def test_as_many_constants_as_samples_are_refused():

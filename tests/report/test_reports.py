@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from fewer_hypotheses import few_candidates
 from standing_alone import SCRIPT, stands_alone
 
 from discover.comparison import LearnerOutcome, compare
@@ -63,6 +64,7 @@ def comparison():
     )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.comparison.learning.train", trained)
+        few_candidates(patch)
         return replace(compare(study), name="<script>alert(1)</script>")
 
 

@@ -54,18 +54,6 @@ def test_small_oscillation_gives_the_maxwell_moduli(frequency):
 
 
 @pytest.mark.slow
-def test_stiff_spectrum_matches_the_analytic_start_up():
-    modulus, relaxation_time = SPECTRUM
-    times = np.concatenate([[0.0], np.logspace(-3, 3.5, 40)])
-    stress = simulate(
-        Fluid(UpperConvectedMaxwell(), modulus, relaxation_time), start_up(0.02), times
-    )
-    viscosities = modulus * relaxation_time
-    expected = 0.02 * np.sum(viscosities * -np.expm1(-times[:, None] / relaxation_time), axis=1)
-    np.testing.assert_allclose(stress.shear_stress, expected, rtol=1e-6, atol=1e-6)
-
-
-@pytest.mark.slow
 def test_stiff_nonlinear_spectrum_agrees_with_an_implicit_scipy_method():
     modulus, relaxation_time = SPECTRUM
     fluid = Fluid(Giesekus(0.3), modulus, relaxation_time)

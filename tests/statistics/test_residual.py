@@ -1,9 +1,13 @@
-"""When is a residual noise, and when is something missing."""
+"""What a fit leaves: its size, its smooth part, and that of short runs."""
 
 import numpy as np
 import pytest
-from independent.noise import correlated
+from independent import Giesekus, Modes, UpperConvectedMaxwell, oscillation, start_up
+from independent.noise import correlated, proportional, rms, white
 
+from discover.statistics import lack_of_fit
+from discover.statistics.lack_of_fit import what_is_left
+from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
 from discover.statistics.noise.whiteness import noise_probability
 from discover.statistics.residual import (
     Expectation,
@@ -102,3 +106,151 @@ def test_the_size_of_a_run_too_short_to_be_tested_is_no_sign_of_noise():
 def test_runs_that_are_all_of_a_few_samples_do_not_say_how_noisy_they_are():
     assert not tells_noise(np.ones((3, 6)))
     assert tells_noise(np.ones((3, 7)))
+
+
+TIMES = np.linspace(0.33, 5.0, 15)
+
+
+def noise_short(generator, runs=6, samples=15):
+    return 0.01 * generator.standard_normal((runs, samples))
+
+
+def structured(residual, weight):
+    probability = noise_probability(residual, weight)
+    assert probability is not None
+    return probability <= 0.01
+
+
+def test_plain_noise_of_short_runs_is_taken_for_structure_as_seldom_as_the_level_says():
+    weight = np.ones((6, 15))
+    taken = sum(structured(noise_short(np.random.default_rng(seed)), weight) for seed in range(300))
+    # 1 % of 300, within three standard deviations of a binomial count
+    assert taken <= 3 + 3 * np.sqrt(300 * 0.01 * 0.99)
+
+
+def test_few_short_runs_of_noise_are_explained():
+    records = [np.ones(12)] * 3
+    verdicts = [
+        what_is_left(list(noise_short(np.random.default_rng(seed), 3, 12)), records).verdict
+        for seed in range(60)
+    ]
+    # 1 % of 60: more than 4 has a probability below 1e-3
+    assert verdicts.count("explained") >= 56
+
+
+def test_six_runs_of_fifteen_samples_show_a_misfit_as_large_as_their_noise():
+    # start-ups of Maxwell fluids of the same viscosity, one 2 times as slow
+    misfit = np.exp(-TIMES / 2.0) - np.exp(-TIMES)
+    misfit *= 0.01 / np.sqrt(np.mean(misfit**2))
+    records = [-np.expm1(-TIMES)] * 6
+    found = [
+        what_is_left(list(noise_short(np.random.default_rng(seed)) + misfit), records).verdict
+        for seed in range(20)
+    ]
+    # a misfit that is seen nine times in ten is missed more than five times of 20 once in 10,000
+    assert found.count("unexplained") >= 15
+
+
+def test_what_short_runs_cannot_tell_is_said():
+    # no larger than a pattern of noise may be, and yet a pattern
+    bent = 0.008 * np.cos(np.linspace(0.0, np.pi, 15))
+    residuals = list(bent + noise_short(np.random.default_rng(1)))
+    assert "do not tell correlated noise" in what_is_left(residuals, [np.ones(15)] * 6).reason
+    # changes from sample to sample, as noise does
+    few = what_is_left([0.01 * (-1.0) ** np.arange(8)] * 2, [np.ones(8)] * 2)
+    assert few.probability is None
+    assert "too few samples" in few.reason
+    # 8 samples of plain noise look like more than noise one time in five
+    row = noise_short(np.random.default_rng(0), 1, 8)[0] + np.linspace(-0.1, 0.1, 8)
+    open_ = what_is_left([row], [np.ones(8)])
+    assert open_.verdict == "unexplained"
+    assert "hardly tell" in open_.reason
+    assert "hardly tell" not in what_is_left([row] * 3, [np.ones(8)] * 3).reason
+
+
+def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():
+    def correlated(n, generator):
+        drawn = generator.standard_normal(n)
+        for i in range(1, n):
+            drawn[i] = 0.7 * drawn[i - 1] + np.sqrt(0.51) * drawn[i]
+        return drawn
+
+    weight = np.zeros((7, 200))
+    weight[0], weight[1:, :15] = 1.0, 1.0
+    alone, together = 0, 0
+    for seed in range(20):
+        generator = np.random.default_rng(seed)
+        residual = np.zeros((7, 200))
+        residual[0] = correlated(200, generator)
+        residual[1:, :15] = [correlated(15, generator) for _ in range(6)]
+        alone += structured(residual[1:], weight[1:])
+        together += structured(residual, weight)
+    assert alone >= 18
+    # 1 % of 20: more than 3 has a probability below 1e-4
+    assert together <= 3
+
+
+def test_the_noise_of_short_runs_is_their_size_where_nothing_speaks_against_it():
+    residual = noise_short(np.random.default_rng(1)) / np.sqrt(15)
+    # 90 samples: 7 % standard error
+    assert noise_floor(residual, np.full((6, 15), 1 / np.sqrt(15))) == pytest.approx(0.01, rel=0.2)
+
+
+GROWTH, WAVE = np.geomspace(0.05, 10.0, 60), np.linspace(0.0, 12.0, 121)
+FLOWS = [(start_up(0.5), GROWTH), (start_up(2.0), GROWTH), (oscillation(2.0, 1.0), WAVE)]
+TWO = Modes(Giesekus(0.1, 80.0, 1.0), Giesekus(0.7, 60.0, 0.1))
+NEAR = Modes(Giesekus(0.1, 80.0, 1.0), UpperConvectedMaxwell(54.0, 0.1))
+
+
+@pytest.fixture(scope="module")
+def stresses():
+    """σ12 of a fluid of two modes, and of one that is nearly it."""
+    return [[material.respond(*flow).sigma12 for flow in FLOWS] for material in (TWO, NEAR)]
+
+
+def said(exact, predicted, noise, seed):
+    generator = np.random.default_rng(seed)
+    records = [noise(row, generator) for row in exact]
+    residuals = [row - record for row, record in zip(predicted, records, strict=True)]
+    return lack_of_fit(residuals, records).verdict
+
+
+NOISES = {
+    "white": lambda row, generator: white(row, 0.01, generator),
+    "slow": lambda row, generator: correlated(row, 0.03, 0.9, generator),
+    "less slow": lambda row, generator: correlated(row, 0.03, 0.6, generator),
+    "proportional": lambda row, generator: proportional(row, 0.05, generator),
+}
+
+
+@pytest.mark.slow
+def test_a_smooth_misfit_larger_than_the_noise_is_no_slow_noise(stresses):
+    exact, near = stresses
+    # two to three times the noise: so much correlated noise would explain, were it not for its form
+    misses = [rms(one - other) / rms(one) for one, other in zip(exact, near, strict=True)]
+    assert 0.008 < np.mean(misses) < 0.04
+    verdicts = [said(exact, near, NOISES["white"], seed) for seed in range(20)]
+    assert verdicts.count("unexplained") >= 18
+
+
+@pytest.mark.parametrize("noise", NOISES.values(), ids=NOISES)
+def test_the_law_that_made_the_data_leaves_noise(stresses, noise):
+    verdicts = [said(stresses[0], stresses[0], noise, seed) for seed in range(20)]
+    # significance 0.01: more than 2 of 20 has a probability of 0.001
+    assert verdicts.count("explained") >= 18
+
+
+LOUD = 1.0 + 15.0 * np.exp(-WAVE)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, 0.9])
+@pytest.mark.parametrize("size", [np.ones(121), LOUD], ids=["even", "loud start"])
+def test_the_probability_is_one_whatever_the_noise(rho, size):
+    drawn = []
+    for seed in range(60):
+        generator = np.random.default_rng(seed)
+        rows = [size * correlated(np.ones(121), 1.0, rho, generator) for _ in range(3)]
+        drawn.append(smooth_misfit_probability([row - size for row in rows]))
+    # 5 % of 60 is 3, and more than 9 has a probability of 0.1 %
+    assert np.count_nonzero(np.array(drawn) < 0.05) <= 9
+    assert np.count_nonzero(np.array(drawn) < 0.001) <= 1

@@ -1,3 +1,4 @@
+import first_calls
 import jax
 import jax.numpy as jnp
 import jaxtyping
@@ -107,5 +108,6 @@ def test_flows_keep_the_volume(flow):
 
 def test_shapes_are_checked_while_tests_run():
     # so that every other test also tests the shapes written on public functions
+    first_calls.begin_file()
     with pytest.raises(jaxtyping.TypeCheckError):
         tl.trace(jnp.zeros((5, 4)))

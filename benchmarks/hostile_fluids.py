@@ -1,4 +1,4 @@
-"""Materials of hostile records that `independent` has not; a source stands with each."""
+"""Fluids of hostile records that `independent` has not; a source stands with each."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +19,11 @@ from independent.material import Rate, rate_tensor, stretched
 from scipy.integrate import solve_ivp
 
 ONE = np.eye(3)
+
+
+def without_normal(shear: np.ndarray) -> Stresses:
+    """Return stresses of a scalar theory, which knows no normal stress."""
+    return Stresses(shear, np.full_like(shear, np.nan), np.full_like(shear, np.nan))
 
 
 @dataclass(frozen=True)
@@ -55,11 +60,10 @@ class Elastoplastic(Material):
     """Local stresses that load, yield and shake their neighbours   [Hébraud & Lequeux 1998].
 
     ∂P/∂t = −Gγ̇ ∂P/∂s + D ∂²P/∂s² − θ(|s| > s_c) P/τ + Γ δ(s), Γ = ∫_{|s|>s_c} P/τ, D = α s_c² Γ
-    [Phys. Rev. Lett. 81, 2934, eq. 1 to 3]. A scalar, so that no normal stress is known. Finite
-    volumes, from the steady state at rest, which has D > 0 for α > 1/2.
+    [Phys. Rev. Lett. 81, 2934, eq. 1 to 3]; finite volumes, from the steady state at rest.
     """
 
-    coupling: float = 0.7  # α
+    coupling: float = 0.7  # α; D > 0 at rest for more than 1/2
     modulus: float = 100.0
     threshold: float = 100.0  # s_c
     time: float = 1.0  # τ
@@ -76,19 +80,17 @@ class Elastoplastic(Material):
             padded = np.concatenate([[0.0], density, [0.0]])
             speed = self.modulus * float(flow.rate(t)) / self.threshold if t >= 0 else 0.0
             upwind = padded[:-1] if speed >= 0 else padded[1:]
-            spread = self.coupling * yielding * np.diff(padded) / width
-            through = speed * upwind - spread
+            through = speed * upwind - self.coupling * yielding * np.diff(padded) / width
             through[[0, -1]] = 0.0
             return -np.diff(through) / width - beyond * density + yielding * at_zero
 
         start = np.exp(-(middle**2))
         start = start / np.sum(start) / width
-        old = solve_ivp(change, (-300.0, -1e-9), start, "LSODA", rtol=1e-7, atol=1e-9).y[:, -1]
-        found = solve_ivp(
-            change, (0.0, float(times[-1])), old, "LSODA", times, rtol=1e-7, atol=1e-9, max_step=0.1
-        ).y
-        shear = self.threshold * np.sum(middle[:, None] * found, axis=0) * width
-        return Stresses(shear, np.full_like(shear, np.nan), np.full_like(shear, np.nan))
+        exact = {"method": "LSODA", "rtol": 1e-7, "atol": 1e-9}
+        old = solve_ivp(change, (-300.0, -1e-9), start, **exact).y[:, -1]
+        span = (0.0, float(times[-1]))
+        found = solve_ivp(change, span, old, t_eval=times, max_step=0.1, **exact).y
+        return without_normal(self.threshold * np.sum(middle[:, None] * found, axis=0) * width)
 
 
 def fractional(exponent: float = 0.5, modulus: float = 100.0, time: float = 1.0) -> Modes:
@@ -97,15 +99,29 @@ def fractional(exponent: float = 0.5, modulus: float = 100.0, time: float = 1.0)
     G(t) = G E_a(−(t/τ)^a) has the spectrum G sin(aπ)/π / (x^a + x^−a + 2 cos aπ) of x = t/τ, per
     ln τ   [Gorenflo & Mainardi 1997]; here two modes a factor of e from e^−4 to e^5.
     """
-    log = np.arange(-4.0, 5.01, 0.5)
-    a = exponent
+    log, a = np.arange(-4.0, 5.01, 0.5), exponent
     share = np.sin(a * np.pi) / np.pi / (2 * np.cosh(a * log) + 2 * np.cos(a * np.pi))
-    pairs = zip(0.5 * modulus * share, time * np.exp(log), strict=True)
-    return Modes(*(UpperConvectedMaxwell(float(g), float(t)) for g, t in pairs))
+    return modes(UpperConvectedMaxwell, 0.5 * modulus * share, time * np.exp(log))
+
+
+class _WithLevel(RateLaw):
+    """A law of a number, `level` at rest, and the stress in Pa."""
+
+    level: float = 0.0
+    modulus: float
+
+    def rest(self) -> np.ndarray:
+        return np.append(self.level, np.zeros(9))
+
+    def scale(self) -> np.ndarray:
+        return np.append(1.0, np.full(9, self.modulus))
+
+    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
+        return state[1:].reshape(3, 3)
 
 
 @dataclass(frozen=True)
-class Heated(RateLaw):
+class Heated(_WithLevel):
     """A Giesekus fluid that its own work warms: both its modulus and its time follow.
 
     dΘ/dt = b σ:D − Θ/t_h with σ:D the whole power, λ → λ e^−Θ, and G → G (1 + Θ/20), as of rubber.
@@ -116,12 +132,6 @@ class Heated(RateLaw):
     loss_time: float = 3.0
     modulus: float = 100.0
     relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        return np.zeros(10)
-
-    def scale(self) -> np.ndarray:
-        return np.append(1.0, np.full(9, self.modulus))
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         warm, stress = state[0], state[1:].reshape(3, 3)
@@ -136,7 +146,7 @@ class Heated(RateLaw):
 
 
 @dataclass(frozen=True)
-class Micelles(RateLaw):
+class Micelles(_WithLevel):
     """σ▽ = G γ̇ − f σ/λ, f' = (1 − f)/λ_s + k (f_∞ − f) σ:D   [Bautista et al. 1999].
 
     [JNNFM 80, 93, eqs. 1 and 2]; f is the fluidity over that at rest, and λ = 1/(G φ_0).
@@ -147,12 +157,7 @@ class Micelles(RateLaw):
     structure_time: float = 2.0  # λ_s, s
     modulus: float = 100.0
     relaxation_time: float = 1.0
-
-    def rest(self) -> np.ndarray:
-        return np.append(1.0, np.zeros(9))
-
-    def scale(self) -> np.ndarray:
-        return np.append(1.0, np.full(9, self.modulus))
+    level = 1.0
 
     def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         fluidity, stress = state[0], state[1:].reshape(3, 3)
@@ -161,9 +166,6 @@ class Micelles(RateLaw):
         grown += self.breaking * (self.largest - fluidity) * work
         own = self.modulus * rate_tensor(rate) + stretched(stress, rate)
         return np.append(grown, own - fluidity * stress / self.relaxation_time)
-
-    def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        return state[1:].reshape(3, 3)
 
 
 class CarreauWhiteMetzner(WhiteMetzner):
@@ -191,8 +193,7 @@ class Thickening(RateLaw):
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         tensor = rate_tensor(rate)
-        size = np.sqrt(np.sum(tensor**2) / 2)
-        return self.viscosity * (1 + size / self.rate) * tensor
+        return self.viscosity * (1 + np.sqrt(np.sum(tensor**2) / 2) / self.rate) * tensor
 
 
 def leonov(a: np.ndarray, gradient: np.ndarray) -> np.ndarray:
@@ -201,6 +202,17 @@ def leonov(a: np.ndarray, gradient: np.ndarray) -> np.ndarray:
     The traces of A and of its inverse are equal in plane flow, so that this is Giesekus with ½.
     """
     return -(a @ a - ONE) / 2
+
+
+def drops(a: np.ndarray, gradient: np.ndarray, affinity: float) -> np.ndarray:
+    """Return −(1 − f)(D·A + A·D) − (A − g I), g = 3 det A/II keeping the volume of an ellipsoid.
+
+    [Maffettone & Minale 1998, J. Non-Newtonian Fluid Mech. 78, 227].
+    """
+    strain = (gradient + gradient.T) / 2
+    second = (np.trace(a) ** 2 - np.trace(a @ a)) / 2
+    slipping = (1 - affinity) * (strain @ a + a @ strain)
+    return -slipping - (a - 3 * np.linalg.det(a) / second * ONE)
 
 
 @dataclass(frozen=True)
@@ -272,17 +284,6 @@ class Acierno(RateLaw):
         return state[:9].reshape(3, 3)
 
 
-def drops(a: np.ndarray, gradient: np.ndarray, affinity: float) -> np.ndarray:
-    """Return −(1 − f)(D·A + A·D) − (A − g I), g = 3 det A/II keeping the volume of an ellipsoid.
-
-    [Maffettone & Minale 1998, J. Non-Newtonian Fluid Mech. 78, 227].
-    """
-    strain = (gradient + gradient.T) / 2
-    second = (np.trace(a) ** 2 - np.trace(a @ a)) / 2
-    slipping = (1 - affinity) * (strain @ a + a @ strain)
-    return -slipping - (a - 3 * np.linalg.det(a) / second * ONE)
-
-
 @dataclass(frozen=True)
 class Damped(KBKZ):
     """σ12 = ∫ m h(γ) γ dt' with a damping function h of its own, otherwise as `KBKZ`."""
@@ -298,16 +299,6 @@ def of_doi_edwards(strain: np.ndarray) -> np.ndarray:
     first = 3 + strain**2
     root = np.sqrt(first + 13 / 4)
     return 5 / (first + 2 * root - 1) * (1 + 1 / root)
-
-
-def of_papanastasiou(strain: np.ndarray) -> np.ndarray:
-    """Return 1/(1 + γ²/6)   [Papanastasiou, Scriven & Macosko 1983, J. Rheol. 27, 387]."""
-    return 1 / (1 + strain**2 / 6)
-
-
-_LOG = np.geomspace(20.0, 0.04, 10)
-BROAD = 60.0 * np.exp(-0.5 * (np.log(_LOG / 0.3) / 2.0) ** 2), _LOG
-"""Moduli and times of a broad spectrum, evenly in log time."""
 
 
 def modes(law: Callable[..., RateLaw], *constants) -> Modes:
