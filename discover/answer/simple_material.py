@@ -50,23 +50,15 @@ Values = Float[np.ndarray, " k"]
 class SimpleMaterial:
     """Material without relaxation, as recognised.
 
-    Attributes
-    ----------
-    kind, title, law
-        What it is, the name for readers, and that in results.
-    constants
-        With 95 % intervals.
-    error
-        Relative misfit of the fitted runs.
-    latex, python
-        Law written out.
+    `kind`, `title`, `law`: what it is, the name for readers, and that in results.
+    `latex`, `python`: law written out.
     """
 
     kind: Kind
     title: str
     law: str
-    constants: tuple[Constant, ...]
-    error: float
+    constants: tuple[Constant, ...]  # with 95 % intervals
+    error: float  # relative misfit of the fitted runs
     latex: str
     python: str
 
@@ -80,10 +72,7 @@ class SimpleMaterial:
 def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
     """Return the simple material that runs show; None where a law that relaxes may be needed.
 
-    Parameters
-    ----------
-    runs
-        Those that are fitted: flow curves, sweeps of both moduli, or shear at a given rate.
+    `runs`: those that are fitted: flow curves, sweeps of both moduli, or shear at a given rate.
     """
     controls = {run.protocol.control for run in runs}
     count = sum(len(run) for run in runs)

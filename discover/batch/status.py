@@ -23,11 +23,10 @@ class LearnerRow:
     """What one learner found in one study.
 
     `terms`: term, coefficient and inner parameters.
-    `errors`: largest relative error of each quantity in flows that no fit saw.
     """
 
     terms: tuple[tuple[str, float, Mapping[str, float]], ...]
-    errors: Mapping[str, float]
+    errors: Mapping[str, float]  # largest relative error of each quantity in flows that no fit saw
 
     @property
     def text(self) -> str:
@@ -43,22 +42,17 @@ class LearnerRow:
 class StudyRow:
     """One study as the tables of a batch show it; everything empty where it failed.
 
-    `learners`: by name.
-    `rivals`: number of laws that its data do not tell from the one found.
-    `undetermined`: quantities that they do not decide.
     `chosen`: terms that each rule for choosing a law takes, by rule.
-    `effects`: effects that a closed loop added.
-    `verdict`: of the closed loop, or of the comparison.
     `error_before`, `error_after`: on its held-out runs, or on the fitted ones where none were held
         out.
     """
 
-    learners: Mapping[str, LearnerRow] = field(default_factory=dict)
-    rivals: int | None = None
-    undetermined: tuple[str, ...] = ()
+    learners: Mapping[str, LearnerRow] = field(default_factory=dict)  # by name
+    rivals: int | None = None  # number of laws that its data do not tell from the one found
+    undetermined: tuple[str, ...] = ()  # quantities that they do not decide
     chosen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    effects: tuple[str, ...] = ()
-    verdict: str = ""
+    effects: tuple[str, ...] = ()  # effects that a closed loop added
+    verdict: str = ""  # of the closed loop, or of the comparison
     error_before: float | None = None
     error_after: float | None = None
 
@@ -144,18 +138,14 @@ class StudyStatus:
     """How one study ended.
 
     `name`, `task`: folder under the batch's, and ``compare`` or ``close-loop``.
-    `status`: ``waiting``, ``done``, ``complete`` (was there already) or ``failed``.
-    `text`: the verdict, or the reason of the failure.
-    `input_error`: whether the failure is the user's to mend.
-    `seconds`: time taken now.
     """
 
     name: str
     task: str
-    status: str
-    text: str
-    input_error: bool = False
-    seconds: float = 0.0
+    status: str  # ``waiting``, ``done``, ``complete`` (was there already) or ``failed``
+    text: str  # the verdict, or the reason of the failure
+    input_error: bool = False  # whether the failure is the user's to mend
+    seconds: float = 0.0  # time taken now
 
     @property
     def outcome(self) -> str:
@@ -165,16 +155,11 @@ class StudyStatus:
 
 @dataclass(frozen=True)
 class BatchResult(NotebookView):
-    """How every study of a batch ended.
+    """How every study of a batch ended."""
 
-    `studies` in the order given.
-    `index`: the summary page.
-    `rows`: what they found, in the same order.
-    """
-
-    studies: tuple[StudyStatus, ...]
-    index: Path = field(repr=False)
-    rows: tuple[StudyRow, ...] = ()
+    studies: tuple[StudyStatus, ...]  # in the order given
+    index: Path = field(repr=False)  # the summary page
+    rows: tuple[StudyRow, ...] = ()  # what they found, in the same order
 
     @property
     def failed(self) -> list[StudyStatus]:

@@ -36,14 +36,12 @@ class TaskResult:
     """Where a task's results lie, and what they say in a few lines.
 
     `report`, `json_file`: the page and the JSON.
-    `text`: the verdict, for a terminal.
-    `was_complete`: whether everything was there already.
     """
 
     report: Path
     json_file: Path
-    text: str
-    was_complete: bool
+    text: str  # the verdict, for a terminal
+    was_complete: bool  # whether everything was there already
 
 
 def _begin(

@@ -39,28 +39,12 @@ def merge_mapping(
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
-    Parameters
-    ----------
-    path
-        The mapping file, if any.
-    columns, units
-        Options of the form ``stress=Shear stress``.
-    geometry
-        Such as ``cone_plate:radius_mm=25,angle_deg=1``.
-    tests
-        Of the form ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``.
-    names
-        File of further names of quantities, as ``names.toml``.
-    temperatures
-        Of the form ``40``, the one to import, or ``melt.txt=40``, that of a file; in °C, or as
-        ``313K``.
-    blocks, start_time_s, layout
-        As in `discover.dataset.importing.Mapping`.
-
-    Raises
-    ------
-    InputError
-        If the file or an option is wrong.
+    `path`: the mapping file, if any. `columns`, `units`: options of the form ``stress=Shear
+    stress``. `geometry`: such as ``cone_plate:radius_mm=25,angle_deg=1``. `tests`: of the form
+    ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``. `names`: file of further names of
+    quantities, as ``names.toml``. `temperatures`: of the form ``40``, the one to import, or
+    ``melt.txt=40``, that of a file; in °C, or as ``313K``. Raises InputError if the file or an
+    option is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, options, example in (
@@ -157,16 +141,9 @@ def write_folder(
 ) -> None:
     """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
 
-    Parameters
-    ----------
-    mapping_file
-        The mapping file that was read, if any; one that stands in the folder is left as it is.
-
-    Raises
-    ------
-    InputError
-        If the folder holds data already and `overwrite` is not set, cannot be written to, or a
-        table would take the place of a file that was read.
+    `mapping_file`: the mapping file that was read, if any; one that stands in the folder is left as
+    it is. Raises InputError if the folder holds data already and `overwrite` is not set, cannot be
+    written to, or a table would take the place of a file that was read.
     """
     for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
         read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]

@@ -23,16 +23,10 @@ _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str]]:
     """Write a page on a data folder and a first study beside it.
 
-    Parameters
-    ----------
-    name
-        The folder, or its name under DISCOVER_DATA.
-    out
-        Folder for both files; made if it is not there.
+    `name`: the folder, or its name under DISCOVER_DATA. `out`: folder for both files; made if it is
+    not there.
 
-    Returns
-    -------
-    The page's path, and what was left as it is since it was there before, in words.
+    Returns the page's path, and what was left as it is since it was there before, in words.
     """
     from discover.dataset.checking.folder import check_folder
     from discover.study.atomic import make_folder

@@ -141,11 +141,6 @@ def _tell_of_folder(study: "Study") -> None:
     """Print a note if a study's data lie outside the folders where one would look.
 
     A study file may come from somebody else; what it reads should surprise nobody.
-
-    Parameters
-    ----------
-    study
-        As read; if its folder does not exist, nothing is said: the command refuses it.
     """
     from discover.errors import InputError
     from discover.study.read import folder_elsewhere

@@ -26,15 +26,8 @@ def absorbed(declared: DeclaredModel) -> DeclaredModel:
 
     What is left among its effects is of the instrument.
 
-    Parameters
-    ----------
-    declared
-        The declared model; its effects of the fluid have values.
-
-    Raises
-    ------
-    InputError
-        If a learner cannot be given an effect as something known.
+    `declared`: the declared model; its effects of the fluid have values. Raises InputError if a
+    learner cannot be given an effect as something known.
     """
     # at zero amplitude an effect is none
     declared = replace(declared, effects=tuple(k for k in declared.effects if k.values[0] != 0.0))

@@ -21,12 +21,8 @@ def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) ->
     whoever listens need not know of threads. If one fails, or the caller is interrupted, the others
     end where they next ask or say something.
 
-    Parameters
-    ----------
-    parts
-        Each takes what it tells of its progress; none may depend on another.
-    progress
-        Called with the name of a part and what it says.
+    `parts`: each takes what it tells of its progress; none may depend on another. `progress`:
+    called with the name of a part and what it says.
     """
     if len(parts) < 2:
         return {name: part(_named(name, progress)) for name, part in parts.items()}

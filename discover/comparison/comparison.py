@@ -39,21 +39,14 @@ _VERDICTS: Mapping[str, FitVerdict] = {
 class SweepPoint:
     """One data set of a sweep over laws and a parameter.
 
-    Attributes
-    ----------
-    law, parameter, value
-        What made the data.
-    flow
-        The test flow.
-    outcomes
-        By learner.
+    `law`, `parameter`, `value`: what made the data.
     """
 
     law: str
     parameter: str
     value: float
-    flow: Flow
-    outcomes: Mapping[str, LearnerOutcome]
+    flow: Flow  # the test flow
+    outcomes: Mapping[str, LearnerOutcome]  # by learner
 
     def errors(self) -> dict[str, dict[str, float | None]]:
         """Return the errors of each learner in the test flow."""

@@ -49,45 +49,27 @@ DRAWN: tuple[FlowKind, ...] = ("training", "held_out", "test")
 class Flow:
     """A flow, when to look at it, and what is known of the stresses.
 
-    Attributes
-    ----------
-    name
-        Name of the run or of the protocol.
-    kind
-        What it is for. Only ``training`` was seen by the learners.
-    protocol
-        The shear rate.
-    times, shear_rate
-        Samples, shape (n,), in s and 1/s.
-    reference
-        The truth where the law is known, the measurement otherwise; not every quantity.
-    measured
-        σ12 that the learners saw, noise included, for training flows.
-    is_truth
-        Whether `reference` is exact and not a measurement.
-    training_end
-        Last time of the training series, beyond which a prediction extrapolates in time; or
-        None.
-    oscillatory
-        Whether Lissajous curves make sense.
-    commanded
-        The protocol before an instrument that is known changed it, for titles; None where none did.
-    weight
-        How much its samples weigh in fits beside those of other runs; see `Run`.
+    `times`, `shear_rate`: samples, shape (n,), in s and 1/s.
+    `reference`: the truth where the law is known, the measurement otherwise; not every quantity.
+    `measured`: σ12 that the learners saw, noise included, for training flows.
+    `training_end`: last time of the training series, beyond which a prediction extrapolates in
+        time; or None.
+    `commanded`: the protocol before an instrument that is known changed it, for titles; None where
+        none did.
     """
 
-    name: str
-    kind: FlowKind
-    protocol: FlowProtocol
+    name: str  # name of the run or of the protocol
+    kind: FlowKind  # what it is for. Only ``training`` was seen by the learners
+    protocol: FlowProtocol  # the shear rate
     times: Float[np.ndarray, " n"]
     rate: Float[np.ndarray, " n"]
     reference: Stresses
     measured: Float[np.ndarray, " n"] | None = None
-    is_truth: bool = False
+    is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
-    oscillatory: bool = False
+    oscillatory: bool = False  # whether Lissajous curves make sense
     commanded: FlowProtocol | None = None
-    weight: float = 1.0
+    weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
 
     @property
     def _imposed(self) -> FlowProtocol:
@@ -213,14 +195,8 @@ def comparison_flows(
 
     All but the first two need a known law.
 
-    Parameters
-    ----------
-    data
-        The data of the study.
-    high_deborah
-        De of the flows γ̇ = 3 cos(De t).
-    pipkin
-        Wi and De of the oscillations over which errors are mapped.
+    `data`: the data of the study. `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi
+    and De of the oscillations over which errors are mapped.
     """
     flows = [run_flow(run, "training", data) for run in data.fit]
     flows += [run_flow(run, "held_out", data) for run in data.held_out]

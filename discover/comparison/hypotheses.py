@@ -39,16 +39,9 @@ def search_hypotheses(
 
     Candidates are every effect with a name, of fluid and instrument, and every library term.
 
-    Parameters
-    ----------
-    data
-        Runs as recorded.
-    declared
-        The known part; what of it is to be fitted is fitted with every hypothesis.
-    library
-        Candidate terms of the study.
-    say
-        Called with a line of text now and then.
+    `data`: runs as recorded. `declared`: the known part; what of it is to be fitted is fitted with
+    every hypothesis. `library`: candidate terms of the study. `say`: called with a line of text now
+    and then.
     """
     dataset = data.dataset
     runs = {run.name: run for run in dataset.runs}
@@ -85,21 +78,15 @@ def search_hypotheses(
 class Proposed:
     """What a learner proposed, as a hypothesis fitted with all that is free.
 
-    Attributes
-    ----------
-    terms
-        Its terms with coefficients and intervals of that fit; as the learner had them where the
-        hypothesis cannot be fitted.
-    share
-        Posterior probability of the hypothesis among all that were fitted, were one of them all
-        there is; zero where it was not fitted.
-    fit
-        The hypothesis; None where a term is none that the engine knows.
+    `terms`: its terms with coefficients and intervals of that fit; as the learner had them where
+        the hypothesis cannot be fitted.
+    `share`: posterior probability of the hypothesis among all that were fitted, were one of them
+        all there is; zero where it was not fitted.
     """
 
     terms: tuple[RecoveredTerm, ...]
     share: float = 0.0
-    fit: Fit | None = None
+    fit: Fit | None = None  # the hypothesis; None where a term is none that the engine knows
 
 
 def with_proposals(
@@ -109,10 +96,7 @@ def with_proposals(
 
     A learner's terms stand beside what the likeliest hypothesis holds of the instrument.
 
-    Parameters
-    ----------
-    terms
-        By learner.
+    `terms`: by learner.
     """
     search, problem = found.posterior.search, found.posterior.problem
     alive = search.alive()

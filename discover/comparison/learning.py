@@ -22,19 +22,12 @@ from discover.study.schema import Study
 class Learning:
     """Where learners are trained, or found again.
 
-    Attributes
-    ----------
-    study
-        Which learners, and with what options.
-    store
-        Where finished learners are kept and found again.
-    made
-        Learners that are fitted already: what they found, by learner.
+    `made`: learners that are fitted already: what they found, by learner.
     """
 
-    study: Study
+    study: Study  # which learners, and with what options
     seed: int
-    store: RunFolder | None = None
+    store: RunFolder | None = None  # where finished learners are kept and found again
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
 
     def outcomes(
@@ -65,14 +58,9 @@ class Learning:
     ) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works.
 
-        Parameters
-        ----------
-        frame
-            The known part, the runs to learn from and the flows of the page.
-        progress
-            Called with what is going on and the fraction done.
-        part
-            Of a sweep, the name under which it is kept; its outcomes are looked at in one flow.
+        `frame`: the known part, the runs to learn from and the flows of the page. `progress`:
+        called with what is going on and the fraction done. `part`: of a sweep, the name under which
+        it is kept; its outcomes are looked at in one flow.
         """
         store, made, flows = self.store, self.made, frame.flows
         name = part or learner

@@ -21,35 +21,21 @@ Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 class LearnerOutcome(TermTables):
     """A learner's result with its predictions in every flow of the comparison.
 
-    Attributes
-    ----------
-    learner
-        Name of the learner.
-    terms
-        The law term by term.
-    train_seconds
-        Wall-clock time of the fit.
-    loss_history
-        Iterations and losses, both of shape (m,).
-    details
-        What else the learner says; JSON-able.
-    message
-        One sentence on how the fit ended.
-    predictions
-        By the key of the flow; None where the law runs away.
-    physics
-        Checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
-    bands
-        By the key of the flow: lowest and highest prediction of each quantity over the members of
-        an ensemble. None for a flow in which one of them runs away; empty where there is one law.
+    `loss_history`: iterations and losses, both of shape (m,).
+    `details`: what else the learner says; JSON-able.
+    `predictions`: by the key of the flow; None where the law runs away.
+    `physics`: checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
+    `bands`: by the key of the flow: lowest and highest prediction of each quantity over the members
+        of an ensemble. None for a flow in which one of them runs away; empty where there is one
+        law.
     """
 
-    learner: str
-    terms: tuple[RecoveredTerm, ...]
-    train_seconds: float
+    learner: str  # name of the learner
+    terms: tuple[RecoveredTerm, ...]  # the law term by term
+    train_seconds: float  # wall-clock time of the fit
     loss_history: tuple[Real[np.ndarray, " m"], Real[np.ndarray, " m"]]
     details: Mapping[str, Any] = field(default_factory=dict)
-    message: str = ""
+    message: str = ""  # one sentence on how the fit ended
     predictions: Mapping[str, Stresses | None] = field(default_factory=dict)
     physics: Mapping[str, Any] | None = None
     bands: Mapping[str, Limits | None] = field(default_factory=dict)

@@ -21,24 +21,16 @@ _NUMBERS = {"shear rate": "shear rate (Wi)", "frequency": "frequency (De)"}
 class Placement:
     """Where a flow lies against the fitted ones.
 
-    Attributes
-    ----------
-    rate, strain
-        Largest shear rate and strain over the largest fitted ones.
-    frequency
-        Angular frequency over the largest fitted one; None where one of the two does not
+    `rate`, `strain`: largest shear rate and strain over the largest fitted ones.
+    `frequency`: angular frequency over the largest fitted one; None where one of the two does not
         oscillate, for a step of the rate excites every frequency.
-    new_flow
-        Which flow it is, where no fitted one is of that kind; empty otherwise.
-    rate_name
-        What the rate is called in this flow.
     """
 
     rate: float
     strain: float
     frequency: float | None
-    new_flow: str = ""
-    rate_name: str = "shear rate"
+    new_flow: str = ""  # which flow it is, where no fitted one is of that kind; empty otherwise
+    rate_name: str = "shear rate"  # what the rate is called in this flow
 
     @property
     def inside(self) -> bool:

@@ -25,14 +25,8 @@ def prepared(data: StudyData) -> StudyData:
 def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
     """Return data in which what starts periodic has the cycles before it that learners wait for.
 
-    Parameters
-    ----------
-    data
-        Of a study, split.
-    relaxation_time
-        The longest, in s.
-    relaxes
-        Whether the known law relaxes, so that a periodic state is solved for.
+    `data`: of a study, split. `relaxation_time`: the longest, in s. `relaxes`: whether the known
+    law relaxes, so that a periodic state is solved for.
     """
     return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
 

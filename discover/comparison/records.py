@@ -33,10 +33,7 @@ _FEWEST_ENTRIES = 64
 class InRecord:
     """What an instrument makes of the stress of one run: recorded = gain · stress + offset.
 
-    Attributes
-    ----------
-    gain, offset
-        At the samples; a pure number, and in Pa.
+    `gain`, `offset`: at the samples; a pure number, and in Pa.
     """
 
     gain: Float[np.ndarray, " n"]
@@ -58,22 +55,11 @@ def corrected(
 
     Runs in extension, which another instrument makes, stay as they are.
 
-    Parameters
-    ----------
-    data
-        As recorded.
-    effects
-        Of the instrument, with their values.
+    `data`: as recorded. `effects`: of the instrument, with their values.
 
-    Returns
-    -------
-    The corrected data, and by name of the run what the instrument makes of its stress.
-
-    Raises
-    ------
-    InputError
-        If an effect acts on a measured rate that contains it, or has a memory of the stress; or if
-        a run is not at a given rate in time.
+    Returns the corrected data, and by name of the run what the instrument makes of its stress.
+    Raises InputError if an effect acts on a measured rate that contains it, or has a memory of the
+    stress; or if a run is not at a given rate in time.
     """
     runs = list(data.dataset.runs)
     for known in effects:

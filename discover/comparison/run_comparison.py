@@ -68,27 +68,12 @@ def compare(
     values of its likeliest hypothesis, and what that holds of the instrument is taken out of the
     records, so that learners learn the fluid. Then each learner's law is a hypothesis too.
 
-    Parameters
-    ----------
-    study
-        The study.
-    seed
-        Overrides the study's seeds, of the noise and of the learners.
-    progress
-        Called with what is going on and the fraction done.
-    store
-        Where finished learners are kept and found again.
-    data, declared
-        Data and known part that are at hand, in place of the study's.
-    made
-        Learners that are fitted already: what they found, by learner.
-    library
-        The terms that they searched, in place of the study's.
-
-    Raises
-    ------
-    InputError
-        If the study asks for something that its data cannot give.
+    `study`: the study. `seed`: overrides the study's seeds, of the noise and of the learners.
+    `progress`: called with what is going on and the fraction done. `store`: where finished learners
+    are kept and found again. `data`, `declared`: data and known part that are at hand, in place of
+    the study's. `made`: learners that are fitted already: what they found, by learner. `library`:
+    the terms that they searched, in place of the study's. Raises InputError if the study asks for
+    something that its data cannot give.
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)

@@ -39,21 +39,12 @@ _TITLES = {"sigma12": "σ12"}
 class Statement:
     """What the data say of a quantity.
 
-    Attributes
-    ----------
-    quantity
-        One of `QUANTITIES`.
-    determined
-        On which condition the data decide it.
-    text
-        The reason, for a reader.
-    of_transients
-        Whether it is about transients alone, and not about steady and periodic states.
+    `of_transients`: whether it is about transients alone, and not about steady and periodic states.
     """
 
-    quantity: str
-    determined: Determined
-    text: str
+    quantity: str  # one of `QUANTITIES`
+    determined: Determined  # on which condition the data decide it
+    text: str  # the reason, for a reader
     of_transients: bool = False
 
     @property
@@ -95,20 +86,10 @@ def make_statements(
 ) -> list[Statement]:
     """Return what the training data say of N1 and N2, with the reason.
 
-    Parameters
-    ----------
-    verdict
-        Of the comparison.
-    bands
-        By the key of the flow.
-    structure
-        What σ12 could say of the library at the law found.
-    spread
-        Relative difference of N1 and N2 between laws that describe the runs as well, where known.
-    normal_stresses_used
-        Whether measured normal stresses were part of the fit.
-    terms
-        Of the law found.
+    `verdict`: of the comparison. `bands`: by the key of the flow. `structure`: what σ12 could say
+    of the library at the law found. `spread`: relative difference of N1 and N2 between laws that
+    describe the runs as well, where known. `normal_stresses_used`: whether measured normal stresses
+    were part of the fit. `terms`: of the law found.
     """
     asked = [q for q in _NORMAL_STRESSES if not (normal_stresses_used and _is_measured(q, flows))]
     if verdict == "no_signal":

@@ -52,19 +52,10 @@ def sweep_points(
 ) -> list[SweepPoint]:
     """Return what each learner of a study finds at each point of its sweep.
 
-    Parameters
-    ----------
-    asked
-        The points, as `sweep_studies` returns them.
-    learning
-        Where learners are trained, of the study whose sweep it is.
-    model
-        The known part.
-    seed
-        Overrides the study's seed of the noise.
-    step
-        Returns what is called with what is going on, of the number of learners that are done and a
-        title.
+    `asked`: the points, as `sweep_studies` returns them. `learning`: where learners are trained, of
+    the study whose sweep it is. `model`: the known part. `seed`: overrides the study's seed of the
+    noise. `step`: returns what is called with what is going on, of the number of learners that are
+    done and a title.
     """
     options, points = learning.study.compare, []
     for i, (law, value, other) in enumerate(asked):

@@ -24,19 +24,10 @@ def train(
 ) -> tuple[LearnerResult, Fluid]:
     """Return what one learner finds in these runs, and the fluid that it makes.
 
-    Parameters
-    ----------
-    learner
-        ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name.
-    study
-        The study, for the learner's settings.
-    model
-        The known part.
-    progress
-        Called as it goes.
-    searched_library
-        The candidate terms of sparse regression and of registered learners, in place of the
-        study's.
+    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `study`: the study,
+    for the learner's settings. `model`: the known part. `progress`: called as it goes.
+    `searched_library`: the candidate terms of sparse regression and of registered learners, in
+    place of the study's.
     """
     options = study.compare
     plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)

@@ -13,17 +13,8 @@ def true_terms(
 ) -> tuple[LawTerm, ...] | None:
     """Return what is missing from UCM in a named law; None if it is no sum of library terms.
 
-    Parameters
-    ----------
-    law, parameters
-        As in `discover.laws.make_law`.
-    known_relaxation
-        Whether −σ is known. If not, it is missing too.
-
-    Raises
-    ------
-    InputError
-        If there is no such law, or a parameter is missing or outside its range.
+    `known_relaxation`: whether −σ is known. If not, it is missing too. Raises InputError if there
+    is no such law, or a parameter is missing or outside its range.
     """
     known = make_law(law, parameters)
     try:

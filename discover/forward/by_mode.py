@@ -19,16 +19,10 @@ def decades(
 ) -> Float[Array, " m"]:
     """Return log10(λ/λ̄), with λ̄ the geometric mean of the times by viscosity.
 
-    Parameters
-    ----------
-    modulus, relaxation_time
-        Of the declared modes, in Pa and s.
-    of
-        Times in s; by default the declared ones. Beyond these the end counts, for a polynomial says
-        nothing there.
-    beyond
-        Whether times beyond the declared ones count as they are: of modes by which a polynomial is
-        told, too.
+    `modulus`, `relaxation_time`: of the declared modes, in Pa and s. `of`: times in s; by default
+    the declared ones. Beyond these the end counts, for a polynomial says nothing there. `beyond`:
+    whether times beyond the declared ones count as they are: of modes by which a polynomial is
+    told, too.
     """
     own = jnp.log10(relaxation_time)
     viscosity = modulus * relaxation_time
@@ -52,18 +46,9 @@ def constants_of_modes(
     so every mode keeps the range in which the law is one, whatever the coefficients. With all of
     them zero each mode has the very constant of the mean.
 
-    Parameters
-    ----------
-    mean
-        The constant at λ̄, dimensionless.
-    low, high
-        Its range.
-    coefficients
-        Of the first and the second power of `places`.
-    deviations
-        Of each mode from the polynomial.
-    places
-        Of the modes, from `decades`.
+    `mean`: the constant at λ̄, dimensionless. `low`, `high`: its range. `coefficients`: of the
+    first and the second power of `places`. `deviations`: of each mode from the polynomial.
+    `places`: of the modes, from `decades`.
     """
     powers = jnp.stack([places ** (i + 1) for i in range(DEGREE)])
     change = coefficients @ powers + deviations

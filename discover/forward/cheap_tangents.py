@@ -22,12 +22,8 @@ def with_cheap_tangents(
     Four pullbacks give the derivative by stress, rate and every number of the law at once; each
     tangent is then a product with a small matrix, where one through the law evaluates all of it.
 
-    Parameters
-    ----------
-    stress_rate
-        Of what is given, of a tree of numbers by which is differentiated, of σ and of λL.
-    given
-        A tree through which no derivative passes.
+    `stress_rate`: of what is given, of a tree of numbers by which is differentiated, of σ and of
+    λL. `given`: a tree through which no derivative passes.
     """
     # what is traced has to be handed in: a rule for derivatives must not close over it
     arrays, rest = eqx.partition(given, eqx.is_array)

@@ -29,58 +29,39 @@ class FreeParameter:
 class DeclaredModel:
     """A law, its modes, and which of them are still to be fitted.
 
-    Attributes
-    ----------
-    law
-        The law of every mode, with starting values where parameters are free.
-    modulus
-        G_k in Pa, shape (k,).
-    relaxation_time
-        λ_k in s, shape (k,).
-    solvent_viscosity
-        In Pa s.
-    fit_modulus, fit_relaxation_time
-        Whether one common factor on all moduli, or on all times, is fitted.
-    law_name, parameters
-        Name and parameters of a named law; needed only if some are free.
-    free_parameters
-        Parameters of the law to fit.
-    linear_error
-        Relative error with which the modes describe the linear data they come from; no prediction
-        can be expected to do better.
-    linear_pattern
-        Relative size of what in that error is no noise of the linear data; 0 where all may be, None
-        where no number of modes follows them.
-    modulus_covariance
-        Of the moduli in Pa², shape (k, k), as those data leave them, and of the solvent behind
-        them, shape (k + 1, k + 1), where it comes from them; None where they are exact.
-    effects
-        What is known beside the law: effects of fluid and instrument, with values or to be fitted.
-    step_instants
-        How many instants of steps of the rate in the fitted runs are fitted; `Run.rate_steps` say
-        which is whose.
-    by_mode
-        Free parameters of the law, and effects by the amplitude of their term, that may differ from
-        mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
-    added_modes
-        How many modes beside the declared ones, which effects add, have constants by mode of their
-        own; without, these have the constants of the declared spectrum at their times.
+    `law`: the law of every mode, with starting values where parameters are free.
+    `fit_modulus`, `fit_relaxation_time`: whether one common factor on all moduli, or on all times,
+        is fitted.
+    `law_name`, `parameters`: name and parameters of a named law; needed only if some are free.
+    `linear_error`: relative error with which the modes describe the linear data they come from; no
+        prediction can be expected to do better.
+    `linear_pattern`: relative size of what in that error is no noise of the linear data; 0 where
+        all may be, None where no number of modes follows them.
+    `modulus_covariance`: of the moduli in Pa², shape (k, k), as those data leave them, and of the
+        solvent behind them, shape (k + 1, k + 1), where it comes from them; None where they are
+        exact.
+    `effects`: what is known beside the law: effects of fluid and instrument, with values or to be
+        fitted.
+    `step_instants`: how many instants of steps of the rate in the fitted runs are fitted;
+        `Run.rate_steps` say which is whose.
+    `by_mode`: free parameters of the law, and effects by the amplitude of their term, that may
+        differ from mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
+    `added_modes`: how many modes beside the declared ones, which effects add, have constants by
+        mode of their own; without, these have the constants of the declared spectrum at their
+        times.
 
-    Raises
-    ------
-    InputError
-        If modes are none, or a constant by mode cannot be one, or has one mode alone.
+    Raises InputError if modes are none, or a constant by mode cannot be one, or has one mode alone.
     """
 
     law: AbstractConstitutiveLaw
-    modulus: Float[np.ndarray, " k"]
-    relaxation_time: Float[np.ndarray, " k"]
-    solvent_viscosity: float = 0.0
+    modulus: Float[np.ndarray, " k"]  # G_k in Pa, shape (k,)
+    relaxation_time: Float[np.ndarray, " k"]  # λ_k in s, shape (k,)
+    solvent_viscosity: float = 0.0  # in Pa s
     fit_modulus: bool = False
     fit_relaxation_time: bool = False
     law_name: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
-    free_parameters: tuple[FreeParameter, ...] = ()
+    free_parameters: tuple[FreeParameter, ...] = ()  # parameters of the law to fit
     linear_error: float = 0.0
     linear_pattern: float | None = 0.0
     effects: tuple[KnownEffect, ...] = ()
@@ -157,16 +138,8 @@ class DeclaredModel:
     ) -> "DeclaredModel":
         """Return a named law with these modes.
 
-        Parameters
-        ----------
-        law_name, parameters
-            As in `discover.laws.make_law`; starting values for those that are free.
-        modulus, relaxation_time
-            In Pa and s, one or several.
-        free
-            What to fit: parameters of the law, ``modulus_Pa``, ``relaxation_time_s``.
-        **options
-            Other attributes.
+        `modulus`, `relaxation_time` in Pa and s, one or several. `free`: what to fit: parameters of
+        the law, ``modulus_Pa``, ``relaxation_time_s``. `**options`: other attributes.
         """
         law = make_law(law_name, parameters)
         ranges = LAWS[law_name].parameters

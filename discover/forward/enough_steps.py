@@ -20,12 +20,7 @@ def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
     The length of steps is chosen by the flow, which is what all else in a law follows. Of a law
     that does not retract they are returned as they are.
 
-    Parameters
-    ----------
-    fluid
-        The fluid; where it runs away steps stay as they are.
-    flows
-        From `lay_out`.
+    `fluid`: the fluid; where it runs away steps stay as they are. `flows`: from `lay_out`.
     """
     followed = all(protocols.control in FOLLOWED for protocols, _ in flows.parts)
     if not fluid.law.retracts or not followed:

@@ -37,20 +37,15 @@ _GROUP = 8
 class AtSamples(NamedTuple):
     """What is seen of a fluid at the samples.
 
-    Attributes
-    ----------
-    observed
-        What is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of which a
-        run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are zero.
-    states
-        Dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
-    rate
-        In 1/s, shape (n,); of an oscillation its amplitude.
+    `observed`: what is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of
+        which a run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are
+        zero.
+    `states`: dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
     """
 
     observed: Inexact[Array, "n 3"]
     states: Float[Array, "n k s"]
-    rate: Float[Array, " n"]
+    rate: Float[Array, " n"]  # in 1/s, shape (n,); of an oscillation its amplitude
 
 
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
@@ -84,17 +79,10 @@ def solve_on_grid(
 ) -> Float[Array, "n 4"]:
     """Return the stresses at a given rate at the samples of one grid.
 
-    Parameters
-    ----------
-    fluid, protocol, grid
-        As in `follow`.
-    adjoint
-        How diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``. None
-        is for values and forward mode: the same steps, traced and compiled in a third of the time.
+    `adjoint`: how diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``.
+    None is for values and forward mode: the same steps, traced and compiled in a third of the time.
 
-    Returns
-    -------
-    σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
+    Returns σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
     if adjoint is None or protocol.control == "steady":
         return _at_given_rate(fluid, protocol, grid, lambda s, rate: fluid.stress(s.T, rate))
@@ -135,16 +123,9 @@ def solved_on_grid(
 ) -> AtSamples:
     """Return what is seen where the rate is solved for: at a given stress, and of oscillations.
 
-    Parameters
-    ----------
-    make
-        The fluid of some numbers; derivatives pass through these alone.
-    numbers
-        A tree.
-    protocol, grid
-        Of one run, from `lay_out`.
-    together
-        Whether the samples are of use only together, and not one is solved for once another cannot.
+    `make`: the fluid of some numbers; derivatives pass through these alone. `numbers`: a tree.
+    `protocol`, `grid`: of one run, from `lay_out`. `together`: whether the samples are of use only
+    together, and not one is solved for once another cannot.
     """
     dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":

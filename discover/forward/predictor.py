@@ -55,12 +55,8 @@ no padding."""
 class Predictor:
     """Predictions of a declared model with effects, part by part of a batch.
 
-    Parameters
-    ----------
-    declared
-        The declared model.
-    program, of_every_effect
-        What is compiled of it: of the effects that there are, and of all that there may be.
+    `declared`: the declared model. `program`, `of_every_effect`: what is compiled of it: of the
+    effects that there are, and of all that there may be.
     """
 
     def __init__(
@@ -105,11 +101,8 @@ class Predictor:
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records that a part of a batch holds, in the order of its rows.
 
-        Parameters
-        ----------
-        normal
-            Whether N1 and N2 are to stand behind what is recorded: not a number where a test has
-            none.
+        `normal`: whether N1 and N2 are to stand behind what is recorded: not a number where a test
+        has none.
         """
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):

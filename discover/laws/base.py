@@ -151,12 +151,9 @@ class AbstractConstitutiveLaw(eqx.Module):
 
 
 class AbstractExtendedLaw(AbstractConstitutiveLaw):
-    """A law that adds to h of another, whose states it carries along.
+    """A law that adds to h of another, whose states it carries along."""
 
-    `base`: the other law, or None.
-    """
-
-    base: eqx.AbstractVar[AbstractConstitutiveLaw | None]
+    base: eqx.AbstractVar[AbstractConstitutiveLaw | None]  # the other law, or None
 
     @property
     def variables(self) -> int:

@@ -11,12 +11,10 @@ from tensor_library.isotropic_function import IsotropicFunction
 class NamedLaw:
     """A law that can be asked for by name.
 
-    `title`: name as a rheologist writes it.
     `build`: makes the law from its parameters, in the order of `parameters`.
     `parameters`: name and physical range of each parameter; laws are dimensionless, and so are
         these.
     `range_sources`: where each range comes from: literature, or the argument in a sentence.
-    `source`: literature on the law.
     `written`: returns h with its constants as letters, by the names of `parameters`, so that the
         law can be written out; None where nobody said.
     `is_one_mode`: whether at small strain the law is one Maxwell mode. One that is not brings a
@@ -26,11 +24,11 @@ class NamedLaw:
         values and the others as those of the law of that name.
     """
 
-    title: str
+    title: str  # name as a rheologist writes it
     build: Callable[..., AbstractConstitutiveLaw]
     parameters: Mapping[str, tuple[float, float]]
     range_sources: Mapping[str, str] = field(default_factory=dict)
-    source: str = ""
+    source: str = ""  # literature on the law
     written: Callable[[], IsotropicFunction] | None = None
     is_one_mode: bool = True
     contains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

@@ -16,14 +16,12 @@ from tensor_library.algebra import Symmetric
 class LawOfFunction(AbstractConstitutiveLaw):
     """A law with h(σ, γ̇) as a function.
 
-    `values`: of the parameters, in the order of `names`.
     `function`: h of stress, rate and the parameters by name.
-    `names`: names of the parameters.
     """
 
-    values: tuple[Float[Array, ""], ...]
+    values: tuple[Float[Array, ""], ...]  # of the parameters, in the order of `names`
     function: Callable[..., Symmetric] = eqx.field(static=True)
-    names: tuple[str, ...] = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)  # names of the parameters
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
     def extra_term(self, stress: State, rate: Symmetric) -> Any:  # a user's, checked by its shape

@@ -22,16 +22,9 @@ def laid_out(
 ) -> tuple[FlowBatch, Records]:
     """Return runs and their grids, and what was recorded in them.
 
-    Parameters
-    ----------
-    runs
-        As `as_runs` returns them.
-    known
-        The known part, whose steps the grids follow.
-    mean
-        Whether each run counts alike, or each value.
-    **limits
-        Of steps, as `make_grids` takes them.
+    `runs`: as `as_runs` returns them. `known`: the known part, whose steps the grids follow.
+    `mean`: whether each run counts alike, or each value. `**limits`: of steps, as `make_grids`
+    takes them.
     """
     n = max(map(len, runs))
     flows = lay_out(

@@ -67,17 +67,8 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
         """Find the law of these runs.
 
-        Parameters
-        ----------
-        X
-            Runs (`Run`), or a data set.
-        y
-            Ignored: the observations are part of the runs.
-
-        Raises
-        ------
-        InputError
-            If a parameter or a run is unusable.
+        `X`: runs (`Run`), or a data set. `y`: ignored: the observations are part of the runs.
+        Raises InputError if a parameter or a run is unusable.
         """
         del y
         check_settings(self.get_params(deep=False))

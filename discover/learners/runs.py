@@ -16,22 +16,11 @@ from discover.protocols import settled
 def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool = True) -> list[Run]:
     """Return the runs as a list, each as `as_compared` has it.
 
-    Parameters
-    ----------
-    runs
-        A data set, or runs.
-    relaxation_time
-        Of the modes, in s.
-    relaxes
-        Whether the fluid is known to relax: the state of a run that starts periodic is then solved
-        for. If not, or at a given stress, it gets as many cycles before it as the slowest mode
-        needs.
-
-    Raises
-    ------
-    InputError
-        If there is none, one is something else, a mode is too slow to be waited for, or JAX
-        computes in single precision.
+    `runs`: a data set, or runs. `relaxation_time`: of the modes, in s. `relaxes`: whether the fluid
+    is known to relax: the state of a run that starts periodic is then solved for. If not, or at a
+    given stress, it gets as many cycles before it as the slowest mode needs. Raises InputError if
+    there is none, one is something else, a mode is too slow to be waited for, or JAX computes in
+    single precision.
     """
     require_double()
     if isinstance(runs, Run):

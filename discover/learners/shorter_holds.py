@@ -49,16 +49,9 @@ def shorter_where_it_pays(
 ) -> tuple[Sequence[Run], _Problem]:
     """Return runs with shorter holds and their problem where that saves half the steps or more.
 
-    Parameters
-    ----------
-    runs, problem
-        Whole runs, and a learner's problem of them.
-    make
-        Returns the problem of other runs.
-    relaxation_time
-        Of the modes, in s.
-    affordable
-        Modes times steps of all runs up to which runs are followed whole.
+    `runs`, `problem`: whole runs, and a learner's problem of them. `make`: returns the problem of
+    other runs. `relaxation_time`: of the modes, in s. `affordable`: modes times steps of all runs
+    up to which runs are followed whole.
     """
     times = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
     if times.size * problem.flows.n_steps <= affordable:
@@ -79,14 +72,9 @@ def shortened_rightly(
 ) -> str:
     """Return what was passed over to save time, and what that changes; empty if that is too much.
 
-    Parameters
-    ----------
-    whole, shorter
-        Problems of the whole and of the shortened runs.
-    recorded
-        What is recorded of the law found in each whole run, and in each shortened one.
-    misfit
-        What the law leaves, relative to the records.
+    `whole`, `shorter`: problems of the whole and of the shortened runs. `recorded`: what is
+    recorded of the law found in each whole run, and in each shortened one. `misfit`: what the law
+    leaves, relative to the records.
     """
     off = float(
         np.max(
@@ -110,12 +98,7 @@ def with_shorter_holds(runs: Sequence[Run], relaxation_time: float) -> list[Run]
     Samples keep their stress and their place in the order; those after a long hold come earlier. A
     run without such a hold, or in which something oscillates, is returned as it is.
 
-    Parameters
-    ----------
-    runs
-        Runs as a learner takes them.
-    relaxation_time
-        The longest, in s.
+    `runs`: runs as a learner takes them. `relaxation_time`: the longest, in s.
     """
     return [_shortened(run, SETTLED * relaxation_time) for run in runs]
 

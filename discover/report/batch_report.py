@@ -15,12 +15,8 @@ _COMPARED = ("sigma12", "N1", "N2")
 def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
     """Return the page over a batch.
 
-    Parameters
-    ----------
-    studies
-        How each study ended, `discover.batch.status.StudyStatus`.
-    rows
-        What each found, `discover.batch.status.StudyRow`, in the same order.
+    `studies`: how each study ended, `discover.batch.status.StudyStatus`. `rows`: what each found,
+    `discover.batch.status.StudyRow`, in the same order.
     """
     learners = list(dict.fromkeys(name for row in rows for name in row.learners))
     rules = list(dict.fromkeys(rule for row in rows for rule in row.chosen))

@@ -28,14 +28,8 @@ _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysin
 def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: str) -> dict:
     """Return what a page says of the run that made it; every table links to it.
 
-    Parameters
-    ----------
-    fingerprint
-        Of the study, its data and the version of this software.
-    command
-        What makes it again.
-    files
-        Written beside the page.
+    `fingerprint`: of the study, its data and the version of this software. `command`: what makes it
+    again. `files`: written beside the page.
     """
     packages = [f"Python {platform.python_version()}"]
     for name in _CALCULATES:
@@ -67,15 +61,9 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     Everything is escaped except pictures and mathematics that this package wrote itself.
 
-    Parameters
-    ----------
-    template
-        File in ``templates``.
-    data
-        Text of files that each picture links to, by name. The page carries those that are not too
-        long, so that it hands them out where it stands alone; the others lie beside it.
-    content
-        Its variables.
+    `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
+    The page carries those that are not too long, so that it hands them out where it stands alone;
+    the others lie beside it. `content`: its variables.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (

@@ -13,18 +13,10 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class Missing:
-    """A part of a page that could not be drawn.
+    """A part of a page that could not be drawn."""
 
-    Attributes
-    ----------
-    title
-        The part, as the subject of a sentence.
-    reason
-        What went wrong.
-    """
-
-    title: str
-    reason: str
+    title: str  # the part, as the subject of a sentence
+    reason: str  # what went wrong
 
     @property
     def sentence(self) -> str:
@@ -39,12 +31,7 @@ def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
     fault of one picture or table is worth the rest of the page. The logger of this module has the
     traceback, at level debug.
 
-    Parameters
-    ----------
-    title
-        The part, as the subject of a sentence.
-    draw
-        Makes it.
+    `title`: the part, as the subject of a sentence. `draw`: makes it.
     """
     try:
         return draw()

@@ -44,22 +44,17 @@ class LackOfFit:
 
     `verdict`: ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if
         the records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
-    `misfit`: root-mean-square residual over rms measurement, mean over runs.
-    `noise`: relative noise of the records, mean over runs.
-    `lag_one_correlation`: of neighbouring residuals, mean over runs.
     `probability`: of residuals as structured as these, if they are noise; None where all runs
         together are too short to look for a pattern.
-    `outliers`: number of samples that are far outside the noise and do not vote.
-    `reason`: the verdict in one sentence.
     """
 
     verdict: FitVerdict
-    misfit: float
-    noise: float
-    lag_one_correlation: float
+    misfit: float  # root-mean-square residual over rms measurement, mean over runs
+    noise: float  # relative noise of the records, mean over runs
+    lag_one_correlation: float  # of neighbouring residuals, mean over runs
     probability: float | None
-    outliers: int = 0
-    reason: str = ""
+    outliers: int = 0  # number of samples that are far outside the noise and do not vote
+    reason: str = ""  # the verdict in one sentence
 
     @property
     def described(self) -> str:

@@ -21,13 +21,12 @@ class StudyData:
     """The data of a study, split.
 
     `fit`, `held_out`: runs that fits may see, and runs that only judge.
-    `each`: whether every fitted run is also to be held out in turn.
     """
 
     dataset: Dataset
     fit: Dataset
     held_out: Dataset
-    each: bool = False
+    each: bool = False  # whether every fitted run is also to be held out in turn
 
     @property
     def truth(self) -> Fluid | None:

@@ -16,18 +16,11 @@ from discover.protocols.protocol import shear_rates
 class StressFlows(eqx.Module):
     """Runs at a given stress on padded grids, with a leading axis of runs.
 
-    Attributes
-    ----------
-    times
-        Step ends, shape (runs, s), in s.
-    imposed
-        Recorded stress there, in Pa.
-    sample_index, clock_factor, kinematics
-        As in `TransientFlows`.
+    `sample_index`, `clock_factor`, `kinematics`: as in `TransientFlows`.
     """
 
-    times: Float[Array, "runs s"]
-    imposed: Float[Array, "runs s"]
+    times: Float[Array, "runs s"]  # step ends, shape (runs, s), in s
+    imposed: Float[Array, "runs s"]  # recorded stress there, in Pa
     sample_index: Array
     clock_factor: Float[Array, " runs"]
     kinematics: Kinematics | None = None

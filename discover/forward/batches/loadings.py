@@ -40,18 +40,12 @@ Values = TypeVar("Values", Array, np.ndarray)
 class Loadings(eqx.Module):
     """Which rows of records share a loading, and how much their factors may differ.
 
-    Attributes
-    ----------
-    members
-        Whether a row is a record of a loading, shape (loadings, rows).
-    deviation
-        Standard deviation of the factors.
-    noise
-        Standard deviation of the weighted residuals of each row that is noise, shape (rows,).
+    `members`: whether a row is a record of a loading, shape (loadings, rows).
+    `noise`: standard deviation of the weighted residuals of each row that is noise, shape (rows,).
     """
 
     members: Bool[Array | np.ndarray, "loadings rows"]
-    deviation: Float[Array | np.ndarray, ""]
+    deviation: Float[Array | np.ndarray, ""]  # standard deviation of the factors
     noise: Float[Array | np.ndarray, " rows"]
 
     @property
@@ -71,10 +65,8 @@ class Loadings(eqx.Module):
     ) -> Float[Values, "*trials rows n"]:
         """Return weighted residuals with factors of their own, which the prior holds back.
 
-        Parameters
-        ----------
-        residual, predicted
-            Predictions minus records, and predictions, both weighted; arrays of NumPy or JAX.
+        `residual`, `predicted`: predictions minus records, and predictions, both weighted; arrays
+        of NumPy or JAX.
         """
         along, size = self._along(residual, predicted)
         with np.errstate(all="ignore"):  # a trial that ran away
@@ -120,13 +112,8 @@ def loadings(runs: Sequence[Run], unit: Float[np.ndarray, " runs"]) -> Loadings 
 
     What else was recorded of a run, and both moduli of a sweep, share its loading.
 
-    Parameters
-    ----------
-    runs
-        Of each record one.
-    unit
-        The norm of the weighted residuals of one that misses by all of its size, over the root of
-        the number of its samples, shape (runs,).
+    `runs`: of each record one. `unit`: the norm of the weighted residuals of one that misses by all
+    of its size, over the root of the number of its samples, shape (runs,).
     """
     deviations = {run.loading.deviation for run in runs if run.loading is not None}
     if not deviations:

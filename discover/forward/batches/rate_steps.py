@@ -17,21 +17,14 @@ _NEVER = -1.0
 class RateSteps(eqx.Module):
     """Steps of the rate between two samples, with a leading axis of runs.
 
-    Attributes
-    ----------
-    start, end
-        Times of the samples in s; padding lies before any record.
-    change
-        Of the rate in 1/s.
-    share
-        Of the interval at whose end the rate steps, where that is not fitted.
-    place
-        Which of the fitted shares is its own; −1 where it is not fitted.
+    `start`, `end`: times of the samples in s; padding lies before any record.
+    `share`: of the interval at whose end the rate steps, where that is not fitted.
+    `place`: which of the fitted shares is its own; −1 where it is not fitted.
     """
 
     start: Float[Array, "*runs steps"]
     end: Float[Array, "*runs steps"]
-    change: Float[Array, "*runs steps"]
+    change: Float[Array, "*runs steps"]  # of the rate in 1/s
     share: Float[Array, "*runs steps"]
     place: Int[Array, "*runs steps"]
 
@@ -43,13 +36,8 @@ class RateSteps(eqx.Module):
         Between the two samples Simpson's rule gives the strain of each step of the integration, and
         rates change smoothly with the instant on a grid that stays as it is.
 
-        Parameters
-        ----------
-        rate, times
-            Rate in 1/s at ends and middles of steps in turn, with a straight line where it steps;
-            and times in s.
-        fitted
-            The fitted shares.
+        `rate`, `times`: rate in 1/s at ends and middles of steps in turn, with a straight line
+        where it steps; and times in s. `fitted`: the fitted shares.
         """
         share = self.share
         if fitted.shape[0]:

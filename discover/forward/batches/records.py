@@ -75,28 +75,19 @@ of that over the runs, or the mean over all values."""
 class Records(eqx.Module):
     """What was recorded in runs, and what every value weighs; arrays of NumPy or JAX.
 
-    Attributes
-    ----------
-    recorded
-        In Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is recorded,
-        N1 and N2, or (runs, n) of the first alone.
-    weight
-        Of each value, as above; zero where nothing was recorded or it is not looked at.
-    loadings
-        Which runs are loadings of their own; None where none is.
+    `recorded` in Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is
+        recorded, N1 and N2, or (runs, n) of the first alone.
+    `weight`: of each value, as above; zero where nothing was recorded or it is not looked at.
     """
 
     recorded: Float[Array | np.ndarray, "runs n *kinds"]
     weight: Float[Array | np.ndarray, "runs n *kinds"]
-    loadings: Loadings | None = None
+    loadings: Loadings | None = None  # which runs are loadings of their own; None where none is
 
     def only(self, keep: Bool[Array | np.ndarray, "*seen"]) -> "Records":
         """Return the records of which only some runs or samples are looked at.
 
-        Parameters
-        ----------
-        keep
-            Which, shape (runs,) or (runs, n).
+        `keep`: which, shape (runs,) or (runs, n).
         """
         keep = keep.reshape(*keep.shape, *(1,) * (self.weight.ndim - keep.ndim))
         return replace(self, weight=_looked_at(keep, self.weight))
@@ -179,17 +170,9 @@ class Records(eqx.Module):
 def make_records(runs: Sequence[Run], n: int, mean: Mean, kinds: int = 1) -> Records:
     """Return what was recorded in runs, of three kinds, in arrays of NumPy.
 
-    Parameters
-    ----------
-    runs
-        Any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
-        stress difference.
-    n
-        Samples of each, with padding.
-    mean
-        What the squares of the residuals add up to.
-    kinds
-        How many of `OBSERVED`, where measured, are looked at.
+    `runs`: any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
+    stress difference. `n`: samples of each, with padding. `mean`: what the squares of the residuals
+    add up to. `kinds`: how many of `OBSERVED`, where measured, are looked at.
     """
     recorded = np.zeros((len(runs), n, len(OBSERVED)))
     weight, size = np.zeros_like(recorded), np.ones_like(recorded)
@@ -218,10 +201,7 @@ def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
     Ones but for a flow curve or a sweep, whose noise is in proportion to it.
 
-    Parameters
-    ----------
-    weight
-        Of its samples, without padding.
+    `weight`: of its samples, without padding.
     """
     least = float(np.min(weight))
     return least / weight if np.ptp(weight) > 1e-9 * least else np.ones_like(weight)

@@ -13,18 +13,10 @@ from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 
 
 class SteadyFlows(eqx.Module):
-    """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate.
+    """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate."""
 
-    Attributes
-    ----------
-    rate
-        In 1/s, shape (runs, n).
-    kinematics
-        As in `TransientFlows`.
-    """
-
-    rate: Float[Array, "runs n"]
-    kinematics: Kinematics | None = None
+    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
+    kinematics: Kinematics | None = None  # as in `TransientFlows`
 
     @property
     def longest(self) -> float:
@@ -51,17 +43,12 @@ Places = tuple[int, tuple[int, ...]]
 class PeriodicFlows(eqx.Module):
     """Periodic states, each of which is solved for by itself; both moduli of each are computed.
 
-    Attributes
-    ----------
-    strain, frequency
-        Amplitude and rad/s.
-    steps
-        Of half a cycle: more at large strain.
+    `strain`, `frequency`: amplitude and rad/s.
     """
 
     strain: Float[Array, " states"]
     frequency: Float[Array, " states"]
-    steps: Int[Array, " states"]
+    steps: Int[Array, " states"]  # of half a cycle: more at large strain
 
     @property
     def longest(self) -> float:

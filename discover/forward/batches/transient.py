@@ -31,42 +31,25 @@ _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 class TransientFlows(eqx.Module):
     """Flows at a given rate in time on padded grids, with a leading axis of runs.
 
-    Attributes
-    ----------
-    times
-        Half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
+    `times`: half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
         what came before the record.
-    commanded_rate
-        Rate there, in 1/s.
-    sample_index
-        Position of the samples among step ends, shape (runs, n).
-    clock_factor
-        Shape (runs,).
-    strain_before
-        Total strain of the sample before each run, shape (runs,).
-    last_step
-        Position of the last sample of each run among step ends; what follows is padding.
-    kinematics
-        Which flow each run is; None where all are simple shear.
-    steps
-        Steps of the rate whose instants are fitted, or were; None where there is none.
-    cycle
-        Positions among step ends of the last cycle before the first sample, shape (runs, 2);
+    `strain_before`: total strain of the sample before each run, shape (runs,).
+    `last_step`: position of the last sample of each run among step ends; what follows is padding.
+    `steps`: steps of the rate whose instants are fitted, or were; None where there is none.
+    `cycle`: positions among step ends of the last cycle before the first sample, shape (runs, 2);
         −1 where the run has no periodic start.
-    cycle_steps
-        The most steps that such a cycle has.
     """
 
     times: Float[Array, "runs m"]
-    commanded_rate: Float[Array, "runs m"]
-    sample_index: Array
-    clock_factor: Float[Array, " runs"]
+    commanded_rate: Float[Array, "runs m"]  # rate there, in 1/s
+    sample_index: Array  # position of the samples among step ends, shape (runs, n)
+    clock_factor: Float[Array, " runs"]  # shape (runs,)
     strain_before: Float[Array, " runs"]
     cycle: Int[Array, "runs 2"]
     last_step: Int[Array, " runs"]
-    kinematics: Kinematics | None = None
+    kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
-    cycle_steps: int = eqx.field(static=True, default=0)
+    cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
 
     @property
     def longest(self) -> float:

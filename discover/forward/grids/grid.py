@@ -48,31 +48,21 @@ _DISTURBANCE, _GROWTH_AS_IT_SETTLES, _SURE, _ORDER = 0.01, 0.05, 0.5, 4
 class IntegrationGrid(eqx.Module):
     """Where to step and where to sample, for one run or, with a leading axis, a batch of runs.
 
-    Attributes
-    ----------
-    times
-        Step times in s, shape (s,), strictly increasing from where the protocol begins; padded past
-        the last sample.
-    sample_index
-        Position in `times` of every sample, shape (n,); padded with the last one.
-    sample_mask
-        False where a sample is padding, shape (n,).
-    phase
-        Of oscillations that have gone on until they are periodic: ωt at step ends and middles in
-        turn over half a cycle, shape (m,). None elsewhere.
-    cycle
-        Steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of a run
-        that had not, None where no run had.
-    cycle_steps
-        The most steps that such a cycle has.
+    `times`: step times in s, shape (s,), strictly increasing from where the protocol begins; padded
+        past the last sample.
+    `sample_index`: position in `times` of every sample, shape (n,); padded with the last one.
+    `phase`: of oscillations that have gone on until they are periodic: ωt at step ends and middles
+        in turn over half a cycle, shape (m,). None elsewhere.
+    `cycle`: steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of
+        a run that had not, None where no run had.
     """
 
     times: Float[Array, "*batch s"]
     sample_index: Int[Array, "*batch n"]
-    sample_mask: Bool[Array, "*batch n"]
+    sample_mask: Bool[Array, "*batch n"]  # false where a sample is padding, shape (n,)
     phase: Float[Array, "*batch m"] | None = None
     cycle: Int[Array, "*batch"] | None = None
-    cycle_steps: int = eqx.field(static=True, default=0)
+    cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
 
     @property
     def sample_times(self) -> Float[Array, "*batch n"]:
@@ -85,10 +75,7 @@ class IntegrationGrid(eqx.Module):
         States are few where samples are padded to those of a long record beside them: each is
         solved for once, and none for padding.
 
-        Parameters
-        ----------
-        solve
-            From the number of a state to a tree of arrays.
+        `solve`: from the number of a state to a tree of arrays.
         """
         found = jax.vmap(solve)(self.times)
         return jax.tree.map(lambda leaf: leaf[self.sample_index], found)
@@ -113,33 +100,19 @@ def make_grid(
     relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
     the method whatever its step, but stable in short ones only.
 
-    Parameters
-    ----------
-    times
-        Sampling times in s, increasing, from 0 on.
-    strain_step, phase_step
-        Largest strain and phase per step.
-    max_step
-        Largest step in s.
-    growth
-        While the rate of a table does not change, steps may grow to this fraction of the time since
-        it last did, up to `COARSEST_STRAIN` where `max_step` limits them too, else half of it: what
-        follows a change happens ever more slowly.
-        An oscillation of the fluid's own is not resolved in the steps that grow.
-    relaxation_time
-        Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
-        `COARSEST_STRAIN` and this time, without adding to the largest error: what a change of the
-        rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as
-        exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out
-        of it. Half of this relaxation is counted on. None leaves steps as they are.
-    from_cycle
-        Whether what had gone on for ever begins with its last cycle before the record, whose state
-        is solved for, and not with all that are waited for.
-
-    Raises
-    ------
-    InputError
-        If the run would need an absurd number of steps.
+    `times`: sampling times in s, increasing, from 0 on. `strain_step`, `phase_step`: largest strain
+    and phase per step. `max_step`: largest step in s. `growth`: while the rate of a table does not
+    change, steps may grow to this fraction of the time since it last did, up to `COARSEST_STRAIN`
+    where `max_step` limits them too, else half of it: what follows a change happens ever more
+    slowly. An oscillation of the fluid's own is not resolved in the steps that grow.
+    `relaxation_time`: longest of the fluid, in s. Steps then grow while the rate of a table is
+    constant, up to `COARSEST_STRAIN` and this time, without adding to the largest error: what a
+    change of the rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow
+    as exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out of
+    it. Half of this relaxation is counted on. None leaves steps as they are. `from_cycle`: whether
+    what had gone on for ever begins with its last cycle before the record, whose state is solved
+    for, and not with all that are waited for. Raises InputError if the run would need an absurd
+    number of steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in STATES:
@@ -302,12 +275,9 @@ def make_grids(
 ) -> IntegrationGrid:
     """Return the grids of several runs, padded to one shape with a leading batch axis.
 
-    Parameters
-    ----------
-    protocols, times
-        One flow of one control and its sampling times for each run; see `make_grid`.
-    relaxation_time, from_cycle, **limits
-        Step limits of `make_grid`, and where it begins.
+    `protocols`, `times`: one flow of one control and its sampling times for each run; see
+    `make_grid`. `relaxation_time`, `from_cycle`, `**limits`: step limits of `make_grid`, and where
+    it begins.
     """
     grids = [
         make_grid(p, t, relaxation_time=relaxation_time, from_cycle=from_cycle, **limits)

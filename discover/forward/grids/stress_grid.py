@@ -34,14 +34,9 @@ def stress_grid(
     in steps that grow with the time since. No step takes more than twice `strain_step` of the
     strain recorded.
 
-    Parameters
-    ----------
-    protocol
-        With the imposed stress as its table, and the strain recorded where there is a record.
-    times
-        Of the samples, shape (n,).
-    strain_step
-        Half of the largest strain of one step: the rate is solved for in its middle too.
+    `protocol`: with the imposed stress as its table, and the strain recorded where there is a
+    record. `times`: of the samples, shape (n,). `strain_step`: half of the largest strain of one
+    step: the rate is solved for in its middle too.
     """
     begins, end = float(protocol.begins), float(times[-1])
     knots = np.asarray(protocol.table_times)

@@ -34,19 +34,11 @@ def follow(
     Made to be transformed: `jax.vmap`, `jax.jvp`; reverse mode keeps every step in memory. A law
     that runs away gives infinite or nan values, never an error, so that a fit can reject the trial.
 
-    Parameters
-    ----------
-    dynamics
-        The modes, with derivatives beside them where it has columns. No state changes with them,
-        and nothing gives way in series.
-    fixed
-        The modes alone, through which no derivative passes.
-    protocol, grid
-        Of one run at a given rate, in time or steady.
-    observe
-        What is seen at each step end, or of each steady state.
-    start
-        The modes at the first time; by default as `begun` says.
+    `dynamics`: the modes, with derivatives beside them where it has columns. No state changes with
+    them, and nothing gives way in series. `fixed`: the modes alone, through which no derivative
+    passes. `protocol`, `grid`: of one run at a given rate, in time or steady. `observe`: what is
+    seen at each step end, or of each steady state. `start`: the modes at the first time; by default
+    as `begun` says.
     """
     flow = protocol.kinematics
     if protocol.control == "steady":

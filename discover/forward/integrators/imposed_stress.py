@@ -17,21 +17,11 @@ through all three."""
 
 
 class Answer(NamedTuple):
-    """What a fluid answers a given stress with, at step ends.
+    """What a fluid answers a given stress with, at step ends."""
 
-    Attributes
-    ----------
-    strain
-        Recorded, zero at the first.
-    stress
-        Dimensionless, of the modes, shape (steps, s, k).
-    rate
-        In 1/s.
-    """
-
-    strain: Float[Array, " s"]
-    stress: Float[Array, "s _ k"]
-    rate: Float[Array, " s"]
+    strain: Float[Array, " s"]  # recorded, zero at the first
+    stress: Float[Array, "s _ k"]  # dimensionless, of the modes, shape (steps, s, k)
+    rate: Float[Array, " s"]  # in 1/s
 
 
 def answer_to_stress(
@@ -51,21 +41,11 @@ def answer_to_stress(
     Equations, chapter 2.4]. No differentiation of a measured strain comes in. The modes follow that
     rate by Krogstad's method, and what a step misses of the stress the next one makes good.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid, with what gives way in series with it.
-    times
-        Step ends in s, shape (s,), increasing; at rest at the first.
-    imposed
-        Recorded stress there in Pa, shape (s,).
-    inertia
-        I of the tool in Pa s².
-    flow
-        Which flow it is; None is simple shear.
-    fixed
-        The fluid once more, through which no derivative passes: where the rate is looked for, those
-        of its law would cost much and say nothing.
+    `dynamics`: the fluid, with what gives way in series with it. `times`: step ends in s, shape
+    (s,), increasing; at rest at the first. `imposed`: recorded stress there in Pa, shape (s,).
+    `inertia`: I of the tool in Pa s². `flow`: which flow it is; None is simple shear. `fixed`: the
+    fluid once more, through which no derivative passes: where the rate is looked for, those of its
+    law would cost much and say nothing.
     """
     fixed = dynamics if fixed is None else fixed
     width = jnp.diff(times)
@@ -149,12 +129,7 @@ def strain_in_series(
 ) -> Float[Array, " s"]:
     """Return the strain of what gives way, which feels the same stress as the fluid.
 
-    Parameters
-    ----------
-    series
-        What gives way; slip that depends on the stress is left out.
-    times, imposed
-        As in `answer_to_stress`; what is recorded is this strain and that of the fluid.
+    `series`: what gives way; slip that depends on the stress is left out.
     """
     slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * jnp.diff(times))
     given = series.compliance * (imposed - imposed[0])

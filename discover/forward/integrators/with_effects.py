@@ -27,18 +27,11 @@ def integrate(
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid, with what gives way in series with it.
-    times, rate
-        Step ends, shape (s,), and the rate at ends and middles in turn, shape (2 s − 1,).
-    steps
-        How many steps are taken; those beyond are padding, and nothing is computed of them.
-    flow
-        Which flow has this rate; None is simple shear.
-    cycle
-        The last cycle before the record, of a batch that holds runs with a periodic start.
+    `dynamics`: the fluid, with what gives way in series with it. `times`, `rate`: step ends, shape
+    (s,), and the rate at ends and middles in turn, shape (2 s − 1,). `steps`: how many steps are
+    taken; those beyond are padding, and nothing is computed of them. `flow`: which flow has this
+    rate; None is simple shear. `cycle`: the last cycle before the record, of a batch that holds
+    runs with a periodic start.
     """
     width = jnp.diff(times)
     if cycle is not None:

@@ -24,17 +24,10 @@ _AT_ONCE = 2
 class PeriodicSideBySide:
     """Predictions of moduli for one structure of law and effects.
 
-    Parameters
-    ----------
-    fluid, code
-        The fluid with its effects, and its machine code.
-    rates
-        Of a vector, the effects that are present, and states: the amplitude of the rate that the
-        fluid feels.
-    recorded
-        Of the numbers, these and the moduli of the modes, the moduli recorded.
-    made_from
-        What tells these from those of another structure.
+    `fluid`, `code`: the fluid with its effects, and its machine code. `rates`: of a vector, the
+    effects that are present, and states: the amplitude of the rate that the fluid feels.
+    `recorded`: of the numbers, these and the moduli of the modes, the moduli recorded. `made_from`:
+    what tells these from those of another structure.
     """
 
     def __init__(

@@ -83,20 +83,9 @@ class PeriodicCode(Code):
 
     No state of the fluid changes with the modes in it, and nothing gives way in series.
 
-    Attributes
-    ----------
-    flags
-        Which parts of it a vector needs.
+    `flags`: which parts of it a vector needs.
 
-    Parameters
-    ----------
-    fluid, found, flow
-        As of `Code`; the flow is simple shear.
-
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
+    Raises NotTranslatable if a law or an effect does what is not known in lanes.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -119,13 +108,9 @@ class PeriodicCode(Code):
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> np.ndarray:
         """Return G′ + iG″ of the modes in Pa, shape (groups, lanes).
 
-        Parameters
-        ----------
-        used
-            Parts of the program that one of the vectors needs; see `Flags`.
-        given
-            Amplitudes, frequencies, modes and what these share, groups first and lanes last; the
-            steps of half a cycle of each group, and cosine and sine at their ends and middles.
+        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`:
+        amplitudes, frequencies, modes and what these share, groups first and lanes last; the steps
+        of half a cycle of each group, and cosine and sine at their ends and middles.
         """
         groups, modes = given["mode"].shape[:2]
         storage, loss = np.empty((2, groups, LANES))

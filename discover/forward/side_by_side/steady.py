@@ -24,16 +24,10 @@ _AT_ONCE = 8
 class SteadySideBySide:
     """Predictions of flow curves for one structure of law and effects.
 
-    Parameters
-    ----------
-    fluid, code
-        The fluid with its effects, and its machine code.
-    rates
-        Of a vector, the effects that are present, and a run: the felt rate without slip.
-    recorded
-        Of these, the stress and the felt rate, what is recorded.
-    made_from
-        What tells these from those of another structure.
+    `fluid`, `code`: the fluid with its effects, and its machine code. `rates`: of a vector, the
+    effects that are present, and a run: the felt rate without slip. `recorded`: of these, the
+    stress and the felt rate, what is recorded. `made_from`: what tells these from those of another
+    structure.
     """
 
     def __init__(

@@ -113,20 +113,9 @@ class SteadyStep(Step):
 class SteadyCode(Code):
     """Machine code for steady states.
 
-    Attributes
-    ----------
-    flags
-        Which parts of it a vector needs.
+    `flags`: which parts of it a vector needs.
 
-    Parameters
-    ----------
-    fluid, found, flow
-        As of `Code`.
-
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
+    Raises NotTranslatable if a law or an effect does what is not known in lanes.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -147,12 +136,8 @@ class SteadyCode(Code):
         The first two have the shape (groups, lanes), that of the modes is σ11, σ22, σ33, σ12, shape
         (groups, 4, lanes).
 
-        Parameters
-        ----------
-        used
-            Parts of the program that one of the vectors needs; see `Flags`.
-        given
-            Rates, modes, what these share, and flows, by name; groups first and lanes last.
+        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: rates,
+        modes, what these share, and flows, by name; groups first and lanes last.
         """
         groups, modes = given["mode"].shape[:2]
         (stress, felt), of_modes = np.empty((2, groups, LANES)), np.empty((groups, 4, LANES))

@@ -36,10 +36,8 @@ WEIGHTS = 10
 class Mode(NamedTuple):
     """What differs from mode to mode: each leaf has a leading axis of modes, or is of one mode.
 
-    Attributes
-    ----------
-    relaxations, shares
-        What decides how chains that retract are stepped through, as the law's; None for others.
+    `relaxations`, `shares`: what decides how chains that retract are stepped through, as the law's;
+        None for others.
     """
 
     modulus: Any
@@ -129,19 +127,10 @@ def beside_modes(fluid: AugmentedFluid) -> list[ConstitutiveEffect]:
 class Step:
     """The functions of which a step consists.
 
-    Parameters
-    ----------
-    fluid
-        The fluid with its effects.
-    law
-        What of the law is no array.
-    states
-        Those states of the fluid that are followed; by default all.
+    `fluid`: the fluid with its effects. `law`: what of the law is no array. `states`: those states
+    of the fluid that are followed; by default all.
 
-    Attributes
-    ----------
-    kept
-        How many weights of a step are kept of each mode.
+    `kept`: how many weights of a step are kept of each mode.
     """
 
     kept = WEIGHTS
@@ -236,16 +225,9 @@ class Step:
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.
 
-        Parameters
-        ----------
-        flow
-            Which flow it is; None is simple shear.
-        slow
-            The factor on all times at the start, in the middle and at the end.
-        rates
-            There, in 1/s, without what series elements take.
-        taken, earlier
-            Rate that these take in this step and in the one before.
+        `flow`: which flow it is; None is simple shear. `slow`: the factor on all times at the
+        start, in the middle and at the end. `rates`: there, in 1/s, without what series elements
+        take. `taken`, `earlier`: rate that these take in this step and in the one before.
         """
         w = self._of_step(mode, weights)
         first, middle, last = rates

@@ -21,15 +21,9 @@ from discover.protocols.kinematics import normal_stress_differences
 class StressSideBySide:
     """Predictions of strains for one structure of law and effects.
 
-    Parameters
-    ----------
-    fluid, code
-        The fluid with its effects, and its machine code.
-    driven
-        Of a vector and a run: the true stress at step ends in Pa, the inertia of the tool in Pa s²,
-        and the strain of what gives way in series.
-    made_from
-        What tells these from those of another structure.
+    `fluid`, `code`: the fluid with its effects, and its machine code. `driven`: of a vector and a
+    run: the true stress at step ends in Pa, the inertia of the tool in Pa s², and the strain of
+    what gives way in series. `made_from`: what tells these from those of another structure.
     """
 
     def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):

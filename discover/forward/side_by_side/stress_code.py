@@ -105,15 +105,7 @@ class StressStep(Step):
 class StressCode(Code):
     """Machine code for runs at a given stress.
 
-    Parameters
-    ----------
-    fluid, found, flow
-        As of `Code`.
-
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
+    Raises NotTranslatable if a law or an effect does what is not known in lanes.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -138,14 +130,8 @@ class StressCode(Code):
         That is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where normal stresses are asked
         for, and empty if not.
 
-        Parameters
-        ----------
-        used
-            Parts of the program that one of the vectors needs; see `Flags`.
-        given
-            The arrays beside these, by name.
-        normal
-            Whether normal stresses are asked for.
+        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
+        beside these, by name. `normal`: whether normal stresses are asked for.
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         strain = np.full((runs, steps + 1, LANES), np.nan)

@@ -35,19 +35,12 @@ _LONG, _ROUNDING = 1e3, 1e-13
 class Approach(NamedTuple):
     """A way towards a steady state.
 
-    Attributes
-    ----------
-    stress
-        Of all modes.
-    number
-        Of the next step of each mode, and how many were taken again, both of shape (k,).
-    again
-        See there.
+    `number`: of the next step of each mode, and how many were taken again, both of shape (k,).
     """
 
-    stress: Float[Array, "s k"]
+    stress: Float[Array, "s k"]  # of all modes
     number: Float[Array, " k"]
-    again: Float[Array, " k"]
+    again: Float[Array, " k"]  # see there
 
 
 def approach(stress: Float[Array, "s k"]) -> Approach:
@@ -67,16 +60,8 @@ def approach_step(
 
     Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
 
-    Parameters
-    ----------
-    change
-        Rate of change of all modes.
-    index
-        Of the step.
-    weissenberg_number
-        Of each mode.
-    scalars
-        How many structure variables that are no part of a tensor stand last in each mode.
+    `change`: rate of change of all modes. `index`: of the step. `weissenberg_number`: of each mode.
+    `scalars`: how many structure variables that are no part of a tensor stand last in each mode.
     """
     width = pseudo_time_step(way.number, weissenberg_number)
     moved = linearly_implicit_step(change, way.stress, width)
@@ -104,14 +89,8 @@ def moves(
 
     A step that is taken again moves nothing either.
 
-    Parameters
-    ----------
-    before, after
-        The way at the beginning and at the end of a step.
-    weissenberg_number
-        Of each mode.
-    beside
-        What else is on the way, before and after the step.
+    `before`, `after`: the way at the beginning and at the end of a step. `weissenberg_number`: of
+    each mode. `beside`: what else is on the way, before and after the step.
     """
     width = pseudo_time_step(before.number, weissenberg_number)
     newton = jnp.all((after.number >= before.number) & (width > _LONG))
@@ -153,12 +132,8 @@ def pseudo_time_step(
 ) -> Float[Array, " k"]:
     """Return the width of a step of each mode, in its relaxation times.
 
-    Parameters
-    ----------
-    number
-        Of the step of each mode, from 0 on.
-    weissenberg_number
-        Rate of the flow times the relaxation time of each mode.
+    `number`: of the step of each mode, from 0 on. `weissenberg_number`: rate of the flow times the
+    relaxation time of each mode.
     """
     first = _FIRST / (1.0 + weissenberg_number)
     return first * (_LAST / first) ** (number / (_WIDTHS - 1))
@@ -171,14 +146,8 @@ def linearly_implicit_step(
 ) -> Float[Array, "s k"]:
     """Return modes after one linearly implicit Euler step; an infinite one is Newton's.
 
-    Parameters
-    ----------
-    change
-        Rate of change of all modes, each of which changes by itself.
-    stress
-        Where the step begins.
-    width
-        Of the step, in the unit of time of each mode.
+    `change`: rate of change of all modes, each of which changes by itself. `stress`: where the step
+    begins. `width`: of the step, in the unit of time of each mode.
     """
     now, jacobian = _with_jacobian(change, stress)
     matrix = jnp.eye(len(stress)) / width[:, None, None] - jacobian

@@ -17,13 +17,10 @@ _MIRROR = (1.0, 1.0, 1.0, -1.0)
 class HalfCycle(NamedTuple):
     """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 on the way.
 
-    Attributes
-    ----------
-    recorded
-        Its first harmonic where steps are counted, shape (), else its values at step ends, (s,).
-    of_modes
-        These of each mode, where they are asked for, without the factor of the states, shape
-        (s, k).
+    `recorded`: its first harmonic where steps are counted, shape (), else its values at step ends,
+        (s,).
+    `of_modes`: these of each mode, where they are asked for, without the factor of the states,
+        shape (s, k).
     """
 
     stress: Float[Array, "s k"]
@@ -46,12 +43,7 @@ def first_harmonic(
 ) -> Complex[Array, ""]:
     """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
 
-    Parameters
-    ----------
-    stress
-        In Pa over half a cycle, its ends included.
-    phase
-        ωt there, 0 to π, evenly spaced.
+    `stress` in Pa over half a cycle, its ends included. `phase`: ωt there, 0 to π, evenly spaced.
     """
     # of a periodic function the trapezoidal rule over a period is exact to all orders
     share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
@@ -61,16 +53,8 @@ def first_harmonic(
 def half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
     """Return the function from state and strain amplitude to what half a cycle makes of them.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid.
-    wave
-        Rate over strain amplitude at step ends and middles in turn.
-    width
-        Of a step in s.
-    by_mode
-        Whether stresses of each mode are asked for too.
+    `dynamics`: the fluid. `wave`: rate over strain amplitude at step ends and middles in turn.
+    `width`: of a step in s. `by_mode`: whether stresses of each mode are asked for too.
     """
     step, begun = _step(dynamics, width, 1 if by_mode else 4)
 

@@ -25,24 +25,17 @@ _HOPELESS = 5e-4
 class Approximation(NamedTuple):
     """An approximation to the modes, and the best one of each that was tried.
 
-    Attributes
-    ----------
-    stress, best
-        Dimensionless, shape (s, k): four components of σ, and structure variables.
-    best_misfit, best_step
-        What a cycle changes in the best one, relative, and Newton's step from it.
-    share
-        Of that step that is taken.
-    number
-        Of cycles gone through.
+    `stress`, `best`: dimensionless, shape (s, k): four components of σ, and structure variables.
+    `best_misfit`, `best_step`: what a cycle changes in the best one, relative, and Newton's step
+        from it.
     """
 
     stress: Float[Array, "s k"]
     best: Float[Array, "s k"]
     best_misfit: Float[Array, " k"]
     best_step: Float[Array, "s k"]
-    share: Float[Array, " k"]
-    number: Float[Array, ""]
+    share: Float[Array, " k"]  # of that step that is taken
+    number: Float[Array, ""]  # of cycles gone through
 
 
 def first_approximation(stress: Float[Array, "s k"], number: int = 0) -> Approximation:
@@ -69,15 +62,10 @@ def next_approximation(
     A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
     Introduction to Numerical Analysis, section 5.4].
 
-    Parameters
-    ----------
-    now, after
-        The modes, and what a cycle makes of them.
-    jacobian
-        Of that in these, for each mode: direction, component.
-    moved
-        By how much something beside the modes has changed since, a state or what is felt. It puts
-        the modes off, which is no step of theirs that led astray.
+    `now`, `after`: the modes, and what a cycle makes of them. `jacobian`: of that in these, for
+    each mode: direction, component. `moved`: by how much something beside the modes has changed
+    since, a state or what is felt. It puts the modes off, which is no step of theirs that led
+    astray.
     """
     difference = after - now.stress
     misfit = _size(difference) / (1.0 + _size(now.stress))
@@ -116,14 +104,8 @@ def relative_change(
 ) -> Float[Array, ""]:
     """Return how far the modes moved, relative, but for what rounding moves of slow ones.
 
-    Parameters
-    ----------
-    now, following
-        Approximations one after the other.
-    slowness
-        Relaxation time of each mode over that of a cycle.
-    tolerance
-        Change below which the iteration ends.
+    `now`, `following`: approximations one after the other. `slowness`: relaxation time of each mode
+    over that of a cycle. `tolerance`: change below which the iteration ends.
     """
     told = 1.0 + _ROUNDING / tolerance * slowness
     moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))

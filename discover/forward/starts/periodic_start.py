@@ -26,17 +26,12 @@ Levels = tuple[Float[Array, "..."], ...]
 class Cycle(NamedTuple):
     """The steps of the last cycle before the first sample; none of a run that is not periodic.
 
-    Attributes
-    ----------
-    start, end
-        Positions of its first and last step ends.
-    steps
-        The most that a run of the batch has in it, at least ``end − start``.
+    `start`, `end`: positions of its first and last step ends.
     """
 
     start: Int[Array, ""]
     end: Int[Array, ""]
-    steps: int
+    steps: int  # the most that a run of the batch has in it, at least ``end − start``
 
 
 class _Iterate(NamedTuple):
@@ -61,16 +56,9 @@ def periodic_start(
     each mode, and along each state, which change nearly by themselves   [shooting: Stoer & Bulirsch
     2002, Introduction to Numerical Analysis, section 7.3; `next_approximation`].
 
-    Parameters
-    ----------
-    after_cycle
-        From modes, shape (s, k), and states to what they are a cycle later.
-    rest
-        Modes and states at rest, from which the iteration begins.
-    slowness
-        Relaxation time of each mode, in cycles.
-    is_periodic
-        Where not, rest is returned.
+    `after_cycle`: from modes, shape (s, k), and states to what they are a cycle later. `rest`:
+    modes and states at rest, from which the iteration begins. `slowness`: relaxation time of each
+    mode, in cycles. `is_periodic`: where not, rest is returned.
     """
 
     def with_derivative(stress, levels):

@@ -71,16 +71,9 @@ def complex_modulus(
     36, 1697]. Slip and compliance in series take their share of the first harmonic; that they also
     feel the higher ones is neglected.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid, with what gives way in series with it.
-    strain, frequency
-        Amplitude γ₀ and ω in rad/s.
-    steps
-        Over half a cycle.
-    beside
-        Recorded stress beside the modes in Pa, of rates in 1/s.
+    `dynamics`: the fluid, with what gives way in series with it. `strain`, `frequency`: amplitude
+    γ₀ and ω in rad/s. `steps`: over half a cycle. `beside`: recorded stress beside the modes in Pa,
+    of rates in 1/s.
     """
     half = counted_half_cycle(dynamics, frequency, steps)
 
@@ -172,18 +165,10 @@ class _Solving(NamedTuple):
 
 
 class PeriodicState(NamedTuple):
-    """Where a cycle of an oscillation begins and ends, at zero strain, and its moduli.
+    """Where a cycle of an oscillation begins and ends, at zero strain, and its moduli."""
 
-    Attributes
-    ----------
-    stress
-        Dimensionless, of the modes, shape (s, k).
-    modulus
-        G′ + iG″ in Pa of the first harmonic.
-    """
-
-    stress: Float[Array, "s k"]
-    modulus: Complex[Array, ""]
+    stress: Float[Array, "s k"]  # dimensionless, of the modes, shape (s, k)
+    modulus: Complex[Array, ""]  # G′ + iG″ in Pa of the first harmonic
 
 
 def periodic_state(
@@ -198,17 +183,9 @@ def periodic_state(
 
     They are those of the implicit function: none passes through the iteration.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; no state changes with it, and nothing gives way in series.
-    fixed
-        The same, through which no derivative passes.
-    strain, frequency, phase
-        As in `complex_modulus`.
-    together
-        The name of an axis of states that are of use only together, over which this is mapped: once
-        one of them is given up, so are the others.
+    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
+    same, through which no derivative passes. `together`: the name of an axis of states that are of
+    use only together, over which this is mapped: once one of them is given up, so are the others.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency

@@ -39,14 +39,8 @@ def steady_states(
     several steady states it is the one that a start-up leads to; where it has none, or the flow
     runs away, the values are not finite or far off.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; of elements in series only slip acts.
-    rates
-        Of the tool, in 1/s, shape (n,); zero is rest.
-    flow
-        Which flow has these rates; None is simple shear.
+    `dynamics`: the fluid; of elements in series only slip acts. `rates`: of the tool, in 1/s, shape
+    (n,); zero is rest. `flow`: which flow has these rates; None is simple shear.
     """
 
     def one(rate):
@@ -65,14 +59,8 @@ def steady_state(
     Not finite where none is reached. Derivatives are those of the implicit function: none passes
     through the steps.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; no state changes with it, and nothing gives way in series.
-    fixed
-        The same, through which no derivative passes.
-    rate, flow
-        As in `steady_states`.
+    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
+    same, through which no derivative passes.
     """
     reached, _, _ = jax.lax.stop_gradient(_approach(fixed, rate, flow))
     return newton_step(lambda stress: dynamics.change(stress, rate, 1.0, flow), reached)

@@ -26,8 +26,6 @@ _WEAKEST = 5
 class Direction:
     """A change of the law's coefficients, its largest entry one.
 
-    `coefficients`: term → entry.
-    `exact`: whether the observed stresses do not change at all, to first order.
     `noise_for_tenth`: relative noise of the data at which the standard error along the direction is
         0.1, zero for an exact one: with less noise the data determine it better.
     `changes`: relative change of σ12, N1 and N2 per unit of the direction; N2's relative to N1.
@@ -36,8 +34,8 @@ class Direction:
         Johnson–Segalman do) that has this direction as its tangent.
     """
 
-    coefficients: Mapping[str, float]
-    exact: bool
+    coefficients: Mapping[str, float]  # term → entry
+    exact: bool  # whether the observed stresses do not change at all, to first order
     noise_for_tenth: float
     changes: Mapping[str, float]
     at_any_size: bool | None = None

@@ -110,12 +110,11 @@ def _growing(
 class Agreement:
     """To which order two laws agree in every shear history.
 
-    `order`: order to which the series were computed.
     `sigma12`, `N1`, `N2`: first order at which the quantity differs, or None where it agrees to
         `order`.
     """
 
-    order: int
+    order: int  # order to which the series were computed
     sigma12: int | None
     N1: int | None
     N2: int | None

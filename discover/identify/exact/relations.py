@@ -24,13 +24,12 @@ Reach = Literal["nothing", "33"]
 class TermRelation:
     """A combination of terms that vanishes in simple shear, or lives on σ33 only.
 
-    `coefficients`: term → whole number.
     `touches`: ``"nothing"``: the combination is zero in every simple shear, so terms can be
         exchanged freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets
         σ33 act back, N2 does.
     """
 
-    coefficients: Mapping[str, int]
+    coefficients: Mapping[str, int]  # term → whole number
     touches: Reach
 
     @property

@@ -31,15 +31,13 @@ _EXTENSION_QUANTITY = {"uniaxial": "σ11 − σ22", "planar": "σ22 − σ33"}
 class Separation:
     """An experiment in which two laws part.
 
-    `flow`: the flow in words, rates scaled by the relaxation time.
-    `quantity`: what to measure in it.
     `difference`: root-mean-square difference, relative to the reference's N1 for N2 in shear, to
         its σ11 − σ22 in extension, and to the quantity itself otherwise; infinite where the stress
         of one law grows without bound and that of the other does not.
     """
 
-    flow: str
-    quantity: str
+    flow: str  # the flow in words, rates scaled by the relaxation time
+    quantity: str  # what to measure in it
     difference: float
 
     @property

@@ -59,19 +59,13 @@ _PER_RATE = len(_DEBORAH_FACTORS)
 
 @dataclass(frozen=True)
 class PhysicsCheck:
-    """One check of a law.
-
-    `passed`: whether the law passes; None where the check could not be made.
-    `value`: the number that decides.
-    `where`: where it is taken, or where the law fails, in words.
-    `text`: one sentence for a reader.
-    """
+    """One check of a law."""
 
     name: str
-    passed: bool | None
-    value: float | None
-    where: str
-    text: str
+    passed: bool | None  # whether the law passes; None where the check could not be made
+    value: float | None  # the number that decides
+    where: str  # where it is taken, or where the law fails, in words
+    text: str  # one sentence for a reader
 
     def line(self) -> dict[str, Any]:
         """Return the check as one line of a table."""
@@ -80,12 +74,9 @@ class PhysicsCheck:
 
 @dataclass(frozen=True)
 class PhysicsReport(SentenceAndTable):
-    """All checks of a law.
+    """All checks of a law."""
 
-    `checks` in a fixed order.
-    """
-
-    checks: tuple[PhysicsCheck, ...]
+    checks: tuple[PhysicsCheck, ...]  # in a fixed order
 
     def __getitem__(self, name: str) -> PhysicsCheck:
         return next(check for check in self.checks if check.name == name)

@@ -90,12 +90,11 @@ def _energy(law, stress, rate):
 class Cycles:
     """Oscillations over a grid of Weissenberg and Deborah numbers.
 
-    `names`: of the flows, Weissenberg number first.
     `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
         where the law runs away.
     """
 
-    names: tuple[str, ...]
+    names: tuple[str, ...]  # of the flows, Weissenberg number first
     work: Float[np.ndarray, " flows"]
 
 

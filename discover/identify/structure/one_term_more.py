@@ -24,12 +24,11 @@ themselves, in exact arithmetic."""
 class OneTermMore:
     """The term that leaves a quantity most open if it is fitted along.
 
-    `term`: its name.
     `per_noise`: half of the 95 % interval of the quantity, root-mean-square over N1's, over the
         relative noise of the records, white and of one size.
     """
 
-    term: str
+    term: str  # its name
     per_noise: float
 
     def to_json(self) -> dict[str, Any]:

@@ -23,14 +23,8 @@ def with_sensitivities(
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
     """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients.
 
-    Parameters
-    ----------
-    law
-        What it makes is not finite where it runs away.
-    known
-        A fluid with its modes and solvent.
-    flows
-        The runs and their grids.
+    `law`: what it makes is not finite where it runs away. `known`: a fluid with its modes and
+    solvent. `flows`: the runs and their grids.
     """
 
     def observed(coefficients):

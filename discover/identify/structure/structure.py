@@ -66,17 +66,15 @@ NOMINAL: Mapping[str, LawTerms] = {
 class QuantityVerdict:
     """Whether the observed stresses determine a normal stress difference.
 
-    `quantity`: ``"N1"`` or ``"N2"``.
     `verdict`: ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
         experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
         of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
         form of the law; ``"determined"`` otherwise, within the library.
-    `text`: the verdict for a reader.
     """
 
-    quantity: str
+    quantity: str  # ``"N1"`` or ``"N2"``
     verdict: Verdict
-    text: str
+    text: str  # the verdict for a reader
 
     @property
     def open(self) -> bool:
@@ -92,23 +90,19 @@ class QuantityVerdict:
 class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
-    `law`: its terms beyond the known part.
-    `hidden`: what σ12 feels of the normal stresses.
     `exact`, `weak`: directions of which the experiment sees nothing, and the weakest of the others.
-    `quantities`: verdicts on N1 and N2 from what is observed.
     `n_exact_with_N1`: number of exact directions that would be left if N1 were measured as well.
-    `N2_with_N1`: verdict on N2 if N1 were measured as well.
     `one_more`: by quantity, the term beyond the law that leaves it most open.
     """
 
     name: str
-    law: LawTerms
-    hidden: HiddenStresses
+    law: LawTerms  # its terms beyond the known part
+    hidden: HiddenStresses  # what σ12 feels of the normal stresses
     exact: tuple[Direction, ...]
     weak: tuple[Direction, ...]
-    quantities: tuple[QuantityVerdict, ...]
+    quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
     n_exact_with_N1: int
-    N2_with_N1: Verdict
+    N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
     one_more: Mapping[str, OneTermMore] = field(default_factory=dict)
 
     @property
@@ -148,16 +142,11 @@ class LawStructure(NotebookView):
 
 @dataclass(frozen=True)
 class Structure(SentenceAndTable):
-    """What an experiment can determine of a library.
+    """What an experiment can determine of a library."""
 
-    `laws`: by nominal law; the first is the known part alone.
-    `relations`: exact relations among terms in shear, at any law.
-    `n_terms`: size of the library.
-    """
-
-    laws: tuple[LawStructure, ...]
-    relations: tuple[TermRelation, ...]
-    n_terms: int
+    laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
+    relations: tuple[TermRelation, ...]  # exact relations among terms in shear, at any law
+    n_terms: int  # size of the library
 
     @property
     def text(self) -> str:

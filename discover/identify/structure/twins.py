@@ -44,22 +44,18 @@ INVISIBLE_SIZE = 0.05
 class Twin(NotebookView):
     """A law that no shear stress tells from another.
 
-    `law`: the twin, beyond the known part.
     `proof`: ``"relation"`` or ``"series"``: exact. ``"histories"``: to integration error in random
         histories.
-    `keeps_N1`: whether N1 is the same too.
-    `difference`: largest difference of σ12, N1 and N2 in random histories.
-    `separated_by`: experiments that would tell the two apart.
     `order`: order to which the Taylor series agree exactly, where that was the proof. It is given
         at coefficients rounded to short fractions: that the family of twins exists is exact.
     `change`: the twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
     """
 
-    law: LawTerms
+    law: LawTerms  # the twin, beyond the known part
     proof: Proof
-    keeps_N1: bool
-    difference: Difference
-    separated_by: tuple[Separation, ...] = ()
+    keeps_N1: bool  # whether N1 is the same too
+    difference: Difference  # largest difference of σ12, N1 and N2 in random histories
+    separated_by: tuple[Separation, ...] = ()  # experiments that would tell the two apart
     order: int | None = None
     change: Mapping[str, str] = field(default_factory=dict)
 

@@ -39,10 +39,7 @@ def write_estimator(
 ) -> Path:
     """Write an estimator to a file, replacing it whole or not at all.
 
-    Raises
-    ------
-    InputError
-        If something of it cannot be written.
+    Raises InputError if something of it cannot be written.
     """
     writer = PlainWriter(types)
     header = {
@@ -68,15 +65,10 @@ def write_estimator(
 class EstimatorFile:
     """What a file written by `write_estimator` holds.
 
-    Attributes
-    ----------
-    learner
-        Name of the learner.
+    `learner`: name of the learner.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, it is something else, it is damaged, or it is of a later version.
+    Raises InputError if there is no such file, it is something else, it is damaged, or it is of a
+    later version.
     """
 
     def __init__(self, path: str | Path):

@@ -29,16 +29,10 @@ Arrays = dict[str, np.ndarray]
 class PlainWriter:
     """Turns values into JSON-able ones.
 
-    Parameters
-    ----------
-    types
-        Dataclasses that may be written beside numbers, text, arrays, laws, fluids, libraries, and
-        lists and dictionaries of them.
+    `types`: dataclasses that may be written beside numbers, text, arrays, laws, fluids, libraries,
+    and lists and dictionaries of them.
 
-    Attributes
-    ----------
-    arrays
-        What was set beside the JSON, by name.
+    `arrays`: what was set beside the JSON, by name.
     """
 
     def __init__(self, types: Sequence[type]):
@@ -48,10 +42,7 @@ class PlainWriter:
     def plain(self, value: Any, where: str) -> Any:
         """Return a value as JSON-able ones.
 
-        Raises
-        ------
-        InputError
-            If it, or something in it, cannot be written; `where` says what it is.
+        Raises InputError if it, or something in it, cannot be written; `where` says what it is.
         """
         if value is None or isinstance(value, bool | str | int):
             return value
@@ -132,10 +123,7 @@ _NETWORK_FIELDS = ("constants", "network_mask", "invariant_scale", "linear_relax
 class PlainReader:
     """Undoes `PlainWriter`.
 
-    Parameters
-    ----------
-    types
-        The dataclasses that may occur.
+    `types`: the dataclasses that may occur.
     """
 
     def __init__(self, types: Sequence[type], arrays: Mapping[str, np.ndarray]):

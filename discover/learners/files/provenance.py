@@ -13,36 +13,19 @@ from discover.dataset.run import Run
 
 @dataclass(frozen=True)
 class Provenance:
-    """What an estimator was fitted to; it stays with a saved one, which holds no data.
+    """What an estimator was fitted to; it stays with a saved one, which holds no data."""
 
-    Attributes
-    ----------
-    data
-        Name of the data set; empty for a list of runs.
-    runs
-        Names of the runs.
-    samples
-        Number of samples in all.
-    fingerprint
-        Hash of times, rates and shear stresses.
-    version
-        Of this software.
-    """
-
-    data: str
-    runs: tuple[str, ...]
-    samples: int
-    fingerprint: str
-    version: str = __version__
+    data: str  # name of the data set; empty for a list of runs
+    runs: tuple[str, ...]  # names of the runs
+    samples: int  # number of samples in all
+    fingerprint: str  # hash of times, rates and shear stresses
+    version: str = __version__  # of this software
 
 
 def provenance_of(data: Any, runs: Sequence[Run]) -> Provenance:
     """Return the provenance of a fit to some runs.
 
-    Parameters
-    ----------
-    data
-        What the user gave: a data set, whose name is kept, or anything else.
+    `data`: what the user gave: a data set, whose name is kept, or anything else.
     """
     return Provenance(
         str(getattr(data, "name", "")),

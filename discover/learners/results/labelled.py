@@ -19,10 +19,7 @@ N_DRAWS = 1000
 def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
     """Return draws of the coefficients of a law's terms, dimensions chain, draw and term.
 
-    Raises
-    ------
-    InputError
-        If the law has no term, or xarray is missing.
+    Raises InputError if the law has no term, or xarray is missing.
     """
     rng = np.random.default_rng(seed)
     terms, values, inner = _of_a_sparse_law(estimator, rng)
@@ -36,17 +33,8 @@ def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
 def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":
     """Return what each network of an ensemble predicts, dimensions member and sample.
 
-    Parameters
-    ----------
-    estimator
-        A fitted `TBNNUDE`.
-    runs
-        The flows; by default those that were fitted. σ12, N1 and N2 are in Pa, time is in s.
-
-    Raises
-    ------
-    InputError
-        If there are no runs, or xarray is missing.
+    `estimator`: a fitted `TBNNUDE`. `runs`: the flows; by default those that were fitted. σ12, N1
+    and N2 are in Pa, time is in s. Raises InputError if there are no runs, or xarray is missing.
     """
     wanted = getattr(estimator, "runs_", None) if runs is None else runs
     if wanted is None:

@@ -99,16 +99,9 @@ def estimates_of(
 ) -> list[Estimate]:
     """Return the coefficients of terms, and whether the data determine each.
 
-    Parameters
-    ----------
-    terms
-        Of the law.
-    left
-        What the law leaves of the runs; None where that is not known.
-    rivals
-        Terms of each law that the runs do not tell from it.
-    key
-        What stands before the term in the index of a summary.
+    `terms`: of the law. `left`: what the law leaves of the runs; None where that is not known.
+    `rivals`: terms of each law that the runs do not tell from it. `key`: what stands before the
+    term in the index of a summary.
     """
     rivals = list(rivals)
     found = []

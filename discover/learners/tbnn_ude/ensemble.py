@@ -107,16 +107,9 @@ def choose_member(
     The likeliest of those that fit; without noise, the fewest varying tensors among those of nearly
     the least misfit. A median of laws would be no law.
 
-    Parameters
-    ----------
-    members
-        All of them; where constants suffice the first alone has seen all runs and is taken.
-    misfits
-        Relative misfit of each on all runs.
-    resolved
-        Relative misfit that a rheometer does not resolve.
-    surprise
-        From `evidence.surprises`, where noise hides more than that.
+    `members`: all of them; where constants suffice the first alone has seen all runs and is taken.
+    `misfits`: relative misfit of each on all runs. `resolved`: relative misfit that a rheometer
+    does not resolve. `surprise`: from `evidence.surprises`, where noise hides more than that.
     """
     least = float(np.min(misfits))
     fits = misfits <= max(FITS * least, resolved)

@@ -71,14 +71,8 @@ def posterior_draws(
     They are drawn from the Gaussian of Laplace's approximation. Where the law is bent, or the noise
     correlated, it reaches beyond the laws that fit: a draw is halved until it does.
 
-    Parameters
-    ----------
-    law
-        Trained on the problem, with coefficients that vary.
-    keys
-        One for each draw.
-    fits
-        Largest relative misfit over that of the law.
+    `law`: trained on the problem, with coefficients that vary. `keys`: one for each draw. `fits`:
+    largest relative misfit over that of the law.
     """
     along = trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))

@@ -38,16 +38,11 @@ Integrate = Callable[
 class Objective(eqx.Module):
     """What a round of training minimises, apart from the weights.
 
-    Attributes
-    ----------
-    rebuild
-        Which weights move, and the law around them.
-    cloud, prior
-        Where the prior looks, and how strong it is.
+    `cloud`, `prior`: where the prior looks, and how strong it is.
     """
 
     problem: TrainingProblem
-    rebuild: Rebuild
+    rebuild: Rebuild  # which weights move, and the law around them
     cloud: Cloud
     prior: PriorWeights
 
@@ -82,12 +77,8 @@ class Stopping:
     A rejected step is no sign of an end: it teaches the damping. Only steps taken count, unless
     one rejection follows another. Of two descents that compete, the one far behind is given up.
 
-    Parameters
-    ----------
-    target
-        Misfit that is good enough.
-    pace
-        Misfits of a rival after each of its steps, or None.
+    `target`: misfit that is good enough. `pace`: misfits of a rival after each of its steps, or
+    None.
     """
 
     def __init__(self, target: float, pace: Sequence[float] | None = None):
@@ -141,18 +132,9 @@ def minimise(
     A step to weights whose trajectories run away has a misfit that is not finite; it is rejected
     and the damping grows.
 
-    Parameters
-    ----------
-    weights
-        Where to start.
-    steps
-        Largest number of steps.
-    callback
-        Called after every step with the relative misfit of the best weights.
-    target
-        Stop when the norm of all residuals is below this.
-    pace
-        Misfits of a rival after each of its steps: stop when far behind it.
+    `weights`: where to start. `steps`: largest number of steps. `callback`: called after every step
+    with the relative misfit of the best weights. `target`: stop when the norm of all residuals is
+    below this. `pace`: misfits of a rival after each of its steps: stop when far behind it.
     """
     descent, stopping = Steps(weights), Stopping(target, pace)
     for _ in range(steps):

@@ -35,23 +35,14 @@ _FLOOR = 1e-4
 class Cloud(eqx.Module):
     """States along the trajectories of a law, at which a network is looked at.
 
-    Attributes
-    ----------
-    stress
-        Dimensionless stress of a mode, shape (m, 4).
-    rate
-        Dimensionless rate of deformation, shape (m, 4).
-    size
-        Norm of each basis tensor, times the weight, shape (m, 8).
-    weight
-        What a state counts for, shape (m,): one where there is one mode. Of several modes each
-        counts by its modulus over the stress of the run: a slow one's dimensionless stress may be
-        a million, and its modulus too small for the record to show it.
+    `weight`: what a state counts for, shape (m,): one where there is one mode. Of several modes
+        each counts by its modulus over the stress of the run: a slow one's dimensionless stress may
+        be a million, and its modulus too small for the record to show it.
     """
 
-    stress: Float[Array, "m 4"]
-    rate: Float[Array, "m 4"]
-    size: Float[Array, "m 8"]
+    stress: Float[Array, "m 4"]  # dimensionless stress of a mode, shape (m, 4)
+    rate: Float[Array, "m 4"]  # dimensionless rate of deformation, shape (m, 4)
+    size: Float[Array, "m 8"]  # norm of each basis tensor, times the weight, shape (m, 8)
     weight: Float[Array, " m"]
 
     def coefficients(self, law: TensorBasisNetwork) -> Float[Array, "m 8"]:
@@ -135,10 +126,8 @@ def reweighted(
 def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
     """Return the weights of a plain quadratic penalty on variation, the same for every tensor.
 
-    Parameters
-    ----------
-    strength
-        κ. Amounts are penalised 1e-5 times as much: only where the data say nothing of them.
+    `strength`: κ. Amounts are penalised 1e-5 times as much: only where the data say nothing of
+    them.
     """
     every = strength * jnp.ones(N_COEFFICIENTS)
     return PriorWeights(1e-5 * every, every)

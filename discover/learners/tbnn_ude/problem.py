@@ -29,27 +29,17 @@ _IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
 class TrainingProblem(eqx.Module):
     """Records of several runs, and the modes that the network serves.
 
-    Attributes
-    ----------
-    flows
-        The runs, on fixed time grids.
-    records
-        What was recorded, of one kind.
-    stress
-        Root-mean-square of the stress of each run in Pa, with which the prior compares its states,
-        shape (runs,).
-    modulus, relaxation_time
-        Of each mode, shape (k,), in Pa and s.
-    solvent_viscosity
-        In Pa s.
+    `stress`: root-mean-square of the stress of each run in Pa, with which the prior compares its
+        states, shape (runs,).
+    `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
     """
 
-    flows: FlowBatch
-    records: Records
+    flows: FlowBatch  # the runs, on fixed time grids
+    records: Records  # what was recorded, of one kind
     stress: Float[Array, " runs"]
     modulus: Float[Array, " k"]
     relaxation_time: Float[Array, " k"]
-    solvent_viscosity: Float[Array, ""]
+    solvent_viscosity: Float[Array, ""]  # in Pa s
 
     def fluid(self, law: AbstractConstitutiveLaw) -> Fluid:
         """Return the fluid of a trial law."""
@@ -93,28 +83,12 @@ def make_problem(
     The default grid is that of the paper's series with a step of 0.1: its error, 4e-6 of the
     stress, is far below what a network reaches.
 
-    Parameters
-    ----------
-    runs
-        Runs whose record is learned.
-    modulus, relaxation_time
-        Modes, in Pa and s.
-    strain_step
-        Largest strain of a step of the integration.
-    solvent_viscosity
-        In Pa s.
-    known_relaxation
-        Whether the fluid relaxes in these times, and not only in what is learned; ignored where
-        `base` is given.
-    base
-        The known law, for steps that follow it; by default UCM.
-    **limits
-        Further limits of steps, as `make_grid` takes them.
-
-    Raises
-    ------
-    InputError
-        If what was recorded in a run is zero throughout.
+    `runs`: runs whose record is learned. `modulus`, `relaxation_time`: modes, in Pa and s.
+    `strain_step`: largest strain of a step of the integration. `solvent_viscosity` in Pa s.
+    `known_relaxation`: whether the fluid relaxes in these times, and not only in what is learned;
+    ignored where `base` is given. `base`: the known law, for steps that follow it; by default UCM.
+    `**limits`: further limits of steps, as `make_grid` takes them. Raises InputError if what was
+    recorded in a run is zero throughout.
     """
     law = UpperConvectedMaxwell(known_relaxation) if base is None else base
     known = Fluid(law, modulus, relaxation_time)

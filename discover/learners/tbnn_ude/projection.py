@@ -24,20 +24,13 @@ SIMILAR = 1.05
 class Projection:
     """A sparse expansion of a network's extra term.
 
-    Attributes
-    ----------
-    coefficients
-        Their least-squares coefficients, shape (n,).
-    inner
-        Inner parameters of the chosen terms' closed forms.
-    misfit
-        Norm of what is left over that of the extra term, all four components, over the states
+    `misfit`: norm of what is left over that of the extra term, all four components, over the states
         that training visited, each with the weight that the record gives its mode.
     """
 
     library: TermLibrary | None
-    coefficients: Float[np.ndarray, " n"]
-    inner: Float[np.ndarray, " m"]
+    coefficients: Float[np.ndarray, " n"]  # their least-squares coefficients, shape (n,)
+    inner: Float[np.ndarray, " m"]  # inner parameters of the chosen terms' closed forms
     misfit: float
 
 

@@ -62,16 +62,9 @@ def train_default(
 ) -> Trained:
     """Return a law trained by the default recipe.
 
-    Parameters
-    ----------
-    key
-        For the initial weights.
-    linear_relaxation
-        Whether −σ is known.
-    progress
-        Called after every step with step, total number of steps (at most) and misfit.
-    base_law
-        Known law to which the network is added.
+    `key`: for the initial weights. `linear_relaxation`: whether −σ is known. `progress`: called
+    after every step with step, total number of steps (at most) and misfit. `base_law`: known law to
+    which the network is added.
     """
     recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
@@ -145,14 +138,8 @@ def train_along(
 ) -> Trained:
     """Return a law whose tensors are given, from initial weights of its own.
 
-    Parameters
-    ----------
-    found
-        A trained law: its invariant scale, base and known relaxation are taken over.
-    groups
-        Tensors, taken group by group while the law has not settled.
-    recipe, progress
-        As in `train_default`.
+    `found`: a trained law: its invariant scale, base and known relaxation are taken over. `groups`:
+    tensors, taken group by group while the law has not settled.
     """
     session = Session(problem, recipe, progress)
     assert found.invariant_scale is not None  # a law with varying coefficients has one

@@ -30,24 +30,12 @@ trajectories run away; the paper does not say how its network started."""
 
 @dataclass(frozen=True)
 class PaperRecipe:
-    """Settings of the paper.
+    """Settings of the paper."""
 
-    Attributes
-    ----------
-    width
-        Neurons in each of two hidden layers.
-    learning_rate
-        Of Adam, with decay rates 0.9 and 0.999.
-    penalty
-        Factor κ on the sum of absolute weights.
-    iterations_per_series
-        Iterations for each series added; 8 × 900 = 7,200 in all.
-    """
-
-    width: int = 32
-    learning_rate: float = 1e-3
-    penalty: float = 0.01
-    iterations_per_series: int = 900
+    width: int = 32  # neurons in each of two hidden layers
+    learning_rate: float = 1e-3  # of Adam, with decay rates 0.9 and 0.999
+    penalty: float = 0.01  # factor κ on the sum of absolute weights
+    iterations_per_series: int = 900  # iterations for each series added; 8 × 900 = 7,200 in all
 
 
 def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> TensorBasisNetwork:
@@ -129,18 +117,9 @@ def train_paper(
 ) -> tuple[TensorBasisNetwork, Float[np.ndarray, " m"]]:
     """Return a law trained by the paper's recipe, and the loss at every iteration.
 
-    Parameters
-    ----------
-    problem
-        The training data; series are added in the order of its runs.
-    key
-        For the initial weights.
-    linear_relaxation
-        Whether −σ is known.
-    progress
-        Called every 50 iterations with iteration, total and loss.
-    base_law
-        Known law to which the network is added.
+    `problem`: the training data; series are added in the order of its runs. `key`: for the initial
+    weights. `linear_relaxation`: whether −σ is known. `progress`: called every 50 iterations with
+    iteration, total and loss. `base_law`: known law to which the network is added.
     """
     recipe = recipe or PaperRecipe()
     law = make_network(key, recipe.width, linear_relaxation)

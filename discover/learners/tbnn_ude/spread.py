@@ -23,15 +23,10 @@ from tensor_library.integrity_basis import TENSOR_NAMES
 class MemberPredictions:
     """What every member of an ensemble predicts in one flow.
 
-    Attributes
-    ----------
-    times
-        In s, shape (n,).
-    sigma12, N1, N2
-        In Pa, shape (members, n); nan throughout for a member that runs away.
+    `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that runs away.
     """
 
-    times: Float[np.ndarray, " n"]
+    times: Float[np.ndarray, " n"]  # in s, shape (n,)
     sigma12: Float[np.ndarray, "members n"]
     N1: Float[np.ndarray, "members n"]
     N2: Float[np.ndarray, "members n"]
@@ -39,10 +34,7 @@ class MemberPredictions:
     def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
         """Return the lowest and the highest prediction at each time; nan where all ran away.
 
-        Parameters
-        ----------
-        quantity
-            ``"sigma12"``, ``"N1"`` or ``"N2"``.
+        `quantity`: ``"sigma12"``, ``"N1"`` or ``"N2"``.
         """
         values = getattr(self, quantity)
         kept = values[~np.any(np.isnan(values), axis=1)]
@@ -56,12 +48,7 @@ def member_predictions(
 ) -> MemberPredictions:
     """Return what is recorded of every member in a flow, and its normal stress differences.
 
-    Parameters
-    ----------
-    fluids
-        The members, as `TBNNUDE.ensemble_fluids_` holds them.
-    protocol, times
-        As in `discover.forward.fluids.observe`.
+    `fluids`: the members, as `TBNNUDE.ensemble_fluids_` holds them.
     """
     rows = np.full((3, len(fluids), len(times)), np.nan)
     for i, fluid in enumerate(fluids):

@@ -31,19 +31,12 @@ from tensor_library.contraction import contracted
 class Along(NamedTuple):
     """What a law makes of the runs, at their samples.
 
-    Attributes
-    ----------
-    recorded
-        What is recorded, in Pa, of creep the strain, shape (runs, n).
-    states
-        Dimensionless stress of every mode, shape (runs, n, k, 4).
-    rate
-        In 1/s, shape (runs, n).
+    `recorded`: what is recorded, in Pa, of creep the strain, shape (runs, n).
     """
 
     recorded: Float[Array, "runs n"]
-    states: Float[Array, "runs n k 4"]
-    rate: Float[Array, "runs n"]
+    states: Float[Array, "runs n k 4"]  # dimensionless stress of every mode, shape (runs, n, k, 4)
+    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
 
 
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:

@@ -51,23 +51,12 @@ class Rebuild(eqx.Module):
     The variational equation carries a column for every entry of the vector, so numbers that never
     move in a round are left out of it; those that merely happen not to are held by a mask, which
     needs no other program.
-
-    Attributes
-    ----------
-    template
-        A law; what is not in the vector comes from it.
-    positions
-        Place of each entry among all trainable numbers, shape (q,).
-    moves
-        False where an entry keeps the template's value, shape (q,).
-    scale
-        Size of each entry's unit, shape (q,).
     """
 
-    template: TensorBasisNetwork
-    positions: Int[Array, " q"]
-    moves: Bool[Array, " q"]
-    scale: Float[Array, " q"]
+    template: TensorBasisNetwork  # a law; what is not in the vector comes from it
+    positions: Int[Array, " q"]  # place of each entry among all trainable numbers, shape (q,)
+    moves: Bool[Array, " q"]  # false where an entry keeps the template's value, shape (q,)
+    scale: Float[Array, " q"]  # size of each entry's unit, shape (q,)
 
     @classmethod
     def everything(cls, law: TensorBasisNetwork) -> "Rebuild":
@@ -84,14 +73,8 @@ class Rebuild(eqx.Module):
     ) -> "Rebuild":
         """Return the vector of the eight constants.
 
-        Parameters
-        ----------
-        law
-            The template.
-        moving
-            Which of them move.
-        scale
-            Unit of each: a constant is as large as the stress that it contributes.
+        `law`: the template. `moving`: which of them move. `scale`: unit of each: a constant is as
+        large as the stress that it contributes.
         """
         n = _count_of(law)
         positions = on_device(np.arange(n - N_COEFFICIENTS, n))

@@ -30,21 +30,10 @@ def library_problem(
     The records hold the fluid and noise: an instrument's faults are for a closed loop, or for
     `compare`, which takes them out beforehand.
 
-    Parameters
-    ----------
-    runs
-        As `as_runs` returns them.
-    library
-        Candidate terms.
-    known
-        The known part; errors of its moduli are nuisances.
-    use_normal_stresses
-        Whether N1 and N2, where measured, are fitted too.
-
-    Raises
-    ------
-    InputError
-        If normal stresses would be fitted twice, or a covariance is none of the moduli.
+    `runs`: as `as_runs` returns them. `library`: candidate terms. `known`: the known part; errors
+    of its moduli are nuisances. `use_normal_stresses`: whether N1 and N2, where measured, are
+    fitted too. Raises InputError if normal stresses would be fitted twice, or a covariance is none
+    of the moduli.
     """
     fluid, observed = known.fluid, list(runs)
     if use_normal_stresses:
@@ -89,17 +78,12 @@ def _checked(covariance, modes: int):
 class LinearModel:
     """y − σ(c₀) + S c₀ ≈ S c: what the records say of the coefficients near a trial law.
 
-    Attributes
-    ----------
-    design
-        S by terms, over the noise of the trial law, what nuisances imitate taken out, and
+    `design`: S by terms, over the noise of the trial law, what nuisances imitate taken out, and
         compressed to as many rows as unknowns: least-squares problems over it are unchanged.
-    target
-        The left-hand side, likewise.
     """
 
     design: Float[np.ndarray, "rows n"]
-    target: Float[np.ndarray, " rows"]
+    target: Float[np.ndarray, " rows"]  # the left-hand side, likewise
 
     @classmethod
     def at(cls, fitter: Fitter, fit: Fit, names: Sequence[str]) -> "LinearModel":

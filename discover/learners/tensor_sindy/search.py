@@ -33,18 +33,8 @@ class SupportSearch(Search):
     supports of any size, and every further term is scored; all of them are fitted, and the search
     goes on from the likeliest, until no proposal is likelier.
 
-    Parameters
-    ----------
-    fitter
-        What fits them, to a problem whose candidates are the terms of the library.
-    library
-        The terms.
-    optimizer
-        As in `solve_sparse`.
-    most
-        Largest support.
-    say
-        Called with a line of text now and then.
+    `fitter`: what fits them, to a problem whose candidates are the terms of the library. `library`:
+    the terms. `most`: largest support. `say`: called with a line of text now and then.
     """
 
     def __init__(

@@ -12,10 +12,7 @@ _LEVEL = 0.01
 def choose_by_held_out(errors: Float[np.ndarray, "path runs"]) -> int:
     """Return the simplest member whose error in runs left out cannot be told from the best one's.
 
-    Parameters
-    ----------
-    errors
-        Relative misfit of each member in each run that its fit did not see.
+    `errors`: relative misfit of each member in each run that its fit did not see.
 
     Notes
     -----
@@ -41,11 +38,6 @@ def choose_by_one_standard_error(errors: Float[np.ndarray, "path runs"]) -> int:
     ch. 3.4.3]: the mean over runs of the squared error is no larger than the best one's plus the
     standard error of that mean. What is left out is a whole run, so that the correlation of
     neighbouring samples does not pass for independent evidence.
-
-    Parameters
-    ----------
-    errors
-        As in `choose_by_held_out`.
     """
     squares = _floored(errors) ** 2
     means = np.mean(squares, axis=1)

@@ -32,20 +32,11 @@ def write_comparison(
     The numbers come first. A picture or a table that cannot be drawn then costs its own place on
     the page and nothing else.
 
-    Parameters
-    ----------
-    linear_relaxation
-        Whether −σ was part of the known law.
-    study_text
-        The study file, shown at the end.
-    run
-        What the page says of the run that made it, where that was no command.
-    overlays
-        Curves that the study asks for beside the learners'.
+    `linear_relaxation`: whether −σ was part of the known law. `study_text`: the study file, shown
+    at the end. `run`: what the page says of the run that made it, where that was no command.
+    `overlays`: curves that the study asks for beside the learners'.
 
-    Returns
-    -------
-    The page.
+    Returns the page.
     """
     content = json_text(comparison.to_json())
     folder.write("comparison.json", content)

@@ -38,18 +38,11 @@ _NO_TERM = {
 class Part:
     """A table or a paragraph of the page.
 
-    Attributes
-    ----------
-    title
-        What it is, as the subject of a sentence.
-    template
-        File in ``templates/comparison``, without its extension.
-    content
-        Returns the template's variables; None where there is nothing to show.
+    `content`: returns the template's variables; None where there is nothing to show.
     """
 
-    title: str
-    template: str
+    title: str  # what it is, as the subject of a sentence
+    template: str  # file in ``templates/comparison``, without its extension
     content: Callable[[], Content | None]
 
     def draw(self, comparison: Comparison, run: Content) -> str | Missing | None:
@@ -69,18 +62,14 @@ class Part:
 class Section:
     """A heading with what stands below it.
 
-    Attributes
-    ----------
-    anchor, heading, link
-        Identifier, heading, and the words of the link at the top; without words, no link.
-    parts
-        HTML, or what could not be drawn.
+    `anchor`, `heading`, `link`: identifier, heading, and the words of the link at the top; without
+        words, no link.
     """
 
     anchor: str
     heading: str
     link: str
-    parts: tuple[str | Missing, ...]
+    parts: tuple[str | Missing, ...]  # HTML, or what could not be drawn
 
 
 def sections(comparison: Comparison, run: Content, linear_relaxation: bool) -> list[Section]:

@@ -30,12 +30,8 @@ def superposition_words(
 ) -> list[str]:
     """Return what can be said of a superposition, a sentence each.
 
-    Parameters
-    ----------
-    found
-        Tests and shifts.
-    own
-        What tables over time ask for by themselves, by kind, where the shifts are the sweeps'.
+    `found`: tests and shifts. `own`: what tables over time ask for by themselves, by kind, where
+    the shifts are the sweeps'.
     """
     said = [_verdict(found, kind) for kind in found.leading]
     if found.verdict == "not_superposed":

@@ -37,22 +37,12 @@ def write_loop(
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
-    Parameters
-    ----------
-    name, summary
-        Title, and the data and declared model in words.
-    study_text
-        The study file, shown at the end.
-    run
-        What the page says of the run that made it, where that was no command.
-    conditions
-        Material and temperature, for the title.
-    overlays
-        Curves that the study asks for beside the models.
+    `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
+    file, shown at the end. `run`: what the page says of the run that made it, where that was no
+    command. `conditions`: material and temperature, for the title. `overlays`: curves that the
+    study asks for beside the models.
 
-    Returns
-    -------
-    The page.
+    Returns the page.
     """
     pictures = [
         waterfall_picture(result),

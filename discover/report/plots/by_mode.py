@@ -33,14 +33,9 @@ def by_mode_picture(
 ) -> Picture | None:
     """Return each constant by mode with its band; None where there is none.
 
-    Parameters
-    ----------
-    constants
-        By name of the parameter, the effect or the term.
-    is_unexplained
-        Whether a law with these constants leaves more than noise.
-    left_out
-        What was not fitted, to save time, in words.
+    `constants`: by name of the parameter, the effect or the term. `is_unexplained`: whether a law
+    with these constants leaves more than noise. `left_out`: what was not fitted, to save time, in
+    words.
     """
     if not constants:
         return None

@@ -9,12 +9,7 @@ from matplotlib.path import Path
 def in_last_cycle(times: Float[np.ndarray, " n"], frequency: float) -> Bool[np.ndarray, " n"]:
     """Return which samples lie in the last cycle, a little more so that it closes.
 
-    Parameters
-    ----------
-    times
-        In s, increasing, shape (n,).
-    frequency
-        Angular, in 1/s.
+    `times` in s, increasing, shape (n,). `frequency`: angular, in 1/s.
     """
     return times >= times[-1] - 2.0 * np.pi / frequency * 1.02
 
@@ -38,14 +33,8 @@ def shade_between(
     There a fill between the curves as a whole would shade the inside of a loop and a bar where it
     begins and ends, and not what the band sweeps.
 
-    Parameters
-    ----------
-    panel
-        Axes of matplotlib.
-    along, low, high
-        Where the curves stand, and the curves, shape (n,).
-    style
-        Of the shade, as for `matplotlib.axes.Axes.fill_between`.
+    `panel`: axes of matplotlib. `along`, `low`, `high`: where the curves stand, and the curves,
+    shape (n,). `style`: of the shade, as for `matplotlib.axes.Axes.fill_between`.
     """
     if np.all(np.diff(along) >= 0.0):
         panel.fill_between(along, low, high, **style)

@@ -122,25 +122,16 @@ def learner_colour(name: str) -> str:
 class Picture:
     """A figure as SVG.
 
-    Attributes
-    ----------
-    name
-        File name without extension.
-    caption
-        What it shows and how to read it.
-    svg
-        A stand-alone SVG document.
-    axes
-        Of each panel its box in the SVG's own units and the ends of its axes, for a page that reads
-        values off: ``box`` (left, top, width, height), ``x`` and ``y`` (low, high, logarithmic).
-        An axis of names has no ends.
-    switched
-        Names of curves that a page can hide; the elements of the i-th have ids ``run{i}-...``.
+    `axes`: of each panel its box in the SVG's own units and the ends of its axes, for a page that
+        reads values off: ``box`` (left, top, width, height), ``x`` and ``y`` (low, high,
+        logarithmic). An axis of names has no ends.
+    `switched`: names of curves that a page can hide; the elements of the i-th have ids
+        ``run{i}-...``.
     """
 
-    name: str
-    caption: str
-    svg: str
+    name: str  # file name without extension
+    caption: str  # what it shows and how to read it
+    svg: str  # a stand-alone SVG document
     axes: tuple[dict, ...] = ()
     switched: tuple[str, ...] = ()
 
@@ -202,12 +193,8 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 
     The figure is not pyplot's: a notebook that writes a report keeps its own pictures and backend.
 
-    Parameters
-    ----------
-    rows, columns
-        Number of panels.
-    width, height
-        Of the whole figure and of one row, in inches.
+    `rows`, `columns`: number of panels. `width`, `height`: of the whole figure and of one row, in
+    inches.
     """
     with only_settings(_SETTINGS):
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
@@ -220,12 +207,7 @@ def panels_of(
 ) -> Iterator[tuple]:
     """Yield a figure, its axes, and as many panels as are asked for; those left over are hidden.
 
-    Parameters
-    ----------
-    count, columns
-        Number of panels, and how many stand side by side at most.
-    width, height
-        As of `figure`.
+    `count`, `columns`: number of panels, and how many stand side by side at most.
     """
     columns = min(columns, count)
     with figure(-(-count // columns), columns, width, height) as (drawing, axes):
@@ -311,10 +293,7 @@ def runs_through_decades(
     A rate that was measured rises before it is constant; samples that crowd at early times say the
     same.
 
-    Parameters
-    ----------
-    times, shear_rate
-        Of one run, in s and 1/s.
+    `times`, `shear_rate`: of one run, in s and 1/s.
     """
     positive = times[times > 0]
     if not positive.size or positive[-1] <= _DECADES * positive[0]:

@@ -22,14 +22,13 @@ class NoiseModel:
 
     `coefficients`: φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
     `correlation`: of samples k apart, from k = 0, shape (longest sequence,).
-    `variance`: of each sequence, shape (sequences,).
     `effective_samples`: number of independent samples whose mean would be as uncertain as that of
         all sequences.
     """
 
     coefficients: Float[np.ndarray, " order"]
     correlation: Float[np.ndarray, " n"]
-    variance: Float[np.ndarray, " sequences"]
+    variance: Float[np.ndarray, " sequences"]  # of each sequence, shape (sequences,)
     effective_samples: float
 
     def covariance_times(self, sequence: int, columns: Float[np.ndarray, "n q"]) -> np.ndarray:

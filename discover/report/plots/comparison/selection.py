@@ -30,10 +30,7 @@ _RULE_STYLES = {
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
     """Return the selection path: misfits, evidence, and how probable each term is.
 
-    Parameters
-    ----------
-    details
-        Of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
+    `details`: of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
     """
     path = details.get("path") or []
     if len(path) < 2:

@@ -121,14 +121,8 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
 def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
     """Draw the measured stress, the declared and the augmented model of one run.
 
-    Parameters
-    ----------
-    panel
-        Axes of matplotlib.
-    along
-        What the stress is drawn against, shape (n,).
-    marked, shown
-        Which samples are marked as measured, and between which the models are drawn.
+    `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
+    `shown`: which samples are marked as measured, and between which the models are drawn.
     """
     if record.band is not None:
         low, high = record.band[:, shown]
