@@ -143,9 +143,5 @@ def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
     a11, a22, a33, a12 = components
     zero = jnp.zeros_like(a11)
     return jnp.stack(
-        [
-            jnp.stack([a11, a12, zero]),
-            jnp.stack([a12, a22, zero]),
-            jnp.stack([zero, zero, a33]),
-        ]
+        [jnp.stack([a11, a12, zero]), jnp.stack([a12, a22, zero]), jnp.stack([zero, zero, a33])]
     )

@@ -7,8 +7,7 @@ import typer
 
 StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
 OutOption = Annotated[
-    Path | None,
-    typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY."),
+    Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]
 SeedOption = Annotated[
     int | None,

@@ -187,9 +187,7 @@ class Flow:
 
 
 def comparison_flows(
-    data: StudyData,
-    high_deborah: tuple[float, ...],
-    pipkin: Sequence[tuple[float, float]] = (),
+    data: StudyData, high_deborah: tuple[float, ...], pipkin: Sequence[tuple[float, float]] = ()
 ) -> list[Flow]:
     """Return the flows of a comparison: training, held out, tests, and where only errors are told.
 

@@ -17,13 +17,7 @@ from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
-from discover.study.in_memory import (
-    HeldOut,
-    data_in_memory,
-    declared_fluid,
-    joined,
-    with_known,
-)
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined, with_known
 from discover.study.read import parse_study
 from discover.study.schema import Study
 

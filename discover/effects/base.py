@@ -174,10 +174,7 @@ class StateEffect(ConstitutiveEffect):
 
     @abstractmethod
     def source_and_decay(
-        self,
-        values: Float[Array, " p"],
-        shear_rate: Float[Array, ""],
-        stress: Float[Array, ""],
+        self, values: Float[Array, " p"], shear_rate: Float[Array, ""], stress: Float[Array, ""]
     ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
         """Return source and decay in 1/s.
 

@@ -15,13 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
-from discover.forward.batches import (
-    Batch,
-    PeriodicFlows,
-    SteadyFlows,
-    StressFlows,
-    TransientFlows,
-)
+from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.by_mode import LARGEST, decades
 from discover.forward.declared import DeclaredModel, FreeParameter
 from discover.forward.linearised import Linearised, Point, linearised, widths_of

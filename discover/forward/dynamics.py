@@ -46,9 +46,7 @@ class Series(NamedTuple):
 
 @compiled
 def declared_weights(
-    times: Float[Array, "runs m"],
-    relaxation_time: Float[Array, " k"],
-    decay: Float[Array, ""],
+    times: Float[Array, "runs m"], relaxation_time: Float[Array, " k"], decay: Float[Array, ""]
 ) -> Float[Array, "runs s 1 11 k"]:
     """Return the weights of all steps of runs for modes whose trace relaxes as the rest does.
 
@@ -154,9 +152,7 @@ class Dynamics(NamedTuple):
         """
         if any(effect.changes_times for effect in self.states):
             pieces = jax.lax.cond(
-                self.times_change,
-                lambda: self.weights_alone(width / slow),
-                lambda: pieces,
+                self.times_change, lambda: self.weights_alone(width / slow), lambda: pieces
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
         whole = KrogstadWeights(*joined[0])

@@ -59,12 +59,7 @@ class Predictor:
     effects that there are, and of all that there may be.
     """
 
-    def __init__(
-        self,
-        declared: DeclaredModel,
-        program: Program,
-        of_every_effect: Program,
-    ):
+    def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
         self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []

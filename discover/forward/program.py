@@ -10,20 +10,9 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import (
-    AbstractEffect,
-    KinematicEffect,
-    Record,
-    SignalEffect,
-)
+from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.batches import (
-    Flows,
-    PeriodicFlows,
-    SteadyFlows,
-    StressFlows,
-    TransientFlows,
-)
+from discover.forward.batches import Flows, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.integrators.imposed_stress import answer_to_stress, strain_in_series
 from discover.forward.integrators.with_effects import integrate
 from discover.forward.side_by_side import (
@@ -113,11 +102,7 @@ class Program:
         return self._kernels[kind]
 
     def _in_lanes(
-        self,
-        numbers: Numbers,
-        control: type,
-        flow: Kinematics | None,
-        choices: dict[str, bool],
+        self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
     ):
         given, made_from = (self.fluid, numbers, flow), self._made_from
         if control is SteadyFlows:

@@ -153,10 +153,7 @@ class Fluid(eqx.Module):
 
     @classmethod
     def from_sweep(
-        cls,
-        sweep: HasSpectrum | None,
-        law: AbstractConstitutiveLaw | None = None,
-        **options: Any,
+        cls, sweep: HasSpectrum | None, law: AbstractConstitutiveLaw | None = None, **options: Any
     ) -> "Fluid":
         """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
 

@@ -15,10 +15,7 @@ from discover.programs import on_device
 
 
 def laid_out(
-    runs: Sequence[Run],
-    known: Fluid,
-    mean: Mean = "values",
-    **limits: Any,
+    runs: Sequence[Run], known: Fluid, mean: Mean = "values", **limits: Any
 ) -> tuple[FlowBatch, Records]:
     """Return runs and their grids, and what was recorded in them.
 

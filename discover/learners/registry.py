@@ -13,10 +13,7 @@ from discover.words import unknown_name
 from tensor_library.library import TermLibrary
 from tensor_library.registry import Registry
 
-BUILT_IN: Mapping[str, str] = {
-    "tensor_sindy": "sparse regression",
-    "tbnn_ude": "neural network",
-}
+BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
 """Titles of the learners of this package."""
 
 

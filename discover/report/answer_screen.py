@@ -4,14 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from discover.answer import Answer
-from discover.answer.sentences import (
-    SYMBOLS,
-    description,
-    expected,
-    further,
-    law,
-    where,
-)
+from discover.answer.sentences import SYMBOLS, description, expected, further, law, where
 from discover.equations import Equation
 from discover.equations.files import FORMATS
 from discover.equations.spelling.markup import law_element

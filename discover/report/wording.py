@@ -31,10 +31,7 @@ SMALL_FAULTS = (
 )
 """What an interval allows for."""
 
-_LEARNERS = {
-    "tensor_sindy": "Sparse regression",
-    "tbnn_ude": "The neural network",
-}
+_LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
 
 
 def learner_as_subject(name: str) -> str:

@@ -73,13 +73,7 @@ class Data(Section):
     observe: (
         tuple[
             Literal[
-                "sigma12",
-                "tensile_stress",
-                "N1",
-                "N2",
-                "strain",
-                "storage_modulus",
-                "loss_modulus",
+                "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
             ],
             ...,
         ]

@@ -59,9 +59,7 @@ class Loadings(eqx.Module):
         return Loadings(self.members[:, at], self.deviation, self.noise[at])
 
     def whitened(
-        self,
-        residual: Float[Values, "*trials rows n"],
-        predicted: Float[Values, "*trials rows n"],
+        self, residual: Float[Values, "*trials rows n"], predicted: Float[Values, "*trials rows n"]
     ) -> Float[Values, "*trials rows n"]:
         """Return weighted residuals with factors of their own, which the prior holds back.
 
@@ -124,9 +122,7 @@ def loadings(runs: Sequence[Run], unit: Float[np.ndarray, " runs"]) -> Loadings 
     noise = [1.0 if (one := run.loading) is None else relative_noise(run, one) for run in runs]
     told = np.array([run.loading is not None for run in runs])
     return Loadings(
-        (sources == own[:, None]) & told,
-        np.asarray(deviation),
-        np.where(told, noise * unit, 1.0),
+        (sources == own[:, None]) & told, np.asarray(deviation), np.where(told, noise * unit, 1.0)
     )
 
 

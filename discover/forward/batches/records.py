@@ -141,9 +141,7 @@ class Records(eqx.Module):
         return self.residual(predicted) + self.weight * self.recorded
 
     def linearised(
-        self,
-        predicted: Float[Array, "runs n *kinds"],
-        columns: Float[Array, "runs n *kinds p"],
+        self, predicted: Float[Array, "runs n *kinds"], columns: Float[Array, "runs n *kinds p"]
     ) -> tuple[Float[Array, "runs n *kinds"], Float[Array, "runs n *kinds p"]]:
         """Return the residual and its derivatives, of predictions and theirs."""
         if self.loadings is None:

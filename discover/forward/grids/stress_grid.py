@@ -23,9 +23,7 @@ _CONSTANT = 0.01
 
 
 def stress_grid(
-    protocol: FlowProtocol,
-    times: Float[np.ndarray, " n"],
-    strain_step: float = 0.25,
+    protocol: FlowProtocol, times: Float[np.ndarray, " n"], strain_step: float = 0.25
 ) -> Float[np.ndarray, " s"]:
     """Return step times for a run at a given stress.
 

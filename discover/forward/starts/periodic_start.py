@@ -98,9 +98,7 @@ def periodic_start(
     never = jnp.asarray(jnp.inf)
     start = _Iterate(first_approximation(begun[0], FROM_REST), begun[1], jnp.zeros(()), never)
     end = jax.lax.while_loop(
-        lambda now: goes_on(now.modes, now.change, MOST, TOLERANCE),
-        improved,
-        start,
+        lambda now: goes_on(now.modes, now.change, MOST, TOLERANCE), improved, start
     )
     found = jnp.where(end.change < TOLERANCE, end.modes.stress, jnp.nan)
     stress, levels = rest

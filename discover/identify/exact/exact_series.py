@@ -88,12 +88,7 @@ def _growing(
         one = _Series((number(1), *zero.values[1:]), modular)
         s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
         g = _Series(tuple(shear_rate), modular)
-        slope = [
-            2 * (g * s12).values[k],
-            number(0),
-            number(0),
-            shear_rate[k] + (g * s22).values[k],
-        ]
+        slope = [2 * (g * s12).values[k], number(0), number(0), shear_rate[k] + (g * s22).values[k]]
         if linear_relaxation:
             slope = [value - old for value, old in zip(slope, stress[k], strict=True)]
         evaluated = exact_terms(terms, (s11, s22, s33, s12), g, one, zero)

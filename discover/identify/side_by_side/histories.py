@@ -134,9 +134,7 @@ def differences(
     return [difference(observed[0], other) for other in observed[1:]]
 
 
-def observe_differences(
-    stresses: Float[np.ndarray, "*batch 4"],
-) -> Float[np.ndarray, "*batch 3"]:
+def observe_differences(stresses: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3"]:
     """Return σ12, N1 and N2 from the components 11, 22, 33, 12."""
     s11, s22, s33, s12 = np.moveaxis(stresses, -1, 0)
     return np.stack([s12, s11 - s22, s22 - s33], axis=-1)

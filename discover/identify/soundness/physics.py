@@ -99,11 +99,7 @@ class PhysicsReport(SentenceAndTable):
 
 
 def check_physics(
-    fluid: Fluid,
-    flows: FlowBatch,
-    names: Sequence[str],
-    weissenberg: float,
-    deborah: float,
+    fluid: Fluid, flows: FlowBatch, names: Sequence[str], weissenberg: float, deborah: float
 ) -> PhysicsReport:
     """Return the checks of a fluid.
 

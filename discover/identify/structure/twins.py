@@ -97,9 +97,7 @@ class Twin(NotebookView):
 
 
 def find_twins(
-    library: TermLibrary,
-    law: LawTerms,
-    base: AbstractConstitutiveLaw | None = None,
+    library: TermLibrary, law: LawTerms, base: AbstractConstitutiveLaw | None = None
 ) -> list[Twin]:
     """Return the twins of a law, simplest first, checked by simulation.
 

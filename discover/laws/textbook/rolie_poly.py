@@ -115,10 +115,7 @@ def _written() -> IsotropicFunction:
     import sympy
 
     ratio, beta, stretch, r = scalars("stretch_time_ratio", "beta", "Lambda", "r")
-    where = {
-        "Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3),
-        "r": 2 / ratio * (1 - 1 / stretch),
-    }
+    where = {"Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3), "r": 2 / ratio * (1 - 1 / stretch)}
     return IsotropicFunction({"I": r, "sigma": r * (1 + beta / stretch)}, where, _LETTERS)
 
 

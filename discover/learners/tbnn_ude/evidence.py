@@ -61,10 +61,7 @@ def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
 
 
 def posterior_draws(
-    law: TensorBasisNetwork,
-    problem: TrainingProblem,
-    keys: Key[Array, " draws"],
-    fits: float,
+    law: TensorBasisNetwork, problem: TrainingProblem, keys: Key[Array, " draws"], fits: float
 ) -> list[TensorBasisNetwork]:
     """Return laws around a trained one that fit the data about as well.
 

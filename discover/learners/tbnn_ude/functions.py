@@ -8,12 +8,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.initial_law import (
-    with_tensors,
-)
-from discover.learners.tbnn_ude.prior import (
-    least_variation,
-)
+from discover.learners.tbnn_ude.initial_law import with_tensors
+from discover.learners.tbnn_ude.prior import least_variation
 from discover.learners.tbnn_ude.session import PRIOR_SHARE, START_STEPS, Session
 
 _POLISHED = 2

@@ -8,10 +8,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.prior import (
-    Cloud,
-    parts,
-)
+from discover.learners.tbnn_ude.prior import Cloud, parts
 from discover.programs import compiled, on_device
 from tensor_library.invariants import scalar_invariants
 

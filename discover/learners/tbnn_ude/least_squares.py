@@ -29,10 +29,7 @@ _FAIR_STEPS = 4
 _FAR_BEHIND = 5.0
 
 Callback = Callable[[float], None]
-Integrate = Callable[
-    [Array, Rebuild, TrainingProblem],
-    tuple[Along, Float[Array, "runs n p"]],
-]
+Integrate = Callable[[Array, Rebuild, TrainingProblem], tuple[Along, Float[Array, "runs n p"]]]
 
 
 class Objective(eqx.Module):

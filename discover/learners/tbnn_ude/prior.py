@@ -110,9 +110,7 @@ def prior_residual(
 
 @compiled
 def reweighted(
-    law: TensorBasisNetwork,
-    cloud: Cloud,
-    strength: float | Float[Array, ""],
+    law: TensorBasisNetwork, cloud: Cloud, strength: float | Float[Array, ""]
 ) -> PriorWeights:
     """Return the weights of the next round, from the root mean squares of this one."""
     amount, variation = parts(law, cloud)

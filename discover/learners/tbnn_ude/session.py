@@ -9,12 +9,7 @@ from jaxtyping import Float
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.initial_law import constant_scale, without_empty_terms
 from discover.learners.tbnn_ude.least_squares import Objective, minimise, relative_misses
-from discover.learners.tbnn_ude.prior import (
-    Cloud,
-    PriorWeights,
-    cloud_of,
-    reweighted,
-)
+from discover.learners.tbnn_ude.prior import Cloud, PriorWeights, cloud_of, reweighted
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.recipe import DefaultRecipe
 from discover.learners.tbnn_ude.variational import Along, trajectories

@@ -66,10 +66,7 @@ class Rebuild(eqx.Module):
 
     @classmethod
     def of_constants(
-        cls,
-        law: TensorBasisNetwork,
-        moving: Bool[ArrayLike, "8"],
-        scale: Float[ArrayLike, "8"],
+        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
     ) -> "Rebuild":
         """Return the vector of the eight constants.
 
@@ -82,10 +79,7 @@ class Rebuild(eqx.Module):
 
     @classmethod
     def with_network(
-        cls,
-        law: TensorBasisNetwork,
-        moving: Bool[ArrayLike, "8"],
-        scale: Float[ArrayLike, "8"],
+        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
     ) -> "Rebuild":
         """Return the vector of the network's weights, then the eight constants.
 

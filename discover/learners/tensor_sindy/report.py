@@ -118,9 +118,7 @@ def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:
 
 
 def path_table(
-    search: SupportSearch,
-    path: Sequence[Fit],
-    held_out: Float[np.ndarray, "path runs"] | None,
+    search: SupportSearch, path: Sequence[Fit], held_out: Float[np.ndarray, "path runs"] | None
 ) -> list[dict[str, Any]]:
     """Return one row for each member of the path: support, size, misfits, log evidence.
 

@@ -38,12 +38,7 @@ class SupportSearch(Search):
     """
 
     def __init__(
-        self,
-        fitter: Fitter,
-        library: TermLibrary,
-        optimizer,
-        most: int,
-        say: Callable[[str], None],
+        self, fitter: Fitter, library: TermLibrary, optimizer, most: int, say: Callable[[str], None]
     ):
         super().__init__(fitter, min(most, len(library)), say)
         self.library, self.optimizer = library, optimizer

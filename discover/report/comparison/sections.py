@@ -147,9 +147,7 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
             "errors",
             "Errors in test flows",
             "Errors",
-            [
-                Part("The table of errors", "errors", errors),
-            ],
+            [Part("The table of errors", "errors", errors)],
         ),
         (
             "law",

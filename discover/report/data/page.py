@@ -42,10 +42,7 @@ def data_page(
         name=dataset.name,
         conditions=material_and_temperature(dataset),
         doubts=[str(finding) for finding in findings if finding.severity != "note"],
-        notes=[
-            *imported,
-            *(str(finding) for finding in findings if finding.severity == "note"),
-        ],
+        notes=[*imported, *(str(finding) for finding in findings if finding.severity == "note")],
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,
         lines=[*map(_line, dataset), *(_line(run, is_table=True) for run in tables)],

@@ -12,11 +12,7 @@ from discover.report.free_form_words import free_form_sentence
 from discover.report.wording import effect_title, percent, readable, sentence, significant
 from discover.words import listed
 
-KINDS = {
-    "constitutive": "in the fluid",
-    "kinematic": "in the flow",
-    "signal": "in the instrument",
-}
+KINDS = {"constitutive": "in the fluid", "kinematic": "in the flow", "signal": "in the instrument"}
 
 _LOOP = {
     "effects_added": "Your model is missing an effect; with it the data are fitted to the noise",
@@ -35,10 +31,7 @@ _UNTESTED = {
 _ALIKE = 0.05
 """Probability of a law from which on these runs do not exclude it."""
 
-_MEASURED = {
-    "flows": "what was measured",
-    "states": "the states that were measured",
-}
+_MEASURED = {"flows": "what was measured", "states": "the states that were measured"}
 
 _SLOW = 0.5
 """Correlation from which noise and a slow effect look alike for some samples on end."""

@@ -39,10 +39,7 @@ def by_mode_picture(
     """
     if not constants:
         return None
-    with figure(1, len(constants), width=9.0, height=2.8) as (
-        drawing,
-        axes,
-    ):
+    with figure(1, len(constants), width=9.0, height=2.8) as (drawing, axes):
         for panel, (name, constant) in zip(axes[0], constants.items(), strict=True):
             told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
             if told:

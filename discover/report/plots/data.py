@@ -154,10 +154,7 @@ def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> Picture:
         if sweep is not None:
             edges = sweep.angular_frequency
             inside = groups[(groups >= edges[0]) & (groups <= edges[-1])]
-            for values, colour in (
-                (sweep.storage_modulus, NETWORK),
-                (sweep.loss_modulus, SPARSE),
-            ):
+            for values, colour in ((sweep.storage_modulus, NETWORK), (sweep.loss_modulus, SPARSE)):
                 levels = np.interp(np.log(inside), np.log(edges), values)
                 for level in levels:
                     panel.axhline(level, color=colour, lw=0.8, ls=":")

@@ -17,8 +17,7 @@ _OTHER_RATE = 1.1  # flows whose rates differ by less than this factor are one f
 
 
 def holds_signal(
-    measured: Sequence[Float[np.ndarray, " _"]],
-    rates: Sequence[Float[np.ndarray, " _"]] | None,
+    measured: Sequence[Float[np.ndarray, " _"]], rates: Sequence[Float[np.ndarray, " _"]] | None
 ) -> bool:
     """Return whether records hold something that a law could be told from.
 

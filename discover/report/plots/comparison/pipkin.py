@@ -10,15 +10,7 @@ import numpy as np
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES
 from discover.learners.registry import learner_title
-from discover.report.plots.style import (
-    INK,
-    NETWORK,
-    TRUTH,
-    Picture,
-    figure,
-    legend_above,
-    picture,
-)
+from discover.report.plots.style import INK, NETWORK, TRUTH, Picture, figure, legend_above, picture
 from discover.report.wording import FIGURE_SYMBOLS, percent
 
 _STRONGEST = 0.55  # more would drown the number in the cell

@@ -21,10 +21,7 @@ from discover.report.plots.style import (
 from discover.report.wording import readable
 
 _MOST_BARS = 8
-_RULE_STYLES = {
-    "evidence": (SPARSE, "o", "evidence"),
-    "held_out": (NETWORK, "s", "held-out runs"),
-}
+_RULE_STYLES = {"evidence": (SPARSE, "o", "evidence"), "held_out": (NETWORK, "s", "held-out runs")}
 
 
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
