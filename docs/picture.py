@@ -13,8 +13,8 @@ from discover.compilation_cache import enable_compilation_cache
 from discover.precision import enable_x64
 from discover.report.plots.comparison.flows import curves, last_cycle
 from discover.report.plots.style import Picture, figure, legend_above, picture
-from discover.report.wording import FIGURE_SYMBOLS
 from discover.study.read import read_study
+from discover.words import FIGURE_SYMBOLS
 
 FLOW = "laos_3_1.5"
 TITLES = {

@@ -13,7 +13,7 @@ from discover.study.atomic import write_text
 PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
 """What lies in the folder of a batch beside the folders of its studies."""
 
-_PAUSE = 5.0  # seconds for which news are gathered before the page is written again
+_PAGE_PAUSE = 5.0  # seconds for which news are gathered before the page is written again
 
 
 class Summary:
@@ -41,7 +41,7 @@ class Summary:
         """Write in a few seconds: the next study may take hours, so the page cannot wait for it."""
         with self._lock:
             if self._timer is None:
-                self._timer = Timer(_PAUSE, self._write_if_possible)
+                self._timer = Timer(_PAGE_PAUSE, self._write_if_possible)
                 self._timer.daemon = True
                 self._timer.start()
 

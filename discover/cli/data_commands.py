@@ -23,7 +23,8 @@ FolderArgument = Annotated[
 @guarded
 def list_data(as_json: JsonOption = False) -> None:
     """List the data sets under DISCOVER_DATA."""
-    from discover.dataset.load import DATA_VARIABLE, INDEX_FILE
+    from discover.dataset.load import DATA_VARIABLE
+    from discover.dataset.read_run import INDEX_FILE
     from discover.dataset.tables.table import read_bytes
 
     root = os.environ.get(DATA_VARIABLE)

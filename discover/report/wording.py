@@ -4,15 +4,16 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from discover.answer.sentences import A_TRANSIENT as A_TRANSIENT
-from discover.answer.sentences import IF_LOADINGS as IF_LOADINGS
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
 from discover.protocols.kinematics import MODULI
-from discover.words import FIGURE_SYMBOLS, estimate, interval, percent_of, readable
-from discover.words import effect_title as effect_title
-from discover.words import effects_title as effects_title
-from discover.words import significant as significant
+from discover.words import (
+    FIGURE_SYMBOLS,
+    estimate,
+    interval,
+    percent_of,
+    readable,
+)
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 

@@ -10,7 +10,7 @@ from discover.batch.status import BatchResult, LearnerRow, StudyRow, StudyStatus
 from discover.batch.summary import Summary
 from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page
-from discover.report.wording import effect_title
+from discover.words import effect_title
 
 GOOD = {
     "learners": {

@@ -13,11 +13,12 @@ from discover.identify.exact.exact_series import (
     stress_series,
 )
 from discover.identify.exact.exact_terms import PRIME, exact_terms, residue
-from discover.identify.exact.relations import feels_33, spell, term_relations
+from discover.identify.exact.relations import feels_33, term_relations
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate
 from discover.simulate import simulate
 from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library.law_terms import spell
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 CUBIC = (

@@ -16,6 +16,7 @@ from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
 from discover.programs.fingerprint import NotDescribable, fingerprint
@@ -29,7 +30,7 @@ from discover.programs.store import (
 )
 from discover.programs.structure import put_together, take_apart
 from discover.protocols.protocol import oscillatory_shear, start_up
-from discover.simulate.solve import simulate, solve_batch
+from discover.simulate.solve import simulate
 from tensor_library.library import build_library
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))

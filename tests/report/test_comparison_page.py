@@ -13,15 +13,9 @@ from discover.report.comparison.learners import learner_lines
 from discover.report.comparison.report import write_comparison
 from discover.report.comparison.tables import error_rows
 from discover.report.parts import Missing, attempt
-from discover.report.wording import (
-    estimate,
-    interval,
-    percent,
-    percent_range,
-    significant,
-    terms_text,
-)
+from discover.report.wording import percent, percent_range, terms_text
 from discover.study import RunFolder
+from discover.words import estimate, interval, significant
 
 
 @pytest.mark.parametrize("number", NOT_THERE[:2])

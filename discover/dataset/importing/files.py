@@ -14,10 +14,10 @@ from discover.dataset.importing.text_rows import (
     Constant,
     constants_of,
     is_number,
-    name_and_unit,
     with_points,
 )
 from discover.dataset.tables.table import read_bytes
+from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
 from discover.new_names import require_new_name
 from discover.words import unknown_name

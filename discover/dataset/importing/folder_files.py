@@ -12,7 +12,8 @@ from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.load import INDEX_FILE, TESTS_FILE
+from discover.dataset.load import TESTS_FILE
+from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables.table import shown
 
 TABLES = {

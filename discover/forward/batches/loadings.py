@@ -22,7 +22,8 @@ from jaxtyping import Array, Bool, Float
 
 from discover.dataset import Run
 from discover.dataset.run import Loading
-from discover.statistics.residual import FEWEST_FAST, fast_part
+from discover.statistics.noise.whiteness import FEWEST_FAST
+from discover.statistics.residual import fast_part
 
 _LEAST = 1e-3
 """Relative noise below which none is taken to be: a law is not told to more digits."""

@@ -12,7 +12,7 @@ FROM_REST = 2
 _SHORTER, _EXACT = 0.25, 1e-12
 
 # Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
-_ROUNDING = 1e-13
+_STATE_ROUNDING = 1e-13
 
 # Of a change beside the modes, what it may add to their misfit
 _BESIDE = 10.0
@@ -107,7 +107,7 @@ def relative_change(
     `now`, `following`: approximations one after the other. `slowness`: relaxation time of each mode
     over that of a cycle. `tolerance`: change below which the iteration ends.
     """
-    told = 1.0 + _ROUNDING / tolerance * slowness
+    told = 1.0 + _STATE_ROUNDING / tolerance * slowness
     moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))
     return jnp.max(moved / told)
 

@@ -18,7 +18,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 
-Progress = Callable[[int, int, float], None]
+PaperProgress = Callable[[int, int, float], None]
 
 _CHUNK = 50
 """Iterations between two looks at the clock; each chunk is one compiled scan."""
@@ -112,7 +112,7 @@ def train_paper(
     key: PRNGKeyArray,
     linear_relaxation: bool,
     recipe: PaperRecipe | None,
-    progress: Progress | None = None,
+    progress: PaperProgress | None = None,
     base_law: AbstractConstitutiveLaw | None = None,
 ) -> tuple[TensorBasisNetwork, Float[np.ndarray, " m"]]:
     """Return a law trained by the paper's recipe, and the loss at every iteration.

@@ -5,16 +5,8 @@ from collections.abc import Iterator
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
 from discover.protocols.kinematics import in_words as quantities_in_words
-from discover.report.wording import (
-    learner_as_subject,
-    percent,
-    readable,
-    sentence,
-    significant,
-    terms_text,
-    worst,
-)
-from discover.words import listed, percent_of
+from discover.report.wording import learner_as_subject, percent, sentence, terms_text, worst
+from discover.words import listed, percent_of, readable, significant
 
 _MOST_TERMS = 4
 """More are a table and no sentence."""

@@ -8,7 +8,7 @@ import numpy as np
 from discover.comparison.comparison import Comparison
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
-from discover.report.wording import estimate, interval, readable
+from discover.words import estimate, interval, readable
 
 
 def law_rows(comparison: Comparison) -> list[dict[str, Any]]:

@@ -15,16 +15,8 @@ from discover.laws.registry import LAWS
 from discover.learners import RecoveredTerm
 from discover.learners.registry import learner_title
 from discover.report.plots.style import learner_colour
-from discover.report.wording import (
-    FIGURE_SYMBOLS,
-    RULES,
-    interval,
-    percent,
-    readable,
-    selection_sentence,
-    significant,
-)
-from discover.words import effects_title
+from discover.report.wording import RULES, percent, selection_sentence
+from discover.words import FIGURE_SYMBOLS, effects_title, interval, readable, significant
 
 
 def selection(comparison: Comparison) -> dict[str, Any] | None:

@@ -16,8 +16,7 @@ from discover.errors import InputError
 from discover.report.page import render
 from discover.report.parts import attempt
 from discover.report.plots.data import data_pictures, linear_function
-from discover.report.wording import significant
-from discover.words import counted
+from discover.words import counted, significant
 
 # From so many runs on one can be spared to judge
 _ENOUGH_TO_HOLD_OUT = 3

@@ -17,15 +17,10 @@ from discover.report.mathtext import formula
 from discover.report.overlay import Overlay
 from discover.report.page import safe_name
 from discover.report.plots.loop.errors import MOST_RANKED
-from discover.report.wording import (
-    FIGURE_SYMBOLS,
-    effect_title,
-    effects_title,
-    percent,
-    significant,
-)
+from discover.report.wording import percent
 from discover.statistics.projection import rms
 from discover.statistics.residual import fast_part
+from discover.words import FIGURE_SYMBOLS, effect_title, effects_title, significant
 
 
 def overlay_row(result: LoopResult, overlay: Overlay) -> dict[str, Any]:

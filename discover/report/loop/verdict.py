@@ -9,8 +9,8 @@ from discover.loop.loop_result import LoopResult
 from discover.loop.parts import LawFit
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.free_form_words import free_form_sentence
-from discover.report.wording import effect_title, percent, readable, sentence, significant
-from discover.words import listed
+from discover.report.wording import percent, sentence
+from discover.words import effect_title, listed, readable, significant
 
 KINDS = {"constitutive": "in the fluid", "kinematic": "in the flow", "signal": "in the instrument"}
 

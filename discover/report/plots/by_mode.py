@@ -16,8 +16,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
-from discover.report.wording import effect_title, interval, readable, significant
-from discover.words import listed
+from discover.words import effect_title, interval, listed, readable, significant
 
 _DEGREES = (
     "one constant for all modes",

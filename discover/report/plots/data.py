@@ -26,8 +26,8 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import FIGURE_SYMBOLS, percent
-from discover.words import counted
+from discover.report.wording import percent
+from discover.words import FIGURE_SYMBOLS, counted
 
 _MOST_RUNS = 24
 """Panels of runs, beyond which a page is too long to look through."""

@@ -20,7 +20,7 @@ from discover.report.plots.style import (
 from discover.statistics import HALF_BAND
 
 _MARKERS = "os^vD<>ph*"
-_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.8}
+_SHIFTED_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.8}
 _TABLES = {RELAXATION: ("G/b_T (Pa)", NETWORK), CREEP: ("J b_T (1/Pa)", SPARSE)}
 _LINES = {"WLF": ("-", NETWORK), "Arrhenius": ("--", SPARSE)}
 
@@ -29,7 +29,7 @@ def superposition_pictures(found: Superposition) -> list[Picture]:
     """Return the pictures of a superposition."""
     pictures = [_overlap(found), _van_gurp(found)] if SWEEP in found.tests else []
     if any(kind != SWEEP for kind in found.tests):
-        pictures.append(_over_time(found))
+        pictures.append(_functions_over_time(found))
     return [*pictures, _shifts(found)]
 
 
@@ -54,7 +54,7 @@ def _overlap(found: Superposition) -> Picture:
                 (axes[0, 0], moved.storage_modulus, NETWORK),
                 (axes[0, 1], moved.loss_modulus, SPARSE),
             ):
-                style = {**_POINTS, "marker": marker, "color": colour}
+                style = {**_SHIFTED_POINTS, "marker": marker, "color": colour}
                 panel.plot(moved.angular_frequency, values, label=label, **style)
         for panel, symbol in zip(axes[0], ("G′", "G″"), strict=True):
             panel.set(yscale="log", xlabel="ω a_T (rad/s)", ylabel=f"{symbol}/b_T (Pa)")
@@ -70,7 +70,7 @@ def _van_gurp(found: Superposition) -> Picture:
     with figure(1, 2, width=10.0, height=3.4) as (drawing, axes):
         for degrees, _, marker in _marked(found, SWEEP):
             storage, loss = found.tests[SWEEP][degrees].values
-            style = {**_POINTS, "marker": marker, "color": NETWORK}
+            style = {**_SHIFTED_POINTS, "marker": marker, "color": NETWORK}
             axes[0, 0].plot(np.hypot(storage, loss), np.degrees(np.arctan2(loss, storage)), **style)
             axes[0, 1].plot(storage, loss, **style)
         axes[0, 0].set(xscale="log", xlabel="|G*| (Pa)", ylabel="δ (°)")
@@ -84,14 +84,14 @@ def _van_gurp(found: Superposition) -> Picture:
         return picture(drawing, "van_gurp", caption)
 
 
-def _over_time(found: Superposition) -> Picture:
+def _functions_over_time(found: Superposition) -> Picture:
     kinds = [kind for kind in found.tests if kind != SWEEP]
     with figure(1, len(kinds), width=10.0, height=3.8) as (drawing, axes):
         for panel, kind in zip(axes[0], kinds, strict=True):
             symbol, colour = _TABLES[kind]
             for degrees, label, marker in _marked(found, kind):
                 moved = found.moved(kind, degrees)
-                style = {**_POINTS, "marker": marker, "color": colour}
+                style = {**_SHIFTED_POINTS, "marker": marker, "color": colour}
                 panel.plot(moved.argument, moved.values[0], label=label, **style)
             _predictions(found, kind, panel)
             panel.set(yscale="log", xlabel="t/a_T (s)", ylabel=symbol)

@@ -8,8 +8,8 @@ from scipy.ndimage import median_filter
 from scipy.stats import t as student
 
 _STANDS_OUT = 6.0  # robust standard deviations of the neighbourhood
-_BESIDE, _NEIGHBOURHOOD = 5, 25
-_REPEATED = 1e-3
+_SAME_PLACE_BESIDE, _SAME_PLACE_NEIGHBOURHOOD = 5, 25
+_SAME_PLACE_REPEATED = 1e-3
 """Probability below which samples at one place are no chance."""
 
 
@@ -28,13 +28,13 @@ def same_place_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
 
 def repeated(rows: Sequence[Float[np.ndarray, " _"]]) -> list[int]:
     """Return the places at which samples stand out in several runs alike; −1 is the last."""
-    return [at for at, probability in _places(rows) if probability <= _REPEATED]
+    return [at for at, probability in _places(rows) if probability <= _SAME_PLACE_REPEATED]
 
 
 def _places(rows: Sequence[Float[np.ndarray, " _"]]) -> list[tuple[int, float]]:
     """Return where samples of two runs or more stand out, and how probable it is that they do."""
     length = min(map(len, rows), default=0)
-    if len(rows) < 2 or length < _BESIDE:
+    if len(rows) < 2 or length < _SAME_PLACE_BESIDE:
         return []
     out = [_standing_out(np.asarray(row, dtype=float)) for row in rows]
     found = []
@@ -54,7 +54,7 @@ def _standing_out(row: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
 
     So neither a smooth misfit nor a loud stretch stands out; the first and the last sample may.
     """
-    apart = np.abs(row - median_filter(row, _BESIDE, mode="reflect"))
-    size = min(_NEIGHBOURHOOD, len(row))
+    apart = np.abs(row - median_filter(row, _SAME_PLACE_BESIDE, mode="reflect"))
+    size = min(_SAME_PLACE_NEIGHBOURHOOD, len(row))
     spread = 1.4826 * median_filter(apart, size, mode="reflect")
     return apart > _STANDS_OUT * spread

@@ -28,8 +28,7 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import FIGURE_SYMBOLS
-from discover.words import listed
+from discover.words import FIGURE_SYMBOLS, listed
 
 START_UP_SHOWN = 10.0
 

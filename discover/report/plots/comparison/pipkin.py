@@ -11,7 +11,8 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES
 from discover.learners.registry import learner_title
 from discover.report.plots.style import INK, NETWORK, TRUTH, Picture, figure, legend_above, picture
-from discover.report.wording import FIGURE_SYMBOLS, percent
+from discover.report.wording import percent
+from discover.words import FIGURE_SYMBOLS
 
 _STRONGEST = 0.55  # more would drown the number in the cell
 _TOLD = 10.0  # a larger relative error is no more than that in a cell

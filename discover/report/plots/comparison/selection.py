@@ -18,7 +18,7 @@ from discover.report.plots.style import (
     make_percentage,
     picture,
 )
-from discover.report.wording import readable
+from discover.words import readable
 
 _MOST_BARS = 8
 _RULE_STYLES = {"evidence": (SPARSE, "o", "evidence"), "held_out": (NETWORK, "s", "held-out runs")}

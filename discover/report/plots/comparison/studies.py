@@ -6,7 +6,7 @@ from discover.comparison.comparison import Comparison
 from discover.learners.registry import learner_title
 from discover.report.plots.comparison.flows import curves, units
 from discover.report.plots.style import Picture, figure, learner_style, legend_above, picture
-from discover.report.wording import readable
+from discover.words import readable
 
 
 def loss_picture(comparison: Comparison) -> Picture:

@@ -16,7 +16,8 @@ from discover.report.plots.style import (
     panels_of,
     picture,
 )
-from discover.report.wording import effect_title, percent
+from discover.report.wording import percent
+from discover.words import effect_title
 
 MOST_RANKED = 12
 """Candidates of a stage that are shown, the best."""

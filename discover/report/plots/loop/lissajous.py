@@ -11,7 +11,7 @@ from discover.report.plots.cycles import about_middle, in_last_cycle
 from discover.report.plots.loop.runs import draw_overlays, draw_run, short_title
 from discover.report.plots.style import MEASURED, Picture, figure, legend_above, picture
 
-_MOST = 4
+_MOST_DRAWN = 4
 
 
 def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture | None:
@@ -21,7 +21,7 @@ def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> P
     """
     found = [(r, w) for r in result.records if (w := oscillation(r)) is not None]
     found.sort(key=lambda pair: (not pair[0].held_out, -float(np.ptp(pair[0].strain))))
-    shown = found[:_MOST]
+    shown = found[:_MOST_DRAWN]
     if not shown:
         return None
     with figure(2, len(shown), width=10.0, height=2.3) as (drawing, axes):
@@ -43,7 +43,9 @@ def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> P
         axes[0, 0].set_ylabel("elastic: σ₁₂ (Pa)")
         axes[1, 0].set_ylabel("viscous: σ₁₂ (Pa)")
         legend_above(drawing, axes)
-        left = f" The {_MOST} widest of {len(found)} runs." if len(found) > _MOST else ""
+        left = (
+            f" The {_MOST_DRAWN} widest of {len(found)} runs." if len(found) > _MOST_DRAWN else ""
+        )
         return picture(
             drawing,
             "lissajous",

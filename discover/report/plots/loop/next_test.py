@@ -10,7 +10,8 @@ from discover.report.plots.style import (
     legend_above,
     picture,
 )
-from discover.report.wording import FIGURE_SYMBOLS, effects_title, percent
+from discover.report.wording import percent
+from discover.words import FIGURE_SYMBOLS, effects_title
 
 
 def next_test_picture(result: LoopResult) -> Picture | None:

@@ -13,10 +13,11 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import effect_title, percent
+from discover.report.wording import percent
 from discover.statistics.projection import rms
+from discover.words import effect_title
 
-_MOST, _COLUMNS = 6, 3
+_MOST_RIVALS, _COLUMNS = 6, 3
 
 
 def rivals_picture(result: LoopResult) -> Picture | None:
@@ -28,7 +29,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
     records = [r for r in result.records if r.is_transient and r.by_explanation is not None]
     if len(told) < 2 or not records:
         return None
-    shown = told[:_MOST]
+    shown = told[:_MOST_RIVALS]
     chosen = result.explanations.holding([stage.effect for stage in result.stages])
     with panels_of(len(shown), _COLUMNS, width=10.0, height=2.1) as (drawing, axes, panels):
         limit = 0.0
@@ -56,7 +57,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
         for panel in axes[:, 0]:
             panel.set_ylabel("residual (% of rms)")
         legend_above(drawing, axes)
-        left = f" The {_MOST} likeliest of {len(told)}." if len(told) > _MOST else ""
+        left = f" The {_MOST_RIVALS} likeliest of {len(told)}." if len(told) > _MOST_RIVALS else ""
         return picture(
             drawing,
             "rivals",

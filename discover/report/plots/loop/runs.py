@@ -24,7 +24,8 @@ from discover.report.plots.style import (
     picture,
     runs_through_decades,
 )
-from discover.report.wording import FIGURE_SYMBOLS, percent, recorded_symbol
+from discover.report.wording import percent, recorded_symbol
+from discover.words import FIGURE_SYMBOLS
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
