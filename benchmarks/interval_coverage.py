@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.signal import lfilter
 
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 
 CASES = (
     ("giesekus", {"alpha": 0.2}, ("sigma.sigma",), {"sigma.sigma": 0.2}),
@@ -43,9 +43,8 @@ def main() -> None:
     from discover.inference.engine.fits import Fitter
     from discover.learners.known_part import KnownPart
     from discover.learners.runs import as_runs
-    from discover.learners.tensor_sindy.library_problem import library_problem
     from discover.learners.tensor_sindy.report import recovered_terms
-    from discover.learners.tensor_sindy.search import SupportSearch
+    from discover.learners.tensor_sindy.search import SupportSearch, library_problem
     from discover.linear_algebra_threads import in_one_thread
     from discover.simulate import synthetic_dataset
     from tensor_library import TermLibrary, parse_term

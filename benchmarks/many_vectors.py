@@ -106,10 +106,10 @@ CASES = {
 def measured() -> dict[str, dict]:
     """Return milliseconds a vector of every case, seconds of the first call, and a prediction."""
     from discover.compilation_cache import enable_compilation_cache
+    from discover.first_use import enable_x64
     from discover.forward import AugmentedModel, make_batch
     from discover.forward.batches import data_scales
     from discover.forward.declared import DeclaredModel
-    from discover.precision import enable_x64
 
     candidates_of = import_module(f"discover.{LOOP}.candidates").candidates_of
     enable_x64()

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from discover.answer import sentences
 from discover.equations.equation import Equation
-from discover.plain_json import plain
+from discover.plain_numbers import plain
 from discover.summary_view import Estimate
 from discover.words import effect_title, estimate, interval, readable
 

@@ -20,7 +20,7 @@ from discover.answer.answer import Constant
 from discover.dataset import Run
 from discover.inference.engine.inelastic import viscosity
 from discover.protocols.kinematics import MODULI
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 Kind = Literal["yield_stress", "viscous", "solid"]
 

@@ -1,15 +1,21 @@
 """The flows on which learned laws are looked at, with what is known of the truth in each."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
+from discover.dataset.material_functions import as_compared
+from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.dataset.run import Run, sizes_of
+from discover.equations import law_terms
+from discover.errors import InputError
+from discover.laws import make_law
 from discover.laws.multimode import Fluid
+from discover.learners.runs import waiting
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import (
@@ -25,6 +31,8 @@ from discover.protocols.protocol import (
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerm
 
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""
@@ -326,3 +334,94 @@ def of_recorded(errors: Mapping[str, float | None], flow: Flow) -> dict[str, flo
     if flow.records_shear_stress:
         return dict(errors)
     return {flow.protocol.quantity: errors["sigma12"]}
+
+
+def prepared(data: StudyData) -> StudyData:
+    """Return data whose runs are as learners take them."""
+    if data.each:
+        raise InputError(
+            'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
+            'such as held_out = ["fast.csv"].'
+        )
+    return with_runs(data, as_compared)
+
+
+def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
+    """Return data in which what starts periodic has the cycles before it that learners wait for.
+
+    `data`: of a study, split. `relaxation_time`: the longest, in s. `relaxes`: whether the known
+    law relaxes, so that a periodic state is solved for.
+    """
+    return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
+
+
+def thinned_to(data: StudyData, most: int) -> StudyData:
+    """Return data with at most so many samples of each run, evenly chosen in their order.
+
+    Every sample is a step of the integration, and a record of thousands says little more of a law
+    than its hundreds do. What was thinned says so.
+    """
+    return with_each_run(data, lambda run: thin_run(run, most))
+
+
+def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
+    """Return data whose fitted runs lack the samples that stand alone, and words on them.
+
+    Squares would let them bend the law. Those of runs held out stay, and do not judge.
+    """
+    parts = [without_spikes(run) for run in data.fit.runs]
+    told = [f"{len(times)} of {run.name}" for run, times in parts if times]
+    if not told:
+        return data, ""
+    cleaned = {run.name: run for run, _ in parts}
+    dataset, fit = (
+        replace(part, runs=tuple(cleaned.get(run.name, run) for run in part.runs))
+        for part in (data.dataset, data.fit)
+    )
+    return replace(data, dataset=dataset, fit=fit), (f"Outliers excluded: {', '.join(told)}")
+
+
+def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
+    """Return data with each run changed, in every part of it."""
+    return with_runs(data, lambda runs: map(change, runs))
+
+
+def with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]) -> StudyData:
+    """Return data with the runs changed together, in every part of it."""
+    parts = {
+        name: replace(part, runs=tuple(change(part.runs)))
+        for name in ("dataset", "fit", "held_out")
+        for part in [getattr(data, name)]
+    }
+    return replace(data, **parts)
+
+
+def require_one_known_law(declared: DeclaredModel) -> None:
+    """Refuse a known part that only a closed loop can have."""
+    if declared.choice:
+        raise InputError(
+            "[model] law names several laws to choose from, which is for close-loop: a comparison "
+            "learns what one known law lacks. Name one law, or ucm."
+        )
+    if declared.by_mode:
+        raise InputError(
+            f"[model] by_mode lets {', '.join(declared.by_mode)} differ from mode to mode, which "
+            "only close-loop fits. Run discover close-loop on this study, and start from what "
+            'it finds: [model] from = "its folder". Or leave by_mode out.'
+        )
+
+
+def true_terms(
+    law: str, parameters: Mapping[str, float], known_relaxation: bool
+) -> tuple[LawTerm, ...] | None:
+    """Return what is missing from UCM in a named law; None if it is no sum of library terms.
+
+    `known_relaxation`: whether −σ is known. If not, it is missing too. Raises InputError if there
+    is no such law, or a parameter is missing or outside its range.
+    """
+    known = make_law(law, parameters)
+    try:
+        found = law_terms(known)
+    except InputError:
+        return None
+    return found if known_relaxation else (LawTerm("sigma", 1.0), *found)

@@ -6,11 +6,16 @@ from dataclasses import dataclass, field, replace
 import jax.numpy as jnp
 import numpy as np
 
-from discover.comparison.absorbed import absorbed
-from discover.comparison.flows import MEASURED, Flow, Stresses, comparison_flows, predict
+from discover.comparison.flows import (
+    MEASURED,
+    Flow,
+    Stresses,
+    comparison_flows,
+    predict,
+    with_each_run,
+)
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.prepared import with_each_run
-from discover.comparison.records import InRecord, corrected
+from discover.comparison.records import InRecord, absorbed, corrected
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect
 from discover.errors import InputError

@@ -25,7 +25,7 @@ from discover.identify import (
     check_physics,
     find_twins,
 )
-from discover.identify.soundness.physics_flows import time_scale
+from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found

@@ -4,17 +4,24 @@ An effect that a module of the dictionary holds is built in. Effects of a user's
 by a program or by an installed package (see docs/adding-an-effect.md).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from discover.effects import kinematic, memory, network, signal, structure
-from discover.effects.base import AbstractEffect, ConstitutiveEffect, KinematicEffect, SignalEffect
+from discover.effects.base import (
+    AbstractEffect,
+    ConstitutiveEffect,
+    EffectParameter,
+    KinematicEffect,
+    SignalEffect,
+)
 from discover.effects.library_term import library_effects, library_term
-from discover.errors import InputError
-from discover.new_names import require_new_name
-from discover.words import unknown_name
-from tensor_library.registry import Registry
+from discover.errors import InputError, Problems
+from discover.validation import require_new_name
+from discover.words import nearest, unknown_name
+from tensor_library.closed_forms import Registry
 from tensor_library.terms import parse_term
 
 if TYPE_CHECKING:
@@ -115,3 +122,193 @@ def make_effect(name: str) -> AbstractEffect:
             f"{unknown_name('effect', name, effects)} A term of the library is an effect too, such "
             "as 'tr(sigma)*sigma'."
         ) from error
+
+
+Written = Any
+"""As a study has them: effect → parameter → value or ``"fit"``; ``"fit"`` alone fits them all."""
+
+
+@dataclass(frozen=True)
+class KnownEffect:
+    """An effect that is part of the declared model.
+
+    `values`: of its parameters, in their units and order; None where one is to be fitted.
+    """
+
+    effect: AbstractEffect
+    values: tuple[float | None, ...]
+
+    @property
+    def name(self) -> str:
+        """Name of the effect."""
+        return self.effect.name
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that are to be fitted."""
+        pairs = zip(self.effect.parameters, self.values, strict=True)
+        return tuple(parameter.name for parameter, value in pairs if value is None)
+
+    @property
+    def text(self) -> str:
+        """The effect with its values, in words."""
+        pairs = zip(self.effect.parameters, self.values, strict=True)
+        parts = [
+            f"{p.name} to be fitted"
+            if value is None
+            else f"{p.name} = {value:.4g} {p.unit}".strip()
+            for p, value in pairs
+        ]
+        return f"{self.name.replace('_', ' ')} ({', '.join(parts)})"
+
+
+def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
+    """Return the effects that a study or a program names.
+
+    `written`: by name of the effect: values of its parameters, ``"fit"`` for those to be fitted
+    along. `where`: the place, for messages. Raises InputError if an effect or a parameter is
+    unknown, one is missing, or a value is outside its range.
+    """
+    if not isinstance(written, Mapping):
+        raise InputError(
+            f"{where} must name effects with their values, such as "
+            f'{{"rate_rise_time": {{"tau": 0.02}}}}; got {written!r}.'
+        )
+    found, problems = [], Problems()
+    for name, asked in written.items():
+        with problems.collected():
+            found.append(_known_effect(name, asked, where))
+    problems.require_none()
+    return tuple(found)
+
+
+def _known_effect(name: str, asked: object, where: str) -> KnownEffect:
+    try:
+        effect = make_effect(name)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    parameters = {parameter.name: parameter for parameter in effect.parameters}
+    if asked == "fit":
+        asked = dict.fromkeys(parameters, "fit")
+    if not isinstance(asked, Mapping):
+        raise InputError(
+            f'{where}: {name} must be "fit", or give its parameters: {", ".join(parameters)}; '
+            f"got {asked!r}."
+        )
+    problems, values = Problems(), []
+    unknown = [key for key in asked if key not in parameters]
+    for key in unknown:
+        said = unknown_name("parameter", key, parameters, f"the effect {name}")
+        problems.add(f"{where}: {said}")
+    meant = {nearest(key, parameters) for key in unknown}
+    for key, parameter in parameters.items():
+        if key in asked:
+            with problems.collected():
+                values.append(_value(asked[key], parameter, f"{where}: {name}"))
+        elif key not in meant:
+            problems.add(
+                f'{where}: the effect {name} needs {key} too. Write a number, or {key} = "fit".'
+            )
+    problems.require_none()
+    return KnownEffect(effect, tuple(values))
+
+
+def _value(asked: object, parameter: EffectParameter, where: str) -> float | None:
+    if asked == "fit":
+        return None
+    if isinstance(asked, bool) or not isinstance(asked, int | float):
+        raise InputError(f'{where}.{parameter.name} must be a number or "fit"; got {asked!r}.')
+    low, high = float(parameter.low), float(parameter.high)
+    # a range in a property of the data is known only beside the data
+    if parameter.range_scale == "one" and not low <= asked <= high:
+        unit = f" {parameter.unit}" if parameter.unit else ""
+        raise InputError(
+            f"{where}.{parameter.name} must lie between {low:g} and {high:g}{unit}; got {asked:g}."
+        )
+    return float(asked)
+
+
+_WHERE = {
+    "constitutive": "Constitutive: the fluid",
+    "kinematic": "Kinematic: the deformation that the fluid felt",
+    "signal": "Signal: what was recorded of the stress",
+}
+
+
+def reference_page() -> str:
+    """Return the dictionary in Markdown: equation, parameters, size, confirmation and source."""
+    effects = list(named_effects().values())
+    lines = [
+        "# The dictionary of effects",
+        "",
+        "These are the effects that the closed loop may add to a declared law. The first",
+        "parameter of an effect is its amplitude: at zero the effect changes nothing. The range",
+        "of a parameter is the range that it can have in a laboratory. If a fit drives a",
+        "parameter to the end of its range, or leaves it open over decades, that is not a",
+        "finding, and the effect is not named. Any term of the tensor library, such as",
+        "`tr(sigma)*sigma`, is a candidate too. An effect of your own is one file: see [adding",
+        "an effect](adding-an-effect.md).",
+        "",
+        "This page is written by `python -m discover.effects.registry > docs/effects.md`; a",
+        "test checks it against the code.",
+    ]
+    for kind, title in _WHERE.items():
+        lines += ["", f"## {title}"]
+        for effect in effects:
+            if effect.kind == kind:
+                lines += ["", *_entry(effect)]
+    return "\n".join(lines) + "\n"
+
+
+def _entry(effect: AbstractEffect) -> list[str]:
+    return [
+        f"### `{effect.name}`",
+        "",
+        f"$${effect.equation}$$",
+        "",
+        "| parameter | symbol | unit | physical range | reason for the range |",
+        "|---|---|---|---|---|",
+        *(
+            f"| `{parameter.name}` | ${parameter.symbol}$ | {parameter.unit or '–'} "
+            f"| {_range(parameter)} | {parameter.range_source} |"
+            for parameter in effect.parameters
+        ),
+        "",
+        *(["- A candidate only if a study asks for it by name."] if effect.on_request else []),
+        f"- Visible from: {effect.visible}",
+        f"- To confirm: {effect.check}",
+        f"- Source: {effect.source.rstrip('.')}.",
+        *(line for parameter in effect.parameters for line in _other_names(parameter)),
+    ]
+
+
+def _other_names(parameter: EffectParameter) -> Iterator[str]:
+    """Yield which alias the effect has in a limit of a constant."""
+    if parameter.endless:
+        yield f"- Also `{parameter.endless}` where no run lasts as long as ${parameter.symbol}$."
+    if parameter.absent:
+        yield f"- Also `{parameter.absent}` where ${parameter.symbol}$ may be {parameter.low:g}."
+
+
+_PROPERTIES = {
+    "run_time": "length of a run",
+    "inverse_rate": "1/(largest rate)",
+    "strain": "strain of a run",
+    "stress": "rms stress",
+    "inverse_stress": "1/(rms stress)",
+    "fluidity": "largest rate/(rms stress)",
+    "viscosity": "(rms stress)/(largest rate)",
+    "stress_rate": "(rms stress)/(length of a run)",
+}
+"""Properties of the data in which ranges are measured; medians over the fitted runs."""
+
+
+def _range(parameter: EffectParameter) -> str:
+    text = f"{parameter.low:g} to {parameter.high:g}"
+    if parameter.range_scale != "one":
+        text += f" × {_PROPERTIES[parameter.range_scale]}"
+    return text
+
+
+if __name__ == "__main__":
+    print(reference_page(), end="")

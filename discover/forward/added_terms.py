@@ -17,9 +17,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, LibraryTerm
-from tensor_library.contraction import contracted
-from tensor_library.integrity_basis import integrity_basis
-from tensor_library.invariants import scalar_invariants
+from tensor_library.algebra import contracted, integrity_basis, scalar_invariants
 from tensor_library.kinematics import rate_of_deformation
 
 

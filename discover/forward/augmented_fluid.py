@@ -15,9 +15,8 @@ from discover.effects import (
     StateEffect,
 )
 from discover.forward.added_terms import AddedTerms, InUse
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades
+from discover.forward.declared import DEGREE, Structure, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
-from discover.forward.structure import Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.protocols.kinematics import Kinematics

@@ -16,12 +16,10 @@ from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
-from discover.forward.by_mode import LARGEST, decades
-from discover.forward.declared import DeclaredModel, FreeParameter
+from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
 from discover.forward.linearised import Linearised, Point, linearised, widths_of
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.forward.structure import Structure
 from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept

@@ -16,7 +16,7 @@ from discover.forward.integrators.exponential_weights import (
 )
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
 
 Levels = tuple[Float[Array, "..."], ...]
 """States of the fluid."""

@@ -23,9 +23,8 @@ from discover.forward.batches import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.declared import DeclaredModel
+from discover.forward.declared import DeclaredModel, Numbers
 from discover.forward.program import Program
-from discover.forward.structure import Numbers
 from discover.programs import in_threads, on_device
 from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 

@@ -134,7 +134,7 @@ class Fluid(eqx.Module):
         import pandas as pd
 
         from discover.laws.registry import LAWS, name_of
-        from discover.notebook_view import as_html
+        from discover.summary_view import as_html
 
         named = name_of(self.law)
         law = type(self.law).__name__ if named is None else LAWS[named[0]].described(named[1])

@@ -13,9 +13,7 @@ from discover.laws.base import (
     as_state,
     stress_in,
 )
-from tensor_library.algebra import Symmetric
-from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
-from tensor_library.invariants import scalar_invariants
+from tensor_library.algebra import TENSOR_NAMES, Symmetric, integrity_basis, scalar_invariants
 from tensor_library.law_terms import LawTerm
 
 N_COEFFICIENTS = 8

@@ -12,8 +12,8 @@ from jaxtyping import Float
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.checking import check_law
 from discover.laws.multimode import Fluid
+from discover.laws.registry import check_law
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.settings import per_mode
 from discover.protocols.kinematics import FOLLOWED

@@ -7,11 +7,11 @@ from time import perf_counter
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.learners.results.result import LearnerResult
-from discover.new_names import require_new_name
+from discover.learners.results import LearnerResult
+from discover.validation import require_new_name
 from discover.words import unknown_name
+from tensor_library.closed_forms import Registry
 from tensor_library.library import TermLibrary
-from tensor_library.registry import Registry
 
 BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
 """Titles of the learners of this package."""

@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float
 from discover.errors import InputError
 from discover.programs import on_device
 from discover.words import listed, unknown_name
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 

@@ -30,7 +30,7 @@ from discover.report.plots.style import (
     runs_through_decades,
 )
 from discover.report.wording import percent, recorded_symbol
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,7 +23,7 @@ from discover.protocols.protocol import (
     shear_rates,
 )
 from discover.simulate.solve import ShearStress, simulate
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 
 @dataclass(frozen=True, repr=False)

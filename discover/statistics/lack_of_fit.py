@@ -7,12 +7,15 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.noise.dead_records import holds_signal
-from discover.statistics.noise.outliers import stray
+from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.outliers import holds_signal, stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
-from discover.statistics.noise.same_place import repeated
-from discover.statistics.noise.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
-from discover.statistics.projection import rms
+from discover.statistics.noise.whiteness import (
+    FEWEST_TESTED,
+    SIGNIFICANCE,
+    noise_probability,
+    repeated,
+)
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
 from discover.words import percent_of
 

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
-from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.noise_model import independent_samples
 from discover.statistics.noise.whiteness import (
     FEWEST_FAST,
     FEWEST_TESTED,

@@ -21,8 +21,8 @@ from collections import Counter
 
 import pytest
 
-from discover.batch import cluster, workers
 from discover.batch import run as batch
+from discover.batch import workers
 from discover.errors import InputError
 from discover.study.atomic import LOCK_FILE
 
@@ -30,8 +30,8 @@ STAND_IN = """
 import json, os, time
 import numpy as np
 from discover.batch import run as batch
-from discover.batch.tasks import TaskResult
-from discover.study.read import fingerprint, read_study
+from discover.batch.run import TaskResult
+from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 
 def compare(path, out, seed, overwrite, progress):
@@ -87,7 +87,7 @@ def studies(tmp_path, monkeypatch):
 def worker_with_stand_in(folder):
     """The command line of a worker that runs the stand-in."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
-    return [sys.executable, "-P", "-c", code + "from discover.batch.worker import main; main()"]
+    return [sys.executable, "-P", "-c", code + "from discover.batch.workers import main; main()"]
 
 
 def computed(folder):
@@ -343,7 +343,7 @@ def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
         "run._TASKS['compare'] = compare\n"
     )
     python, safe, option, code = worker_with_stand_in(tmp_path)
-    code = code.replace("from discover.batch.worker", fatal + "from discover.batch.worker")
+    code = code.replace("from discover.batch.workers", fatal + "from discover.batch.workers")
     monkeypatch.setattr(workers, "_COMMAND", [python, safe, option, code])
     result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
     assert [s.status for s in result.studies] == ["done", "failed"]
@@ -381,7 +381,7 @@ def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_p
             return batch.StudyStatus("a", "compare", "done", "found")
 
     job = ("a.toml", "a", "compare", str(tmp_path / "a"), None, False)
-    status = cluster._status_of(Future(), job)
+    status = workers._status_of(Future(), job)
     assert status.status == "failed"
     assert "one file system" in status.text
 

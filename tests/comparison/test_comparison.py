@@ -9,7 +9,7 @@ import pytest
 
 from discover.comparison import LearnerOutcome, compare, relative_errors
 from discover.comparison.comparison import Comparison
-from discover.comparison.truth import true_terms
+from discover.comparison.flows import true_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms

@@ -1,6 +1,6 @@
 """Sums of terms in a sentence."""
 
-from discover.identify.exact.relations import spell_briefly
+from discover.identify.relations import spell_briefly
 from tensor_library.law_terms import spell
 
 

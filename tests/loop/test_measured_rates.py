@@ -13,7 +13,7 @@ from discover.forward import AugmentedModel, make_batch
 from discover.laws import Fluid, Giesekus
 from discover.loop import DeclaredModel, run_loop, run_loop_on_each
 from discover.protocols import measured_rate, start_up
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict
 from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)

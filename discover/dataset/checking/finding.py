@@ -6,7 +6,7 @@ from typing import Any, Literal, get_args
 
 import pandas as pd
 
-from discover.notebook_view import NotebookView
+from discover.summary_view import NotebookView
 
 Severity = Literal["error", "warning", "note"]
 

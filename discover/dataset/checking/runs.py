@@ -9,7 +9,7 @@ from discover.dataset.checking.finding import Finding
 from discover.dataset.records.thinning import beside_a_step
 from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
-from discover.statistics.noise.held_values import read_times
+from discover.statistics.noise.noise_model import read_times
 
 FEWEST_SAMPLES = 10
 """Runs with fewer samples than this say little about a law."""

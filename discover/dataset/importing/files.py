@@ -19,9 +19,9 @@ from discover.dataset.importing.text_rows import (
 from discover.dataset.tables.table import read_bytes
 from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
-from discover.new_names import require_new_name
+from discover.validation import require_new_name
 from discover.words import unknown_name
-from tensor_library.registry import Registry
+from tensor_library.closed_forms import Registry
 
 _LARGEST_PART = 10_000_000
 """Bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects."""

@@ -17,7 +17,7 @@ from discover.dataset.linear_viscoelasticity import (
     relaxation_spectrum,
 )
 from discover.errors import InputError
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 _STIFFEST = 1e3
 """Times the largest modulus that a compliance shows at once, of a compliance that fits without one:

@@ -12,7 +12,7 @@ from discover.dataset.run import LARGEST, Loading, Run
 from discover.errors import InputError
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import shear_rates
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 
 _SAME = 0.02

@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from discover.dataset.tables.units import Quantity, find_column
 from discover.errors import InputError, Problems
-from discover.inputs_kept import note_input
+from discover.validation import note_input
 from discover.words import did_you_mean, listed, nearest
 
 LARGEST_FILE = 300_000_000
@@ -151,7 +151,7 @@ def read_bytes(
     """Return the content of a regular file of reasonable size.
 
     `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
-    whether a command that reads it must not write over it; see `discover.inputs_kept`. Raises
+    whether a command that reads it must not write over it; see `discover.validation`. Raises
     InputError if it is missing, cannot be read, is no regular file (a pipe would never end), or is
     larger than it may be.
     """

@@ -8,16 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.forward.batches.imposed_stress import StressFlows, at_given_stress
-from discover.forward.batches.records import Records, make_records
-from discover.forward.batches.states import (
+from discover.forward.batches.flows import (
     PeriodicFlows,
     Places,
     SteadyFlows,
+    StressFlows,
+    TransientFlows,
+    at_given_stress,
     oscillations,
     steady_states,
+    transients,
 )
-from discover.forward.batches.transient import TransientFlows, transients
+from discover.forward.batches.records import Records, make_records
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 """Flows of one control, which share one program; of all but oscillations one row for each run."""

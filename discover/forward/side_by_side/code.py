@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.declared import Numbers
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
-from discover.forward.structure import Numbers
 from discover.programs import compiled
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
 from discover.programs.lanes.arithmetic import INTEGER

@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.forward.starts.modified_newton import (
+from discover.forward.starts.half_cycles import MOST, TOLERANCE
+from discover.forward.starts.steady_states import (
     FROM_REST,
     Approximation,
     goes_on,
     next_approximation,
     relative_change,
 )
-from discover.forward.starts.periodic_start import MOST, TOLERANCE
 from discover.programs.lanes.arithmetic import INTEGER
 
 if TYPE_CHECKING:

@@ -17,16 +17,15 @@ import numpy as np
 
 from discover.effects import ConstitutiveEffect, StateEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
+from discover.forward.declared import Numbers
 from discover.forward.integrators.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,
     relax,
 )
-from discover.forward.structure import Numbers
 from discover.laws.each_mode import apart, of_each_mode
-from tensor_library.contraction import contracted
-from tensor_library.integrity_basis import integrity_basis
+from tensor_library.algebra import contracted, integrity_basis
 from tensor_library.kinematics import rate_of_deformation
 
 WEIGHTS = 10

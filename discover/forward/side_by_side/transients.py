@@ -17,11 +17,11 @@ from jaxtyping import Float
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, TransientFlows
+from discover.forward.declared import Numbers
 from discover.forward.dynamics import declared_weights
-from discover.forward.integrators.with_effects import JUMP
+from discover.forward.integrators.stepping import JUMP
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.step import WEIGHTS, Flags
-from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
 from discover.protocols.kinematics import normal_stress_differences

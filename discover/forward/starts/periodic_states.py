@@ -16,7 +16,7 @@ from discover.forward.starts.half_cycles import (
     first_harmonic,
     half_cycle,
 )
-from discover.forward.starts.modified_newton import (
+from discover.forward.starts.steady_states import (
     FROM_REST,
     Approximation,
     first_approximation,

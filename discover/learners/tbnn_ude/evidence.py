@@ -18,11 +18,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import law_misfit, relative_misses
-from discover.learners.tbnn_ude.prior import cloud_of
+from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
-from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
+from discover.learners.tbnn_ude.variational import (
+    Along,
+    Rebuild,
+    rebuilt,
+    side_by_side,
+    trajectories,
+)
 
 
 def surprises(

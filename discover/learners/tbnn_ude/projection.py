@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.prior import Cloud
+from discover.learners.tbnn_ude.least_squares import Cloud
 from discover.programs import compiled, on_device
 from tensor_library.library import TermLibrary
 
