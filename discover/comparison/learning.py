@@ -104,6 +104,8 @@ class Learning:
 
         Whether another one may share a process with threads is not known, so they come after.
         """
+        # before the threads: two that load scikit-learn at once find it half loaded
+        from discover.learners import tbnn_ude, tensor_sindy  # noqa: F401
 
         def part(learner: str) -> Callable[[Progress], LearnerOutcome]:
             return lambda say: self.outcome(learner, frame, say)
