@@ -28,14 +28,11 @@ def train(
     runs: Sequence[Run],
     seed: int = 0,
     progress: Progress = silent,
-    searched_library: TermLibrary | None = None,
 ) -> tuple[LearnerResult, Fluid]:
     """Return what one learner finds in these runs, and the fluid that it makes.
 
     `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `study`: the study,
     for the learner's settings. `model`: the known part. `progress`: called as it goes.
-    `searched_library`: the candidate terms of sparse regression and of registered learners, in
-    place of the study's.
     """
     options = study.compare
     plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
@@ -51,7 +48,7 @@ def train(
         from discover.learners.tensor_sindy import TensorSINDy
 
         sparse = TensorSINDy(
-            library=searched_library or library,
+            library=library,
             optimizer=options.optimizer,
             selection=options.selection,
             max_terms=options.max_terms,
@@ -75,7 +72,7 @@ def train(
         )
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
-    asked = LearningTask(tuple(runs), model.fluid, searched_library or library, seed, progress)
+    asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
     return learn_with(learner, asked)
 
 

@@ -125,13 +125,11 @@ def solved_on_grid(
     numbers: Numbers,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    together: bool = False,
 ) -> AtSamples:
     """Return what is seen where the rate is solved for: at a given stress, and of oscillations.
 
     `make`: the fluid of some numbers; derivatives pass through these alone. `numbers`: a tree.
-    `protocol`, `grid`: of one run, from `lay_out`. `together`: whether the samples are of use only
-    together, and not one is solved for once another cannot.
+    `protocol`, `grid`: of one run, from `lay_out`.
     """
     dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
@@ -139,33 +137,17 @@ def solved_on_grid(
 
     phase = grid.phase
     assert phase is not None  # of oscillations
-    axis = "states" if together else None
 
     def one(number):
         strain, rate = protocol.strain_in_table(number), protocol.rate(number)
-        found = periodic_state(dynamics, fixed, strain, rate / strain, phase, axis)
+        found = periodic_state(dynamics, fixed, strain, rate / strain, phase)
         return AtSamples(found.modulus * jnp.array([1.0, 0.0, 0.0]), found.stress.T, rate)
 
-    solve = jax.vmap(one, axis_name=axis)
-
-    def group(wanted, numbers):
-        if not together:
-            return wanted, solve(numbers)
-        shapes = jax.eval_shape(solve, numbers)
-        found = jax.lax.cond(
-            wanted,
-            solve,
-            lambda _: jax.tree.map(lambda leaf: jnp.full(leaf.shape, jnp.nan, leaf.dtype), shapes),
-            numbers,
-        )
-        return wanted & jnp.all(jnp.isfinite(found.observed)), found
-
-    # alike ones side by side, for all of a group take as many steps as the slowest; and the largest
-    # strain first, for it is where a law has no state
+    # alike ones side by side, for all of a group take as many steps as the slowest
     order = jnp.argsort(-jax.vmap(protocol.strain_in_table)(grid.times))
     size = min(len(order), _GROUP)
     places = jnp.pad(order, (0, -len(order) % size), mode="edge")
-    _, found = jax.lax.scan(group, jnp.asarray(True), grid.times[places].reshape(-1, size))
+    found = jax.lax.map(jax.vmap(one), grid.times[places].reshape(-1, size))
     of_sample = jnp.argsort(order)[grid.sample_index]  # not those that pad a record
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[of_sample], found)
 

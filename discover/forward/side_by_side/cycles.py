@@ -164,9 +164,9 @@ class Cycles:
         with self._w.builder.if_then(self._is(stage)), self._a.apart():
             yield
 
-    def _go_on(self, stage: int, index: int = 0) -> None:
+    def _go_on(self, stage: int) -> None:
         self._w.builder.store(INTEGER(stage), self._stage)
-        self._w.builder.store(INTEGER(index), self._index)
+        self._w.builder.store(INTEGER(0), self._index)
 
     def _keep(self, value: Any, place: int) -> None:
         self._code._keep(value, self._w.at((self._globals, 1), (place, 1)))

@@ -177,15 +177,13 @@ def periodic_state(
     strain: Float[Array, ""],
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
-    together: str | None,
 ) -> PeriodicState:
     """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
 
     They are those of the implicit function: none passes through the iteration.
 
     `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
-    same, through which no derivative passes. `together`: the name of an axis of states that are of
-    use only together, over which this is mapped: once one of them is given up, so are the others.
+    same, through which no derivative passes.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
@@ -216,11 +214,7 @@ def periodic_state(
         return _Solving(following, change, jacobian, harmonics)
 
     def hopeful(now: _Solving):
-        further = goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
-        if together is None:
-            return further
-        given_up = ~further & ~(now.change < NEWTON_STEP)
-        return further & (jax.lax.pmax(given_up.astype(int), together) == 0)
+        return goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
 
     size, modes = fixed.rest()[0].shape
     # the cycles from rest need no derivative

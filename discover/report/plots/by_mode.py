@@ -28,13 +28,12 @@ _TRIED = ("linear", "quadratic", "free")
 
 
 def by_mode_picture(
-    constants: Mapping[str, ConstantByMode], is_unexplained: bool, left_out: str = ""
+    constants: Mapping[str, ConstantByMode], is_unexplained: bool
 ) -> Picture | None:
     """Return each constant by mode with its band; None where there is none.
 
     `constants`: by name of the parameter, the effect or the term. `is_unexplained`: whether a law
-    with these constants leaves more than noise. `left_out`: what was not fitted, to save time, in
-    words.
+    with these constants leaves more than noise.
     """
     if not constants:
         return None
@@ -68,7 +67,7 @@ def by_mode_picture(
             "by_mode",
             f"{said}{doubt} Intervals take it that the law is the fluid's. They hold one degree "
             "more than was chosen, where one was tried, and modes that are free where more of them "
-            f"are told than a parabola has constants. {left_out}".rstrip(),
+            "are told than a parabola has constants.",
         )
 
 
