@@ -2,16 +2,11 @@
 
 import json
 import logging
-import os
-import signal
 import subprocess
-import sys
-import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
 from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
@@ -23,14 +18,11 @@ from uuid import uuid4
 
 from discover.batch.status import StudyStatus, now_and_then
 from discover.errors import InputError
-from discover.linear_algebra_threads import use_one_thread_from_the_start
 from discover.progress import Progress, on_stop
 from discover.python_child import python_command
-from discover.report.plots import keep_out_of_the_working_directory
-from discover.validation import inputs_kept
 
 _log = logging.getLogger(__name__)
-_COMMAND = python_command("-m", "discover.batch.workers")
+_COMMAND = python_command("-m", "discover.batch.worker")
 _STARTS = 3  # of a worker; what kills it as it starts, such as a short lack of memory, passes
 _DEATHS = 3  # workers that one study may kill
 
@@ -131,7 +123,7 @@ class _Team:
 
 
 class _Worker:
-    """A process that runs `discover.batch.workers`."""
+    """A process that runs `discover.batch.worker`."""
 
     def __init__(self):
         # in a session of its own: a terminal sends Ctrl-C to every process of a command, and it is
@@ -167,49 +159,6 @@ class _Worker:
         """End the process and return its exit code."""
         self._process.kill()
         return self._process.wait()
-
-
-def main() -> None:
-    """Run what is asked for until standard input ends, and then end at once.
-
-    It ends when the process that asks is gone, however that ended. A study is not waited for: it
-    would keep its folder locked, and what it had finished is kept.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the process that asks hears Ctrl-C
-    use_one_thread_from_the_start()
-    keep_out_of_the_working_directory()
-    from discover.batch.run import run_one
-    from discover.batch.status import now_and_then
-
-    # what a library prints must not stand between the lines
-    lines = os.fdopen(os.dup(1), "w", encoding="ascii")
-    os.dup2(2, 1)
-    lock = threading.Lock()
-
-    def send(**word: Any) -> None:
-        with lock:
-            lines.write(json.dumps(word) + "\n")
-            lines.flush()
-
-    jobs: SimpleQueue[list[Any]] = SimpleQueue()
-    threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
-    send(ready=True)
-    while True:
-        job = jobs.get()
-        progress = now_and_then(lambda text, fraction: send(progress=[text, float(fraction)]))
-        with inputs_kept():
-            status = run_one(*job, progress=progress)
-        send(status=asdict(status))
-
-
-def _listen(jobs: "SimpleQueue[list[Any]]") -> None:
-    for line in sys.stdin.buffer:
-        jobs.put(json.loads(line))
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main()
 
 
 def run_on_cluster(

@@ -87,7 +87,7 @@ def studies(tmp_path, monkeypatch):
 def worker_with_stand_in(folder):
     """The command line of a worker that runs the stand-in."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
-    return [sys.executable, "-P", "-c", code + "from discover.batch.workers import main; main()"]
+    return [sys.executable, "-P", "-c", code + "from discover.batch.worker import main; main()"]
 
 
 def computed(folder):
@@ -343,7 +343,7 @@ def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
         "run._TASKS['compare'] = compare\n"
     )
     python, safe, option, code = worker_with_stand_in(tmp_path)
-    code = code.replace("from discover.batch.workers", fatal + "from discover.batch.workers")
+    code = code.replace("from discover.batch.worker", fatal + "from discover.batch.worker")
     monkeypatch.setattr(workers, "_COMMAND", [python, safe, option, code])
     result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
     assert [s.status for s in result.studies] == ["done", "failed"]
