@@ -98,7 +98,7 @@ def computed(folder):
 def command(folder, pause=5.0):
     """The command line with the stand-in, to be completed by arguments."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
-    code += f"from discover.batch import summary, workers; summary._PAUSE = {pause}\n"
+    code += f"from discover.batch import status, workers; status._PAGE_PAUSE = {pause}\n"
     code += f"workers._COMMAND = {worker_with_stand_in(folder)!r}\n"
     # whoever started the tests may ignore the signal, as a shell's & does, or block it
     code += "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"

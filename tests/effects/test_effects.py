@@ -21,7 +21,7 @@ from discover.effects import (
     named_effects,
 )
 from discover.effects.kinematic import first_order_lag
-from discover.effects.registry import reference_page
+from discover.effects.reference import reference_page
 from discover.errors import InputError
 from discover.forward import data_scales
 from discover.laws import LAWS, FenePeterlin
