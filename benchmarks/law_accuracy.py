@@ -23,10 +23,10 @@ from independent.homogeneous import UNIT
 from independent.named import CONSTANTS, material
 from scipy.integrate import solve_ivp
 
+from discover.first_use import enable_x64
 from discover.forward.fluids import observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.laws import Fluid, make_law
-from discover.precision import enable_x64
 from discover.protocols import FlowProtocol, imposed_stress, in_flow, oscillatory_shear, start_up
 
 SHEAR_RATE, AMPLITUDE, FREQUENCY, HENCKY_RATE = 3.0, 2.0, 1.0, 0.8

@@ -18,14 +18,13 @@ from independent.folders import write_study
 from discover.compilation_cache import enable_compilation_cache
 from discover.dataset import Run
 from discover.errors import InputError
+from discover.first_use import enable_x64
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
 from discover.laws import LAWS
 from discover.loop.loop import Task, with_law
 from discover.loop.runs import MOST_SAMPLES, split_runs
-from discover.precision import enable_x64
-from discover.study.data import load_study_data
+from discover.study.data import load_study_data, read_study
 from discover.study.declared_model import declared_model, forward_model
-from discover.study.read import read_study
 
 # others bring a spectrum of their own, and are fitted where they are named
 ONE_MODE = [name for name, law in LAWS.items() if law.is_one_mode]

@@ -42,7 +42,7 @@ def without_pages() -> Iterator[None]:
 
 def answer(folder: Path, question: str, sections: Mapping[str, Mapping[str, Any]]) -> dict:
     """Return the JSON that a command writes of a study with these sections."""
-    from discover.batch.tasks import run_close_loop, run_compare
+    from discover.batch.run import run_close_loop, run_compare
 
     study = write_study(folder / f"{question}.toml", sections)
     execute = run_close_loop if question == "close-loop" else run_compare

@@ -91,13 +91,7 @@ __all__ = [
 _PLACES = {
     "discover.loop.in_memory": ("close_loop",),
     "discover.comparison.in_memory": ("compare",),
-    "discover.dataset": (
-        "LinearSweep",
-        "Dataset",
-        "Run",
-        "check_folder",
-        "load_dataset",
-    ),
+    "discover.dataset": ("LinearSweep", "Dataset", "Run", "check_folder", "load_dataset"),
     "discover.dataset.from_dataframe": ("from_dataframe",),
     "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),

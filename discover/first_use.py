@@ -10,7 +10,18 @@ import sys
 
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError
-from discover.precision import enable_x64
+
+
+def enable_x64() -> None:
+    """Make JAX compute in float64.
+
+    Sparse regression and reference solutions need it. Whatever computes calls this when it is first
+    used (`discover.first_use`); ``import discover`` alone changes no global setting.
+    """
+    import jax
+
+    jax.config.update("jax_enable_x64", True)
+
 
 _SINGLE = ("float32", "complex64")
 

@@ -1,7 +1,7 @@
 """One shape of progress, for everything that takes long."""
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from threading import Event
 
@@ -122,3 +122,27 @@ def by_steps(progress: Progress | None) -> Callable[[int, int, float], None]:
         (progress or silent)(f"step {step} of at most {total}, loss {loss:.2g}", largest)
 
     return say
+
+
+_registered: list[Callable[[], object]] = []
+
+
+@contextmanager
+def on_stop(callback: Callable[[], object]) -> Iterator[None]:
+    """Have a function called if the program is stopped while the context lasts.
+
+    Whatever decides to stop the program calls `run_stop_callbacks`, from a thread of its own.
+    Nothing is called if the context ends by itself.
+    """
+    _registered.append(callback)
+    try:
+        yield
+    finally:
+        _registered.remove(callback)
+
+
+def run_stop_callbacks() -> None:
+    """Call what is registered, the last first; one that fails does not stop the others."""
+    for callback in reversed(_registered):
+        with suppress(Exception):
+            callback()

@@ -1,15 +1,110 @@
 """Results that are constants with intervals: as a table, as intervals, as a figure."""
 
-from collections.abc import Mapping, Sequence
+import html
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, ClassVar
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
 import pandas as pd
 from scipy.stats import norm
 
 from discover.errors import InputError
-from discover.notebook_view import NotebookView
+
+
+class NotebookView:
+    """A result that shows itself in a notebook; a class says with `_shown` of which parts."""
+
+    def _shown(self) -> Iterable[Any]:
+        """Return sentences, tables and other results, in the order in which they are shown."""
+        raise NotImplementedError
+
+    def _repr_html_(self) -> str:
+        return "".join(map(as_html, self._shown()))
+
+
+class SentenceAndTable(NotebookView, ABC):
+    """A result that one sentence sums up and a table lays out."""
+
+    @property
+    @abstractmethod
+    def text(self) -> str:
+        """One sentence for a reader."""
+
+    @abstractmethod
+    def table(self) -> pd.DataFrame:
+        """Return what it consists of, one line each."""
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+        yield self.table()
+
+
+def as_html(part: Any) -> str:
+    """Return one part of a view as HTML; text is escaped.
+
+    Parameters
+    ----------
+    part
+        A sentence, a table, or what has a ``_repr_html_`` of its own. An empty table or sentence
+        gives nothing, and so does a column without any entry.
+    """
+    if isinstance(part, str):
+        return f"<p>{html.escape(part)}</p>" if part else ""
+    if not isinstance(part, pd.DataFrame):
+        return part._repr_html_()
+    if part.empty:
+        return ""
+    # lines that are only counted need no number in the margin
+    numbered = isinstance(part.index, pd.RangeIndex)
+    with pd.option_context("display.max_colwidth", None):  # a sentence is not cut
+        return part.dropna(axis="columns", how="all").to_html(
+            escape=True, index=not numbered, float_format="{:.4g}".format, na_rep="–"
+        )
+
+
+@runtime_checkable
+class HasLine(Protocol):
+    """A result that is one line of a table of its kind."""
+
+    def line(self) -> Mapping[str, Any]:
+        """Return the columns of the line."""
+        ...
+
+
+def table_of(results: Sequence[HasLine]) -> pd.DataFrame:
+    """Return results of one kind as a table, one line each."""
+    return pd.DataFrame([dict(result.line()) for result in results])
+
+
+class PageView:
+    """A result with a page in the report; a class says with `_page` who writes it."""
+
+    _page: ClassVar[str]
+    """Module and function, with a colon between: from the result to the text of the page."""
+
+    def to_html(self, path: str | Path) -> Path:
+        """Write the report on this result as one self-contained file.
+
+        Parameters
+        ----------
+        path
+            The file, such as ``comparison.html``; replaced if it is there.
+
+        Returns
+        -------
+        The file.
+        """
+        # the report stands above the results that it shows, and brings matplotlib with it: it is
+        # named here, and loaded only when somebody wants a page
+        module, _, function = self._page.partition(":")
+        text = getattr(import_module(module), function)(self)
+        path = Path(path)
+        path.write_text(text, encoding="utf-8")
+        return path
+
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

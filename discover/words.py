@@ -131,13 +131,7 @@ def _digits(value: float) -> str:
     return f"{value + 0.0:.12g}".replace("-", "−")
 
 
-_LETTERS = (
-    ("gammadot", "γ̇"),
-    ("sigma", "σ"),
-    ("epsilon", "ε"),
-    ("kappa", "κ"),
-    ("*", " "),
-)
+_LETTERS = (("gammadot", "γ̇"), ("sigma", "σ"), ("epsilon", "ε"), ("kappa", "κ"), ("*", " "))
 _WORDS = {"alpha": "α", "beta": "β", "eta s": "ηₛ", "tau": "τ", "xi": "ξ"}
 """Letters that are also parts of English words."""
 

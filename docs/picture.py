@@ -10,11 +10,11 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES
 from discover.comparison.run_comparison import compare
 from discover.compilation_cache import enable_compilation_cache
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 from discover.report.plots.comparison.flows import curves, last_cycle
 from discover.report.plots.style import Picture, figure, legend_above, picture
-from discover.report.wording import FIGURE_SYMBOLS
-from discover.study.read import read_study
+from discover.study.data import read_study
+from discover.words import FIGURE_SYMBOLS
 
 FLOW = "laos_3_1.5"
 TITLES = {

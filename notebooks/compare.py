@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 
 from discover.compilation_cache import enable_compilation_cache
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 
 enable_x64()
 enable_compilation_cache()

@@ -99,7 +99,7 @@ pd.Series(mobilities(free), name="should all be −0.3").round(3).to_frame()
 # needs cvxpy: `pip install "discover-rheology[cvxpy]"`.
 
 # %%
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 
 enable_x64()
 

@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from discover.compilation_cache import enable_compilation_cache
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 
 enable_x64()
 enable_compilation_cache()
@@ -30,9 +30,9 @@ from discover.identify import analyse_structure, find_twins
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.learners.tensor_sindy import TensorSINDy
-from discover.notebook_view import table_of
 from discover.protocols import oscillatory_shear
 from discover.simulate import simulate, synthetic_dataset
+from discover.summary_view import table_of
 from tensor_library import LawTerms, TermLibrary, build_library, parse_term
 
 flows = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1, 2) for de in (0.5, 1)}

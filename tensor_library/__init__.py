@@ -1,18 +1,20 @@
 """Tensor mathematics of constitutive laws: basis, invariants, candidate terms, libraries."""
 
 from tensor_library.algebra import (
+    INVARIANT_NAMES,
+    SHEAR_COMPONENTS,
+    TENSOR_NAMES,
     anticommutator,
     from_shear,
     identity_like,
     inner,
+    integrity_basis,
+    scalar_invariants,
     square,
     to_shear,
     trace,
 )
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm, register_closed_form
-from tensor_library.conventions import SHEAR_COMPONENTS
-from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
-from tensor_library.invariants import INVARIANT_NAMES, scalar_invariants
 from tensor_library.kinematics import (
     planar_extension,
     rate_of_deformation,

@@ -143,9 +143,127 @@ def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
     a11, a22, a33, a12 = components
     zero = jnp.zeros_like(a11)
     return jnp.stack(
+        [jnp.stack([a11, a12, zero]), jnp.stack([a12, a22, zero]), jnp.stack([zero, zero, a33])]
+    )
+
+
+def contracted(
+    first: Float[Array, "..."], second: Float[Array, "..."], in_one_piece: bool = True
+) -> Float[Array, "..."]:
+    """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
+
+    `first`, `second`: the last axis of the one and the first of the other are as long.
+    `in_one_piece`: whether no product of matrices is to stand in the loop.
+    """
+    if not in_one_piece:
+        return jnp.tensordot(first, second, axes=1)
+    columns = (1,) * (second.ndim - 1)
+    return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)
+
+
+SHEAR_COMPONENTS = ("11", "22", "33", "12")
+"""Order of the four components that live in simple shear."""
+
+
+INVARIANT_NAMES = (
+    "tr(sigma)",
+    "tr(sigma.sigma)",
+    "tr(gammadot.gammadot)",
+    "tr(sigma.sigma.sigma)",
+    "tr(gammadot.gammadot.gammadot)",
+    "tr(sigma.sigma.gammadot)",
+    "tr(sigma.gammadot.gammadot)",
+    "tr(sigma.gammadot)",
+)
+"""Canonical spellings, in the order of `scalar_invariants`."""
+
+INVARIANT_ORDERS = (1, 2, 2, 3, 3, 3, 3, 2)
+"""Number of tensors multiplied in each invariant; used as a measure of complexity."""
+
+IDENTICALLY_ZERO_IN_SHEAR = (4,)
+"""Indices of invariants that vanish in every simple shear flow: tr γ̇³ = 0."""
+
+
+def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
+    """Return the invariants of two symmetric tensors named in `INVARIANT_NAMES`.
+
+    Smith's list has ten for two symmetric tensors   [Smith 1971, IJES 9, 899]. Two are left out:
+    tr γ̇, which vanishes in an incompressible flow, and tr σ²γ̇², which in simple shear follows from
+    the others. In a general flow it does not follow, so a law in these eight is not the most
+    general one there.
+
+    Parameters
+    ----------
+    stress, rate
+        Symmetric dimensionless tensors, both of shape (3, 3) or both (4,).
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import scalar_invariants
+    >>> sigma = jnp.diag(jnp.asarray([2.0, 0.0, 0.0]))
+    >>> scalar_invariants(sigma, jnp.zeros((3, 3)))[:2].tolist()  # tr σ, tr σ²
+    [2.0, 4.0]
+    """
+    stress_squared = square(stress)
+    rate_squared = square(rate)
+    return jnp.stack(
         [
-            jnp.stack([a11, a12, zero]),
-            jnp.stack([a12, a22, zero]),
-            jnp.stack([zero, zero, a33]),
+            trace(stress),
+            trace(stress_squared),
+            trace(rate_squared),
+            inner(stress_squared, stress),
+            inner(rate_squared, rate),
+            inner(stress_squared, rate),
+            inner(stress, rate_squared),
+            inner(stress, rate),
+        ]
+    )
+
+
+TENSOR_NAMES = (
+    "I",
+    "sigma",
+    "gammadot",
+    "sigma.sigma",
+    "gammadot.gammadot",
+    "sigma.gammadot+gammadot.sigma",
+    "sigma.sigma.gammadot+gammadot.sigma.sigma",
+    "sigma.gammadot.gammadot+gammadot.gammadot.sigma",
+)
+"""Canonical spellings, in the order of `integrity_basis`."""
+
+TENSOR_ORDERS = (0, 1, 1, 2, 2, 2, 3, 3)
+"""Number of tensors multiplied in each; used as a measure of complexity."""
+
+
+def integrity_basis(
+    stress: Symmetric, rate: Symmetric
+) -> Float[Array, "8 3 3"] | Float[Array, "8 4"]:
+    """Return I, σ, γ̇, σ², γ̇², σγ̇+γ̇σ, σ²γ̇+γ̇σ², σγ̇²+γ̇²σ   [Smith 1971, IJES 9, 899].
+
+    Any isotropic symmetric tensor function of two symmetric tensors is a sum of these with
+    coefficients that depend on the ten invariants of the two alone, so a law written in them does
+    not depend on the observer. `scalar_invariants` has eight of the ten.
+
+    Examples
+    --------
+    >>> import jax.numpy as jnp
+    >>> from tensor_library import integrity_basis
+    >>> integrity_basis(jnp.zeros(4), jnp.zeros(4)).shape
+    (8, 4)
+    """
+    stress_squared = square(stress)
+    rate_squared = square(rate)
+    return jnp.stack(
+        [
+            identity_like(stress),
+            stress,
+            rate,
+            stress_squared,
+            rate_squared,
+            anticommutator(stress, rate),
+            anticommutator(stress_squared, rate),
+            anticommutator(stress, rate_squared),
         ]
     )

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tensor_library.integrity_basis import TENSOR_NAMES
-from tensor_library.invariants import INVARIANT_NAMES
+from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
 from tensor_library.notation import Notation, T
 
 if TYPE_CHECKING:

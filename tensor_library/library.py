@@ -9,10 +9,15 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from tensor_library.algebra import Symmetric
+from tensor_library.algebra import (
+    IDENTICALLY_ZERO_IN_SHEAR,
+    INVARIANT_NAMES,
+    TENSOR_NAMES,
+    Symmetric,
+    integrity_basis,
+    scalar_invariants,
+)
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
-from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
-from tensor_library.invariants import IDENTICALLY_ZERO_IN_SHEAR, INVARIANT_NAMES, scalar_invariants
 from tensor_library.terms import CandidateTerm
 
 N_INVARIANTS = len(INVARIANT_NAMES)

@@ -4,10 +4,13 @@
 brackets. A notation only says how it writes a tensor, a product or a bracket.
 """
 
+import re
 import unicodedata
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
+
+import sympy
 
 T = TypeVar("T")
 
@@ -98,3 +101,154 @@ def greek_letter(name: str) -> str | None:
         return unicodedata.lookup(f"GREEK {size} LETTER {name.lower().replace('lambda', 'lamda')}")
     except KeyError:
         return None
+
+
+STRESS = sympy.Symbol("sigma", commutative=False)
+RATE = sympy.Symbol("gammadot", commutative=False)
+UNIT = sympy.Symbol("I", commutative=False)
+
+
+class Trace(sympy.Function):
+    """Trace of a product of tensors: a scalar, so it commutes."""
+
+    is_commutative = True
+    nargs = 1
+
+    # SymPy has a Trace of its own, of matrices, and prints any class of that name as if it were it
+    def _latex(self, printer, exp=None):
+        text = rf"\operatorname{{tr}}\left({printer._print(self.args[0])}\right)"
+        return text if exp is None else rf"{text}^{{{exp}}}"
+
+    def _pretty(self, printer):
+        return printer._print_Function(self, func_name="tr")
+
+
+class SympyNotation(Notation[sympy.Expr]):
+    """Expressions; brackets are the expression tree's own."""
+
+    def tensor(self, name: str) -> sympy.Expr:
+        """Return a non-commuting symbol."""
+        return {"I": UNIT, "sigma": STRESS, "gammadot": RATE}[name]
+
+    def contraction(self, tensors: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the product in this order."""
+        return sympy.Mul(*tensors)
+
+    def sum(self, summands: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the sum."""
+        return sympy.Add(*summands)
+
+    def trace(self, tensor: sympy.Expr) -> sympy.Expr:
+        """Return the trace, which commutes."""
+        return Trace(tensor)  # pyright: ignore[reportReturnType]
+
+    def power(self, scalar: sympy.Expr, exponent: int) -> sympy.Expr:
+        """Return the power."""
+        return sympy.Pow(scalar, exponent)
+
+    def number(self, value: float) -> sympy.Expr:
+        """Return a float."""
+        return sympy.Float(value)
+
+    def letter(self, name: str) -> sympy.Expr:
+        """Return a symbol."""
+        return sympy.Symbol(name)
+
+    def exponential(self, rate: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
+        """Return exp(rate · trace) − 1."""
+        return sympy.exp(rate * trace) - 1  # pyright: ignore[reportReturnType]
+
+    def saturating(self, level: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
+        """Return trace/(1 + level |trace|)."""
+        return trace / (1 + level * sympy.Abs(trace))
+
+    def scalar(
+        self, expression: Any, letters: Mapping[str, sympy.Expr], factor: bool = False
+    ) -> sympy.Expr:
+        """Return the expression."""
+        return expression.xreplace({one: letters[one.name] for one in expression.free_symbols})
+
+    def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
+        """Return the product."""
+        return sympy.Mul(*factors)
+
+
+_TENSORS = {
+    "I": r"\boldsymbol{I}",
+    "sigma": r"\boldsymbol{\sigma}",
+    "gammadot": r"\dot{\boldsymbol{\gamma}}",
+}
+
+
+def latex_number(value: float, digits: int) -> str:
+    """Return a number as LaTeX, powers of ten typeset."""
+    mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
+    return mantissa + (rf" \times 10^{{{int(exponent)}}}" if exponent else "")
+
+
+class LatexNotation(Notation[str]):
+    """LaTeX with so many significant digits in its numbers."""
+
+    def __init__(self, digits: int = 5):
+        self.digits = digits
+
+    def tensor(self, name: str) -> str:
+        """Return a bold letter."""
+        return _TENSORS[name]
+
+    def contraction(self, tensors: Sequence[str]) -> str:
+        r"""Return the tensors with ``\cdot`` between them."""
+        return r" \cdot ".join(tensors)
+
+    def sum(self, summands: Sequence[str]) -> str:
+        """Return the bracketed sum."""
+        return _bracketed(" + ".join(summands))
+
+    def trace(self, tensor: str) -> str:
+        r"""Return ``\operatorname{tr}`` of the bracketed contraction."""
+        return r"\operatorname{tr}" + _bracketed(tensor)
+
+    def power(self, scalar: str, exponent: int) -> str:
+        """Return the bracketed trace and its exponent: tr(σ)² could be taken for tr(σ²)."""
+        return f"{_bracketed(scalar)}^{{{exponent}}}"
+
+    def number(self, value: float) -> str:
+        """Return a number, bracketed if negative."""
+        text = latex_number(value, self.digits)
+        return _bracketed(text) if text.startswith("-") else text
+
+    def letter(self, name: str) -> str:
+        """Return a Greek letter, or the name in upright letters."""
+        if greek_letter(name):
+            return rf"\{name}"
+        return r"\mathrm{" + name.replace("_", r"\_") + "}"
+
+    def exponential(self, rate: str, trace: str) -> str:
+        """Return the bracketed exponential minus one."""
+        return _bracketed(rf"e^{{{rate} \, {trace}}} - 1")
+
+    def saturating(self, level: str, trace: str) -> str:
+        """Return a fraction."""
+        return rf"\frac{{{trace}}}{{1 + {level} \, \left|{trace}\right|}}"
+
+    def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
+        """Return the expression as SymPy typesets it."""
+        import sympy
+
+        def printer(found: Any) -> str:
+            # thin spaces as between the factors of a term; a power is one of the whole letter
+            text = sympy.latex(found, mul_symbol=r" \, ")
+            return re.sub(r"scalar[a-z]of(?=\^)", lambda one: _bracketed(one[0]), text)
+
+        times = r" \times "
+        known = {n: _bracketed(one) if times in one else one for n, one in letters.items()}
+        text, is_sum = printed(expression, known, printer)
+        return _bracketed(text) if factor and is_sum else text
+
+    def product(self, factors: Sequence[str]) -> str:
+        """Return the factors with thin spaces between them."""
+        return r" \, ".join(factors)
+
+
+def _bracketed(text: str) -> str:
+    return rf"\left({text}\right)"

@@ -8,12 +8,17 @@ from typing import TYPE_CHECKING
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from tensor_library.algebra import Symmetric
+from tensor_library.algebra import (
+    INVARIANT_NAMES,
+    INVARIANT_ORDERS,
+    TENSOR_NAMES,
+    TENSOR_ORDERS,
+    Symmetric,
+    integrity_basis,
+    scalar_invariants,
+)
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
-from tensor_library.integrity_basis import TENSOR_NAMES, TENSOR_ORDERS, integrity_basis
-from tensor_library.invariants import INVARIANT_NAMES, INVARIANT_ORDERS, scalar_invariants
-from tensor_library.latex import LatexNotation
-from tensor_library.notation import Notation, T
+from tensor_library.notation import LatexNotation, Notation, T
 
 if TYPE_CHECKING:
     import sympy
@@ -162,7 +167,7 @@ class CandidateTerm:
 
     def sympy(self) -> "sympy.Expr":
         """Return the term as a SymPy expression with non-commuting tensors."""
-        from tensor_library.symbolic import SympyNotation
+        from tensor_library.notation import SympyNotation
 
         return self.spell(SympyNotation())
 

@@ -41,7 +41,7 @@ def _import_what_tests_need() -> None:
     # the packages are imported.
     first_calls.install()
     jaxtyping.install_import_hook(["tensor_library", "discover"], "beartype.beartype")
-    importlib.import_module("discover.precision").enable_x64()
+    importlib.import_module("discover.first_use").enable_x64()
     # shared by the workers of one test run, and by the next run
     folder = Path(__file__).parents[1] / ".pytest_cache" / "compiled"
     importlib.import_module("discover.compilation_cache").enable_compilation_cache(folder)

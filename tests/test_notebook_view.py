@@ -12,10 +12,10 @@ from discover.identify import (
     HiddenStresses,
     Twin,
 )
-from discover.identify.soundness.physics import PhysicsCheck, PhysicsReport
-from discover.identify.structure.structure import LawStructure, QuantityVerdict, Structure
+from discover.identify.physics import PhysicsCheck, PhysicsReport
+from discover.identify.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm
-from discover.notebook_view import NotebookView, as_html, table_of
+from discover.summary_view import NotebookView, as_html, table_of
 from tensor_library import LawTerm
 from tensor_library.law_terms import LawTerms
 

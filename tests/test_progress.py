@@ -34,7 +34,7 @@ RECORDED = {
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_7(name):
-    from discover.batch.tasks import _LOOP_SHARES
+    from discover.batch.run import _LOOP_SHARES
 
     told = []
     part = by_shares(lambda text, fraction: told.append(fraction), _LOOP_SHARES)

@@ -1,6 +1,6 @@
 """What is still done when a program is told to stop."""
 
-from discover.stop_callbacks import on_stop, run_stop_callbacks
+from discover.progress import on_stop, run_stop_callbacks
 
 
 def test_last_words_are_said_backwards_and_one_that_fails_stops_none():

@@ -25,7 +25,7 @@ def _module(name: str):
 def run(name: str, question: str, seed: int, folder: Path) -> dict:
     """Return what a contestant makes of a fluid; a package that is not there is a fault."""
     from discover.compilation_cache import enable_compilation_cache
-    from discover.precision import enable_x64
+    from discover.first_use import enable_x64
 
     enable_x64()
     enable_compilation_cache()

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from discover.answer import sentences
 from discover.equations.equation import Equation
-from discover.plain_json import plain
+from discover.plain_numbers import plain
 from discover.summary_view import Estimate
 from discover.words import effect_title, estimate, interval, readable
 
@@ -25,21 +25,15 @@ Span = tuple[float, float]
 class Constant:
     """Constant of a law or of an effect.
 
-    Attributes
-    ----------
-    name
-        As studies spell it, such as ``alpha``.
-    value, ci95, unit
-        With its 95 % interval, None for one that was declared; ``"1"`` if dimensionless.
-    determined
-        Whether the data determine it.
+    `value`, `ci95`, `unit`: with its 95 % interval, None for one that was declared; ``"1"`` if
+        dimensionless.
     """
 
-    name: str
+    name: str  # as studies spell it, such as ``alpha``
     value: float
     ci95: Span | None = None
     unit: str = "1"
-    determined: bool = True
+    determined: bool = True  # whether the data determine it
 
     @property
     def symbol(self) -> str:
@@ -114,18 +108,10 @@ class Mode:
 
 @dataclass(frozen=True)
 class Suspect:
-    """Effect of the instrument or of the flow, which is no part of the fluid.
+    """Effect of the instrument or of the flow, which is no part of the fluid."""
 
-    Attributes
-    ----------
-    effect
-        Name as studies spell it.
-    constants
-        Its constants with their intervals.
-    """
-
-    effect: str
-    constants: tuple[Constant, ...] = ()
+    effect: str  # name as studies spell it
+    constants: tuple[Constant, ...] = ()  # its constants with their intervals
 
     @property
     def text(self) -> str:
@@ -138,23 +124,17 @@ class Suspect:
 class Range:
     """Flows in which a law was fitted or tested.
 
-    Attributes
-    ----------
-    weissenberg, deborah
-        With the mean relaxation time; None where there is none.
-    strain, rate_1_s
-        Largest strain and rate of the runs, least to largest; None where not known.
-    frequency_rad_s
-        Of sweeps, which have no rate of their own.
-    flows
-        Kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
+    `weissenberg`, `deborah`: with the mean relaxation time; None where there is none.
+    `strain`, `rate_1_s`: largest strain and rate of the runs, least to largest; None where not
+        known.
+    `flows`: kinds of flow: ``shear``, ``uniaxial``, ``planar``, ``biaxial``.
     """
 
     weissenberg: Span | None = None
     deborah: Span | None = None
     strain: Span | None = None
     rate_1_s: Span | None = None
-    frequency_rad_s: Span | None = None
+    frequency_rad_s: Span | None = None  # of sweeps, which have no rate of their own
     flows: tuple[str, ...] = ("shear",)
 
 
@@ -162,14 +142,11 @@ class Range:
 class ExpectedError:
     """Relative error that a prediction of one quantity is expected to have.
 
-    Attributes
-    ----------
-    inside, beyond
-        Inside the range of the data and beyond it (rates up to twice as fast); None where unknown.
-    missing
-        What stands in place of a number that is unknown.
-    note
-        In a few words why, or on what the numbers rest: ``if Giesekus; networks differ by 1.3 %``.
+    `inside`, `beyond`: inside the range of the data and beyond it (rates up to twice as fast); None
+        where unknown.
+    `missing`: what stands in place of a number that is unknown.
+    `note` in a few words why, or on what the numbers rest: ``if Giesekus; networks differ by 1.3
+        %``.
     """
 
     inside: float | None = None
@@ -187,19 +164,13 @@ class ExpectedError:
 class Discrepancy:
     """Size of what no law describes, over the root mean square of the records.
 
-    Attributes
-    ----------
-    size, ci95
-        Of all fitted runs.
-    by_run
-        By name of the run.
-    grows_with_rate
-        Power of the shear rate with which it grows; None where the data do not tell.
+    `size`, `ci95`: of all fitted runs.
+    `grows_with_rate`: power of the shear rate with which it grows; None where the data do not tell.
     """
 
     size: float
     ci95: Span
-    by_run: Mapping[str, float] = field(default_factory=dict)
+    by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
     grows_with_rate: float | None = None
 
 
@@ -209,42 +180,16 @@ class Answer:
 
     Page, JSON, summary and text on the console are written from it.
 
-    Attributes
-    ----------
-    title
-        Law by name, as a rheologist writes it; empty where there is no law to use.
-    law
-        Key of `discover.laws.LAWS`; None for a law without a name.
-    constants
-        Of the law, dimensionless or with units; moduli and times that were fitted among them.
-    modes, solvent_viscosity_Pa_s
-        Linear part of the fluid.
-    error, noise
-        Relative misfit of the fitted runs, and relative noise, mean over runs.
-    fits_to_the_noise
-        Whether what the law leaves is noise.
-    discrepancy
-        Size of what it leaves beside noise; None where unknown.
-    range
-        Where it may be used.
-    expected_error
-        By quantity of `QUANTITIES`; one that is missing is untested.
-    next_test
-        What to measure next, one sentence without *Next:*.
-    suspects
-        Effects of the instrument that were found or are suspected.
-    equation
-        Law written out; None where it cannot be.
-    written
-        A law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX alone).
-    failed
-        A test that the law failed, one short sentence; empty where none.
-    alternative
-        What comes next to this law, one short sentence; empty where it is settled.
-    instead
-        First line where there is no law to use, such as for pure noise.
-    tolerance
-        Relative discrepancy that is good enough.
+    `constants`: of the law, dimensionless or with units; moduli and times that were fitted among
+        them.
+    `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
+    `error`, `noise`: relative misfit of the fitted runs, and relative noise, mean over runs.
+    `discrepancy`: size of what it leaves beside noise; None where unknown.
+    `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
+    `equation`: law written out; None where it cannot be.
+    `written`: a law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX
+        alone).
+    `alternative`: what comes next to this law, one short sentence; empty where it is settled.
 
     Examples
     --------
@@ -259,25 +204,25 @@ class Answer:
     True
     """
 
-    title: str
-    law: str | None = None
+    title: str  # law by name, as a rheologist writes it; empty where there is no law to use
+    law: str | None = None  # key of `discover.laws.LAWS`; None for a law without a name
     constants: tuple[Constant, ...] = ()
     modes: tuple[Mode, ...] = ()
     solvent_viscosity_Pa_s: float = 0.0
     error: float | None = None
     noise: float | None = None
-    fits_to_the_noise: bool = False
+    fits_to_the_noise: bool = False  # whether what the law leaves is noise
     discrepancy: Discrepancy | None = None
-    range: Range = Range()
+    range: Range = Range()  # where it may be used
     expected_error: Mapping[str, ExpectedError] = field(default_factory=dict)
-    next_test: str = ""
-    suspects: tuple[Suspect, ...] = ()
+    next_test: str = ""  # what to measure next, one sentence without *Next:*
+    suspects: tuple[Suspect, ...] = ()  # effects of the instrument that were found or are suspected
     equation: Equation | None = field(default=None, repr=False)
     written: Mapping[str, str] = field(default_factory=dict, repr=False)
-    failed: str = ""
+    failed: str = ""  # a test that the law failed, one short sentence; empty where none
     alternative: str = ""
-    instead: str = ""
-    tolerance: float = TOLERANCE
+    instead: str = ""  # first line where there is no law to use, such as for pure noise
+    tolerance: float = TOLERANCE  # relative discrepancy that is good enough
 
     @property
     def size(self) -> float | None:

@@ -17,9 +17,6 @@ A_TRANSIENT = (
 )
 """What to measure where nothing but states was."""
 
-IF_LOADINGS = "If the sample was reloaded between runs, set [{}] loading = 0.03 (3 % scatter)."
-"""What to say of runs that no law describes, of which nobody said it; for a section of a study."""
-
 
 def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""

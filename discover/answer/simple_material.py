@@ -21,7 +21,7 @@ from discover.answer.answer import Constant
 from discover.dataset import Run
 from discover.inference.engine.inelastic import viscosity
 from discover.protocols.kinematics import MODULI
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 Kind = Literal["yield_stress", "viscous", "solid"]
 
@@ -51,23 +51,15 @@ Values = Float[np.ndarray, " k"]
 class SimpleMaterial:
     """Material without relaxation, as recognised.
 
-    Attributes
-    ----------
-    kind, title, law
-        What it is, the name for readers, and that in results.
-    constants
-        With 95 % intervals.
-    error
-        Relative misfit of the fitted runs.
-    latex, python
-        Law written out.
+    `kind`, `title`, `law`: what it is, the name for readers, and that in results.
+    `latex`, `python`: law written out.
     """
 
     kind: Kind
     title: str
     law: str
-    constants: tuple[Constant, ...]
-    error: float
+    constants: tuple[Constant, ...]  # with 95 % intervals
+    error: float  # relative misfit of the fitted runs
     latex: str
     python: str
 
@@ -81,10 +73,7 @@ class SimpleMaterial:
 def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
     """Return the simple material that runs show; None where a law that relaxes may be needed.
 
-    Parameters
-    ----------
-    runs
-        Those that are fitted: flow curves, sweeps of both moduli, or shear at a given rate.
+    `runs`: those that are fitted: flow curves, sweeps of both moduli, or shear at a given rate.
     """
     controls = {run.protocol.control for run in runs}
     count = sum(len(run) for run in runs)

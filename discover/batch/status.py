@@ -1,18 +1,22 @@
 """How the studies of a batch stand and ended, and what each found."""
 
+import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from threading import Lock
+from threading import Lock, RLock, Timer
 from time import monotonic
 from typing import Any
 
 import pandas as pd
 
 from discover.dataset.tables.table import read_bytes
-from discover.notebook_view import NotebookView
-from discover.plain_json import parse_json
+from discover.errors import InputError
+from discover.plain_numbers import parse_json
 from discover.progress import Progress
+from discover.study.atomic import write_text
+from discover.summary_view import NotebookView
 from tensor_library.law_terms import spell
 
 QUANTITIES = ("sigma12", "N1", "N2")
@@ -23,11 +27,10 @@ class LearnerRow:
     """What one learner found in one study.
 
     `terms`: term, coefficient and inner parameters.
-    `errors`: largest relative error of each quantity in flows that no fit saw.
     """
 
     terms: tuple[tuple[str, float, Mapping[str, float]], ...]
-    errors: Mapping[str, float]
+    errors: Mapping[str, float]  # largest relative error of each quantity in flows that no fit saw
 
     @property
     def text(self) -> str:
@@ -43,22 +46,17 @@ class LearnerRow:
 class StudyRow:
     """One study as the tables of a batch show it; everything empty where it failed.
 
-    `learners`: by name.
-    `rivals`: number of laws that its data do not tell from the one found.
-    `undetermined`: quantities that they do not decide.
     `chosen`: terms that each rule for choosing a law takes, by rule.
-    `effects`: effects that a closed loop added.
-    `verdict`: of the closed loop, or of the comparison.
     `error_before`, `error_after`: on its held-out runs, or on the fitted ones where none were held
         out.
     """
 
-    learners: Mapping[str, LearnerRow] = field(default_factory=dict)
-    rivals: int | None = None
-    undetermined: tuple[str, ...] = ()
+    learners: Mapping[str, LearnerRow] = field(default_factory=dict)  # by name
+    rivals: int | None = None  # number of laws that its data do not tell from the one found
+    undetermined: tuple[str, ...] = ()  # quantities that they do not decide
     chosen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    effects: tuple[str, ...] = ()
-    verdict: str = ""
+    effects: tuple[str, ...] = ()  # effects that a closed loop added
+    verdict: str = ""  # of the closed loop, or of the comparison
     error_before: float | None = None
     error_after: float | None = None
 
@@ -144,18 +142,14 @@ class StudyStatus:
     """How one study ended.
 
     `name`, `task`: folder under the batch's, and ``compare`` or ``close-loop``.
-    `status`: ``waiting``, ``done``, ``complete`` (was there already) or ``failed``.
-    `text`: the verdict, or the reason of the failure.
-    `input_error`: whether the failure is the user's to mend.
-    `seconds`: time taken now.
     """
 
     name: str
     task: str
-    status: str
-    text: str
-    input_error: bool = False
-    seconds: float = 0.0
+    status: str  # ``waiting``, ``done``, ``complete`` (was there already) or ``failed``
+    text: str  # the verdict, or the reason of the failure
+    input_error: bool = False  # whether the failure is the user's to mend
+    seconds: float = 0.0  # time taken now
 
     @property
     def outcome(self) -> str:
@@ -165,16 +159,11 @@ class StudyStatus:
 
 @dataclass(frozen=True)
 class BatchResult(NotebookView):
-    """How every study of a batch ended.
+    """How every study of a batch ended."""
 
-    `studies` in the order given.
-    `index`: the summary page.
-    `rows`: what they found, in the same order.
-    """
-
-    studies: tuple[StudyStatus, ...]
-    index: Path = field(repr=False)
-    rows: tuple[StudyRow, ...] = ()
+    studies: tuple[StudyStatus, ...]  # in the order given
+    index: Path = field(repr=False)  # the summary page
+    rows: tuple[StudyRow, ...] = ()  # what they found, in the same order
 
     @property
     def failed(self) -> list[StudyStatus]:
@@ -269,3 +258,66 @@ def now_and_then(send: Callable[[str, float], None], pause: float = _PAUSE) -> P
             send(label, fraction)
 
     return say
+
+
+PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
+"""What lies in the folder of a batch beside the folders of its studies."""
+
+_PAGE_PAUSE = 5.0  # seconds for which news are gathered before the page is written again
+
+
+class Summary:
+    """Writes ``index.html``, ``table.csv`` and ``batch.json``.
+
+    `out`: folder of the batch. `jobs`: name and task of every study, in their order.
+    """
+
+    def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):
+        self.out = out
+        self._statuses = [StudyStatus(name, task, "waiting", "") for name, task in jobs]
+        self._rows = [StudyRow() for _ in jobs]
+        self._timer: Timer | None = None
+        self._lock = RLock()
+
+    def add(self, position: int, status: StudyStatus) -> None:
+        """Take note of a study that has ended; it is on the page a few seconds later."""
+        row = StudyRow() if status.status == "failed" else read_row(self.out / status.name)
+        with self._lock:
+            self._statuses[position] = status
+            self._rows[position] = row
+        self.write_soon()
+
+    def write_soon(self) -> None:
+        """Write in a few seconds: the next study may take hours, so the page cannot wait for it."""
+        with self._lock:
+            if self._timer is None:
+                self._timer = Timer(_PAGE_PAUSE, self._write_if_possible)
+                self._timer.daemon = True
+                self._timer.start()
+
+    def _write_if_possible(self) -> None:
+        with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
+            self.write()
+
+    def write_ended(self) -> None:
+        """Write everything now if any study has ended."""
+        if any(status.status != "waiting" for status in self._statuses):
+            self.write()
+
+    def write(self) -> BatchResult:
+        """Write everything now and return how the studies ended."""
+        with self._lock:
+            if self._timer is not None:
+                self._timer.cancel()
+                self._timer = None
+            return self._write()
+
+    def _write(self) -> BatchResult:
+        result = BatchResult(tuple(self._statuses), self.out / PAGE, tuple(self._rows))
+        write_text(self.out / STATES, json.dumps(result.to_json(), indent=2) + "\n")
+        table = result.table().to_csv(index=False, lineterminator="\n")
+        write_text(self.out / TABLE, table)
+        from discover.report.batch_report import batch_page  # late: it takes a second to import
+
+        write_text(result.index, batch_page(result.studies, result.rows))
+        return result

@@ -8,14 +8,9 @@ import typer
 
 from discover._version import __version__
 from discover.accelerators import use_the_processor_from_the_start
-from discover.cli.console import heard_or_not
-from discover.cli.data_commands import data_app
-from discover.cli.distil_command import distil
-from discover.cli.export_command import export
-from discover.cli.fetch_command import fetch_data
-from discover.cli.fit_command import fit
-from discover.cli.interruption import obeying_interrupts
-from discover.cli.names_commands import effects, laws
+from discover.cli.console import heard_or_not, obeying_interrupts
+from discover.cli.data_commands import data_app, fetch_data
+from discover.cli.law_commands import distil, effects, export, fit, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 from discover.linear_algebra_threads import use_one_thread_from_the_start
 from discover.report.plots import keep_out_of_the_working_directory
@@ -39,8 +34,7 @@ def _print_version(wanted: bool) -> bool:
 @app.callback()
 def _root(
     version: Annotated[
-        bool,
-        typer.Option("--version", help="Print the version and exit.", callback=_print_version),
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version)
     ] = False,
 ) -> None:
     del version

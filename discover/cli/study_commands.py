@@ -6,9 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from discover.cli.console import progress_bar, say, say_error
-from discover.cli.guard import guarded
-from discover.cli.options import (
+from discover.cli.console import (
     JsonOption,
     OutOption,
     OverwriteOption,
@@ -16,6 +14,10 @@ from discover.cli.options import (
     SeedOption,
     StudyArgument,
     ToleranceOption,
+    guarded,
+    progress_bar,
+    say,
+    say_error,
 )
 
 if TYPE_CHECKING:  # --help needs no studies
@@ -33,7 +35,7 @@ def compare(
     tolerance: ToleranceOption = None,
 ) -> None:
     """Run both learners on the same data and write a comparison report."""
-    from discover.batch.tasks import run_compare
+    from discover.batch.run import run_compare
 
     _run_task(run_compare, study, out, seed, quiet, as_json, overwrite, tolerance)
 
@@ -49,7 +51,7 @@ def close_loop(
     tolerance: ToleranceOption = None,
 ) -> None:
     """Fit a model, find what it lacks, add that, and test the result on held-out runs."""
-    from discover.batch.tasks import run_close_loop
+    from discover.batch.run import run_close_loop
 
     _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite, tolerance)
 
@@ -101,7 +103,7 @@ def demo(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
-    from discover.batch.tasks import run_demo
+    from discover.batch.run import run_demo
 
     with progress_bar(quiet) as report:
         pages = run_demo(out, seed, overwrite, report)
@@ -141,14 +143,9 @@ def _tell_of_folder(study: "Study") -> None:
     """Print a note if a study's data lie outside the folders where one would look.
 
     A study file may come from somebody else; what it reads should surprise nobody.
-
-    Parameters
-    ----------
-    study
-        As read; if its folder does not exist, nothing is said: the command refuses it.
     """
     from discover.errors import InputError
-    from discover.study.read import folder_elsewhere
+    from discover.study.data import folder_elsewhere
 
     try:
         folder = folder_elsewhere(study)

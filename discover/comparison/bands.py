@@ -17,7 +17,7 @@ from discover.inference.engine.problem import NUISANCES
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import misfit, weighed_laws
 from discover.loop.loop import Found
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 _DRAWS = 6
 """Pairs of draws of the constants of a hypothesis."""

@@ -28,25 +28,15 @@ _STARTS = (0.03, 0.3)
 class ClassicalFit:
     """A classical law fitted to the training runs, with the effects of the instrument found.
 
-    Attributes
-    ----------
-    law
-        Key of `LAWS`.
-    parameters
-        Its constants; empty where it cannot be integrated.
-    ci95
-        Their 95 % intervals.
-    misfit
-        Relative misfit of the fitted runs, mean over runs; None where it cannot be integrated.
-    criterion
-        −2 times the log evidence, above that of the best of these laws; None likewise.
-    errors
-        Relative errors of what is recorded by flow, in flows that no fit saw.
+    `misfit`: relative misfit of the fitted runs, mean over runs; None where it cannot be
+        integrated.
+    `criterion`: −2 times the log evidence, above that of the best of these laws; None likewise.
+    `errors`: relative errors of what is recorded by flow, in flows that no fit saw.
     """
 
-    law: str
-    parameters: dict[str, float]
-    ci95: dict[str, tuple[float, float]]
+    law: str  # key of `LAWS`
+    parameters: dict[str, float]  # its constants; empty where it cannot be integrated
+    ci95: dict[str, tuple[float, float]]  # their 95 % intervals
     misfit: float | None
     criterion: float | None
     errors: dict[str, dict[str, float | None]]
@@ -74,14 +64,8 @@ def fit_classical_laws(
 
     The declared law is set aside; modes, solvent and known effects stay.
 
-    Parameters
-    ----------
-    found
-        The search among hypotheses, whose runs are fitted.
-    frame
-        The flows that judge.
-    further
-        Names of more laws.
+    `found`: the search among hypotheses, whose runs are fitted. `frame`: the flows that judge.
+    `further`: names of more laws.
     """
     judged = [flow for flow in frame.shown if flow.kind in ("held_out", "test")]
     best = found.posterior.fits[0][0] if found.posterior.fits else None

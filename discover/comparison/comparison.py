@@ -9,22 +9,18 @@ import pandas as pd
 from discover.answer import Answer
 from discover.comparison.bands import Band
 from discover.comparison.classical import ClassicalFit
-from discover.comparison.equations import outcome_equation
 from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.placement import Placement, place
+from discover.comparison.outcome import LearnerOutcome, Placement, place
 from discover.comparison.rivals import Rival
-from discover.comparison.statements import IN_LIBRARY, Statement
+from discover.comparison.statements import IN_LIBRARY, Statement, outcome_equation
 from discover.effects import KnownEffect
 from discover.equations import Equation, equation_to_json
-from discover.identify.structure.structure import Structure
-from discover.learners.results.term_tables import estimates_of
+from discover.identify.structure import Structure
+from discover.learners.results import estimates_of
 from discover.loop.loop_result import LoopResult
-from discover.notebook_view import table_of
-from discover.page_view import PageView
-from discover.plain_json import plain
+from discover.plain_numbers import plain
 from discover.statistics import FitVerdict, LackOfFit
-from discover.summary_view import Estimate, SummaryView
+from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from tensor_library.law_terms import LawTerm
 
 _VERDICTS: Mapping[str, FitVerdict] = {
@@ -39,21 +35,14 @@ _VERDICTS: Mapping[str, FitVerdict] = {
 class SweepPoint:
     """One data set of a sweep over laws and a parameter.
 
-    Attributes
-    ----------
-    law, parameter, value
-        What made the data.
-    flow
-        The test flow.
-    outcomes
-        By learner.
+    `law`, `parameter`, `value`: what made the data.
     """
 
     law: str
     parameter: str
     value: float
-    flow: Flow
-    outcomes: Mapping[str, LearnerOutcome]
+    flow: Flow  # the test flow
+    outcomes: Mapping[str, LearnerOutcome]  # by learner
 
     def errors(self) -> dict[str, dict[str, float | None]]:
         """Return the errors of each learner in the test flow."""

@@ -1,15 +1,21 @@
 """The flows on which learned laws are looked at, with what is known of the truth in each."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
+from discover.dataset.material_functions import as_compared
+from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.dataset.run import Run, sizes_of
+from discover.equations import law_terms
+from discover.errors import InputError
+from discover.laws import make_law
 from discover.laws.multimode import Fluid
+from discover.learners.runs import waiting
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import (
@@ -25,6 +31,8 @@ from discover.protocols.protocol import (
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
+from discover.study.declared_model import DeclaredModel
+from tensor_library.law_terms import LawTerm
 
 QUANTITIES = ("sigma12", "N1", "N2")
 """What is compared, as spelled in JSON."""
@@ -49,45 +57,27 @@ DRAWN: tuple[FlowKind, ...] = ("training", "held_out", "test")
 class Flow:
     """A flow, when to look at it, and what is known of the stresses.
 
-    Attributes
-    ----------
-    name
-        Name of the run or of the protocol.
-    kind
-        What it is for. Only ``training`` was seen by the learners.
-    protocol
-        The shear rate.
-    times, shear_rate
-        Samples, shape (n,), in s and 1/s.
-    reference
-        The truth where the law is known, the measurement otherwise; not every quantity.
-    measured
-        σ12 that the learners saw, noise included, for training flows.
-    is_truth
-        Whether `reference` is exact and not a measurement.
-    training_end
-        Last time of the training series, beyond which a prediction extrapolates in time; or
-        None.
-    oscillatory
-        Whether Lissajous curves make sense.
-    commanded
-        The protocol before an instrument that is known changed it, for titles; None where none did.
-    weight
-        How much its samples weigh in fits beside those of other runs; see `Run`.
+    `times`, `shear_rate`: samples, shape (n,), in s and 1/s.
+    `reference`: the truth where the law is known, the measurement otherwise; not every quantity.
+    `measured`: σ12 that the learners saw, noise included, for training flows.
+    `training_end`: last time of the training series, beyond which a prediction extrapolates in
+        time; or None.
+    `commanded`: the protocol before an instrument that is known changed it, for titles; None where
+        none did.
     """
 
-    name: str
-    kind: FlowKind
-    protocol: FlowProtocol
+    name: str  # name of the run or of the protocol
+    kind: FlowKind  # what it is for. Only ``training`` was seen by the learners
+    protocol: FlowProtocol  # the shear rate
     times: Float[np.ndarray, " n"]
     rate: Float[np.ndarray, " n"]
     reference: Stresses
     measured: Float[np.ndarray, " n"] | None = None
-    is_truth: bool = False
+    is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
-    oscillatory: bool = False
+    oscillatory: bool = False  # whether Lissajous curves make sense
     commanded: FlowProtocol | None = None
-    weight: float = 1.0
+    weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
 
     @property
     def _imposed(self) -> FlowProtocol:
@@ -205,22 +195,14 @@ class Flow:
 
 
 def comparison_flows(
-    data: StudyData,
-    high_deborah: tuple[float, ...],
-    pipkin: Sequence[tuple[float, float]] = (),
+    data: StudyData, high_deborah: tuple[float, ...], pipkin: Sequence[tuple[float, float]] = ()
 ) -> list[Flow]:
     """Return the flows of a comparison: training, held out, tests, and where only errors are told.
 
     All but the first two need a known law.
 
-    Parameters
-    ----------
-    data
-        The data of the study.
-    high_deborah
-        De of the flows γ̇ = 3 cos(De t).
-    pipkin
-        Wi and De of the oscillations over which errors are mapped.
+    `data`: the data of the study. `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi
+    and De of the oscillations over which errors are mapped.
     """
     flows = [run_flow(run, "training", data) for run in data.fit]
     flows += [run_flow(run, "held_out", data) for run in data.held_out]
@@ -352,3 +334,94 @@ def of_recorded(errors: Mapping[str, float | None], flow: Flow) -> dict[str, flo
     if flow.records_shear_stress:
         return dict(errors)
     return {flow.protocol.quantity: errors["sigma12"]}
+
+
+def prepared(data: StudyData) -> StudyData:
+    """Return data whose runs are as learners take them."""
+    if data.each:
+        raise InputError(
+            'held_out = "each" is for close-loop; a comparison needs the names of held-out runs, '
+            'such as held_out = ["fast.csv"].'
+        )
+    return with_runs(data, as_compared)
+
+
+def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
+    """Return data in which what starts periodic has the cycles before it that learners wait for.
+
+    `data`: of a study, split. `relaxation_time`: the longest, in s. `relaxes`: whether the known
+    law relaxes, so that a periodic state is solved for.
+    """
+    return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
+
+
+def thinned_to(data: StudyData, most: int) -> StudyData:
+    """Return data with at most so many samples of each run, evenly chosen in their order.
+
+    Every sample is a step of the integration, and a record of thousands says little more of a law
+    than its hundreds do. What was thinned says so.
+    """
+    return with_each_run(data, lambda run: thin_run(run, most))
+
+
+def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
+    """Return data whose fitted runs lack the samples that stand alone, and words on them.
+
+    Squares would let them bend the law. Those of runs held out stay, and do not judge.
+    """
+    parts = [without_spikes(run) for run in data.fit.runs]
+    told = [f"{len(times)} of {run.name}" for run, times in parts if times]
+    if not told:
+        return data, ""
+    cleaned = {run.name: run for run, _ in parts}
+    dataset, fit = (
+        replace(part, runs=tuple(cleaned.get(run.name, run) for run in part.runs))
+        for part in (data.dataset, data.fit)
+    )
+    return replace(data, dataset=dataset, fit=fit), (f"Outliers excluded: {', '.join(told)}")
+
+
+def with_each_run(data: StudyData, change: Callable[[Run], Run]) -> StudyData:
+    """Return data with each run changed, in every part of it."""
+    return with_runs(data, lambda runs: map(change, runs))
+
+
+def with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]]) -> StudyData:
+    """Return data with the runs changed together, in every part of it."""
+    parts = {
+        name: replace(part, runs=tuple(change(part.runs)))
+        for name in ("dataset", "fit", "held_out")
+        for part in [getattr(data, name)]
+    }
+    return replace(data, **parts)
+
+
+def require_one_known_law(declared: DeclaredModel) -> None:
+    """Refuse a known part that only a closed loop can have."""
+    if declared.choice:
+        raise InputError(
+            "[model] law names several laws to choose from, which is for close-loop: a comparison "
+            "learns what one known law lacks. Name one law, or ucm."
+        )
+    if declared.by_mode:
+        raise InputError(
+            f"[model] by_mode lets {', '.join(declared.by_mode)} differ from mode to mode, which "
+            "only close-loop fits. Run discover close-loop on this study, and start from what "
+            'it finds: [model] from = "its folder". Or leave by_mode out.'
+        )
+
+
+def true_terms(
+    law: str, parameters: Mapping[str, float], known_relaxation: bool
+) -> tuple[LawTerm, ...] | None:
+    """Return what is missing from UCM in a named law; None if it is no sum of library terms.
+
+    `known_relaxation`: whether −σ is known. If not, it is missing too. Raises InputError if there
+    is no such law, or a parameter is missing or outside its range.
+    """
+    known = make_law(law, parameters)
+    try:
+        found = law_terms(known)
+    except InputError:
+        return None
+    return found if known_relaxation else (LawTerm("sigma", 1.0), *found)

@@ -1,7 +1,11 @@
 """The posterior of a comparison: a search's hypotheses and what the learners propose, weighed."""
 
-from collections.abc import Mapping, Sequence
+import queue
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from threading import Event
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,8 +13,9 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, named_effects
 from discover.effects.library_term import library_term
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.posterior import posterior_of
-from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.results import RecoveredTerm
 from discover.loop.loop import Found, Say, search_runs
+from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model
 from discover.study.schema import Study
@@ -39,16 +44,9 @@ def search_hypotheses(
 
     Candidates are every effect with a name, of fluid and instrument, and every library term.
 
-    Parameters
-    ----------
-    data
-        Runs as recorded.
-    declared
-        The known part; what of it is to be fitted is fitted with every hypothesis.
-    library
-        Candidate terms of the study.
-    say
-        Called with a line of text now and then.
+    `data`: runs as recorded. `declared`: the known part; what of it is to be fitted is fitted with
+    every hypothesis. `library`: candidate terms of the study. `say`: called with a line of text now
+    and then.
     """
     dataset = data.dataset
     runs = {run.name: run for run in dataset.runs}
@@ -85,21 +83,15 @@ def search_hypotheses(
 class Proposed:
     """What a learner proposed, as a hypothesis fitted with all that is free.
 
-    Attributes
-    ----------
-    terms
-        Its terms with coefficients and intervals of that fit; as the learner had them where the
-        hypothesis cannot be fitted.
-    share
-        Posterior probability of the hypothesis among all that were fitted, were one of them all
-        there is; zero where it was not fitted.
-    fit
-        The hypothesis; None where a term is none that the engine knows.
+    `terms`: its terms with coefficients and intervals of that fit; as the learner had them where
+        the hypothesis cannot be fitted.
+    `share`: posterior probability of the hypothesis among all that were fitted, were one of them
+        all there is; zero where it was not fitted.
     """
 
     terms: tuple[RecoveredTerm, ...]
     share: float = 0.0
-    fit: Fit | None = None
+    fit: Fit | None = None  # the hypothesis; None where a term is none that the engine knows
 
 
 def with_proposals(
@@ -109,10 +101,7 @@ def with_proposals(
 
     A learner's terms stand beside what the likeliest hypothesis holds of the instrument.
 
-    Parameters
-    ----------
-    terms
-        By learner.
+    `terms`: by learner.
     """
     search, problem = found.posterior.search, found.posterior.problem
     alive = search.alive()
@@ -214,3 +203,61 @@ def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
             return None
         terms += added
     return tuple(terms)
+
+
+R = TypeVar("R")
+
+_LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be interrupted
+
+
+def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
+    """Return what each part returns, all of them computed side by side.
+
+    A part that is compiled or integrated leaves Python to the others. What each says of its
+    progress is passed on in the thread of the caller, with the mean of their fractions, so that
+    whoever listens need not know of threads. If one fails, or the caller is interrupted, the others
+    end where they next ask or say something.
+
+    `parts`: each takes what it tells of its progress; none may depend on another. `progress`:
+    called with the name of a part and what it says.
+    """
+    if len(parts) < 2:
+        return {name: part(_named(name, progress)) for name, part in parts.items()}
+    told: queue.SimpleQueue[tuple[str, str, float] | Future[R]] = queue.SimpleQueue()
+    stop, fractions = Event(), dict.fromkeys(parts, 0.0)
+
+    def run(name: str, part: Callable[[Progress], R]) -> R:
+        def say(text: str, fraction: float) -> None:
+            if stop.is_set():
+                raise Stopped
+            told.put((name, text, fraction))
+
+        with may_be_stopped(stop):
+            return part(say)
+
+    with ThreadPoolExecutor(len(parts)) as pool:
+        try:
+            futures = {name: pool.submit(run, name, part) for name, part in parts.items()}
+            for future in futures.values():
+                future.add_done_callback(told.put)
+            running = len(futures)
+            while running:
+                try:
+                    one = told.get(timeout=_LOOK_UP)
+                except queue.Empty:
+                    continue
+                if isinstance(one, Future):
+                    one.result()  # or what it failed with
+                    running -= 1
+                    continue
+                name, text, fraction = one
+                fractions[name] = max(fractions[name], fraction)
+                progress(f"{name}: {text}", sum(fractions.values()) / len(fractions))
+        except BaseException:
+            stop.set()
+            raise
+    return {name: future.result() for name, future in futures.items()}
+
+
+def _named(name: str, progress: Progress) -> Progress:
+    return lambda text, fraction: progress(f"{name}: {text}", fraction)

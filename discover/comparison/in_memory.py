@@ -10,21 +10,14 @@ from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
-from discover.learners.files.provenance import fingerprint_of
+from discover.learners.files import fingerprint_of
 from discover.learners.known_part import known_part
 from discover.learners.run_prediction import RunPrediction
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.data import StudyData
+from discover.study.data import StudyData, parse_study
 from discover.study.declared_model import DeclaredModel
-from discover.study.in_memory import (
-    HeldOut,
-    data_in_memory,
-    declared_fluid,
-    joined,
-    with_known,
-)
-from discover.study.read import parse_study
+from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined, with_known
 from discover.study.schema import Study
 
 

@@ -6,11 +6,16 @@ from dataclasses import dataclass, field, replace
 import jax.numpy as jnp
 import numpy as np
 
-from discover.comparison.absorbed import absorbed
-from discover.comparison.flows import MEASURED, Flow, Stresses, comparison_flows, predict
+from discover.comparison.flows import (
+    MEASURED,
+    Flow,
+    Stresses,
+    comparison_flows,
+    predict,
+    with_each_run,
+)
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.prepared import with_each_run
-from discover.comparison.records import InRecord, corrected
+from discover.comparison.records import InRecord, absorbed, corrected
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect
 from discover.errors import InputError
@@ -27,28 +32,16 @@ _INSIDE = 1e-3
 class Frame:
     """What learners are given, and how what they find is seen beside the records.
 
-    Attributes
-    ----------
-    model
-        The known part, nothing of it left to be fitted.
-    data
-        The runs that they learn from, without what the instrument did.
-    flows
-        The flows in which their laws are simulated.
-    shown
-        The same flows with the records as they are.
-    made
-        What the instrument makes of the stress of a run, by its name; empty where it does nothing.
-    effects
-        Of the instrument, taken out of the records.
+    `made`: what the instrument makes of the stress of a run, by its name; empty where it does
+        nothing.
     """
 
-    model: DeclaredModel
-    data: StudyData
-    flows: list[Flow]
-    shown: list[Flow]
+    model: DeclaredModel  # the known part, nothing of it left to be fitted
+    data: StudyData  # the runs that they learn from, without what the instrument did
+    flows: list[Flow]  # the flows in which their laws are simulated
+    shown: list[Flow]  # the same flows with the records as they are
     made: Mapping[str, InRecord] = field(default_factory=dict)
-    effects: tuple[KnownEffect, ...] = ()
+    effects: tuple[KnownEffect, ...] = ()  # of the instrument, taken out of the records
 
     def recorded(self, flow: Flow, stresses: Stresses | None) -> Stresses | None:
         """Return what would be recorded of the stresses in a flow."""
@@ -89,19 +82,8 @@ def known_part(
     What is declared as fitted has the values of that hypothesis. What it holds of the instrument is
     taken out of the records where it can be undone, so that learners learn the fluid.
 
-    Parameters
-    ----------
-    declared, data
-        The declared model, and the data as recorded.
-    ended
-        The posterior.
-    high_deborah, pipkin
-        As in `comparison_flows`.
-
-    Raises
-    ------
-    InputError
-        If learners cannot be told of a declared effect.
+    `declared`, `data`: the declared model, and the data as recorded. `ended`: the posterior. Raises
+    InputError if learners cannot be told of a declared effect.
     """
     data = _dated(ended, data)
     model = absorbed(_with_values(declared, ended))

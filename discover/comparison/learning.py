@@ -4,37 +4,94 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from discover.comparison.at_once import at_once
+from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import physics_of
-from discover.comparison.training import train
+from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.learners.registry import BUILT_IN
-from discover.learners.results.result import LearnerResult
-from discover.progress import Progress
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.learners.registry import BUILT_IN, LearningTask, learn_with
+from discover.learners.results import LearnerResult
+from discover.progress import Progress, silent
+from discover.study.declared_model import DeclaredModel
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
+from tensor_library.library import TermLibrary, build_library
+
+
+def train(
+    learner: str,
+    study: Study,
+    model: DeclaredModel,
+    runs: Sequence[Run],
+    seed: int = 0,
+    progress: Progress = silent,
+) -> tuple[LearnerResult, Fluid]:
+    """Return what one learner finds in these runs, and the fluid that it makes.
+
+    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `study`: the study,
+    for the learner's settings. `model`: the known part. `progress`: called as it goes.
+    """
+    options = study.compare
+    plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
+    shared = {
+        "modulus": model.modulus,
+        "relaxation_time": model.relaxation_time,
+        "known_relaxation": study.model.known_relaxation,
+        "base_law": None if plain_maxwell else model.law,
+        "solvent_viscosity": model.solvent_viscosity,
+    }
+    library = study_library(study)
+    if learner == "tensor_sindy":
+        from discover.learners.tensor_sindy import TensorSINDy
+
+        sparse = TensorSINDy(
+            library=library,
+            optimizer=options.optimizer,
+            selection=options.selection,
+            max_terms=options.max_terms,
+            use_normal_stresses=options.use_normal_stresses,
+            progress=progress,
+            modulus_covariance=model.modulus_covariance,
+            **shared,
+        ).fit(list(runs))
+        return sparse.result_, sparse.fluid_
+    if learner == "tbnn_ude":
+        from discover.learners.tbnn_ude import TBNNUDE
+
+        estimator = TBNNUDE(
+            recipe=options.recipe,
+            n_members=options.members,
+            quick=options.quick,
+            projection_library=library,
+            progress=progress,
+            random_state=seed,
+            **shared,
+        )
+        estimator.fit(list(runs))
+        return estimator.result_, estimator.fluid_
+    asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
+    return learn_with(learner, asked)
+
+
+def study_library(study: Study) -> TermLibrary:
+    """Return the candidate terms of a study."""
+    asked = study.compare.library
+    return build_library(degree=asked.degree, closed_forms=asked.closed_forms)
 
 
 @dataclass(frozen=True)
 class Learning:
     """Where learners are trained, or found again.
 
-    Attributes
-    ----------
-    study
-        Which learners, and with what options.
-    store
-        Where finished learners are kept and found again.
-    made
-        Learners that are fitted already: what they found, by learner.
+    `made`: learners that are fitted already: what they found, by learner.
     """
 
-    study: Study
+    study: Study  # which learners, and with what options
     seed: int
-    store: RunFolder | None = None
+    store: RunFolder | None = None  # where finished learners are kept and found again
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None
 
     def outcomes(
@@ -44,6 +101,8 @@ class Learning:
 
         Whether another one may share a process with threads is not known, so they come after.
         """
+        # before the threads: two that load scikit-learn at once find it half loaded
+        from discover.learners import tbnn_ude, tensor_sindy  # noqa: F401
 
         def part(learner: str) -> Callable[[Progress], LearnerOutcome]:
             return lambda say: self.outcome(learner, frame, say)
@@ -65,14 +124,9 @@ class Learning:
     ) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works.
 
-        Parameters
-        ----------
-        frame
-            The known part, the runs to learn from and the flows of the page.
-        progress
-            Called with what is going on and the fraction done.
-        part
-            Of a sweep, the name under which it is kept; its outcomes are looked at in one flow.
+        `frame`: the known part, the runs to learn from and the flows of the page. `progress`:
+        called with what is going on and the fraction done. `part`: of a sweep, the name under which
+        it is kept; its outcomes are looked at in one flow.
         """
         store, made, flows = self.store, self.made, frame.flows
         name = part or learner

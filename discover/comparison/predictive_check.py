@@ -32,16 +32,9 @@ def lacks_of_fit(
 ) -> dict[str, LackOfFit]:
     """Return what each learner's law leaves of the training runs, and whether that is noise.
 
-    Parameters
-    ----------
-    outcomes
-        By learner.
-    flows
-        The flows; only those of training are looked at.
-    expectation
-        What a complete law may leave.
-    normal_stresses_used
-        Whether measured normal stresses were part of the fit.
+    `outcomes`: by learner. `flows`: the flows; only those of training are looked at. `expectation`:
+    what a complete law may leave. `normal_stresses_used`: whether measured normal stresses were
+    part of the fit.
     """
     training = [flow for flow in flows if flow.kind == "training"]
     return {

@@ -25,7 +25,7 @@ from discover.identify import (
     check_physics,
     find_twins,
 )
-from discover.identify.soundness.physics_flows import time_scale
+from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
@@ -57,21 +57,14 @@ _PHYSICS_FLOWS = ("training", "held_out", "test")
 class Rival:
     """A law that the data do not tell from the chosen one.
 
-    Attributes
-    ----------
-    law
-        Its terms, beyond the known part.
-    reason
-        Why it is a rival, in one sentence.
-    errors_to_chosen
-        Largest relative difference of each quantity over the training and the test flows.
-    separated_by
-        ``{"protocol", "quantity"}`` where the two differ most among flows not yet measured; None
-        where they differ nowhere that was tried.
+    `errors_to_chosen`: largest relative difference of each quantity over the training and the test
+        flows.
+    `separated_by`: ``{"protocol", "quantity"}`` where the two differ most among flows not yet
+        measured; None where they differ nowhere that was tried.
     """
 
-    law: LawTerms
-    reason: str = ""
+    law: LawTerms  # its terms, beyond the known part
+    reason: str = ""  # why it is a rival, in one sentence
     errors_to_chosen: Mapping[str, float | None] = field(default_factory=dict)
     separated_by: Mapping[str, str] | None = None
 
@@ -101,16 +94,8 @@ def exact_twins(
 ) -> list[Rival]:
     """Return laws that give the same σ12 in every shear flow, the law found put aside.
 
-    Parameters
-    ----------
-    terms
-        Of the law found.
-    model
-        The known part.
-    flows
-        Training and test flows.
-    library
-        The terms that were searched; a twin may be outside.
+    `terms`: of the law found. `model`: the known part. `flows`: training and test flows. `library`:
+    the terms that were searched; a twin may be outside.
     """
     chosen = LawTerms.of(terms)
     basis = build_library(degree=1)
@@ -140,12 +125,7 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
 
     Those whose effects of the fluid are no sum of library terms have no spelling and are left out.
 
-    Parameters
-    ----------
-    flows
-        Those in which they are told from the likeliest.
-    runs
-        Runs as recorded, by name.
+    `flows`: those in which they are told from the likeliest. `runs`: runs as recorded, by name.
     """
     fits = [(f, p) for f, p in found.posterior.fits if p >= _POSSIBLE][: 1 + MOST_RIVALS]
     named = [(f, p, t) for f, p in fits[1:] if (t := terms_of(f, found)) is not None]
@@ -257,10 +237,8 @@ def structure_of(
 def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values.
 
-    Parameters
-    ----------
-    flows
-        The flows of the comparison; training ones set the box beyond which the law extrapolates.
+    `flows`: the flows of the comparison; training ones set the box beyond which the law
+    extrapolates.
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along

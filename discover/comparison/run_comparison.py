@@ -1,50 +1,152 @@
 """Both learners on identical data, part by part, so that a run that was stopped can go on."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from discover.comparison.bands import Band, flow_bands
 from discover.comparison.classical import fit_classical_laws
-from discover.comparison.comparison import Comparison
-from discover.comparison.description import data_in_words, known_in_words
-from discover.comparison.equations import known_equation
-from discover.comparison.flows import DRAWN, Flow, comparison_flows
-from discover.comparison.hypotheses import search_hypotheses, terms_of, with_proposals
-from discover.comparison.known_part import Frame, known_part
-from discover.comparison.learning import Learning, distilled, require_teacher
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.predictive_check import expectation_of, lacks_of_fit
-from discover.comparison.prepared import (
+from discover.comparison.comparison import Comparison, SweepPoint
+from discover.comparison.flows import (
+    DRAWN,
+    Flow,
+    comparison_flows,
     prepared,
     require_one_known_law,
     settled_by,
     thinned_to,
+    true_terms,
     without_spikes_in_fit,
 )
+from discover.comparison.hypotheses import search_hypotheses, terms_of, with_proposals
+from discover.comparison.known_part import Frame, known_part
+from discover.comparison.learning import Learning, distilled, require_teacher, study_library
+from discover.comparison.outcome import LearnerOutcome
+from discover.comparison.predictive_check import expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
-from discover.comparison.statements import Statement, make_statements
-from discover.comparison.sweep import sweep_points, sweep_studies
-from discover.comparison.training import study_library
-from discover.comparison.truth import true_terms
+from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.learners.results.result import LearnerResult
+from discover.laws.registry import LAWS, make_law
+from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found
 from discover.loop.loop_result import LoopResult
 from discover.loop.simple import simple_result
 from discover.progress import Progress, silent
+from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
 from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
+from discover.words import unknown_name
 from tensor_library.law_terms import LawTerm
 from tensor_library.library import TermLibrary
+
+Asked = tuple[str, float, Study]
+"""A law, the value of its parameter, and the study of that point."""
+
+
+def sweep_studies(study: Study) -> list[Asked]:
+    """Return the law, the value and the study of each point of a sweep."""
+    sweep, synthetic = study.compare.sweep, study.data.synthetic
+    if sweep is None:
+        return []
+    if synthetic is None:
+        raise InputError(
+            "compare.sweep makes synthetic data, so [data] must say synthetic = {...} too."
+        )
+    studies = []
+    for law in sweep.laws:
+        if sweep.parameter not in LAWS[law].parameters:
+            its = LAWS[law].parameters
+            said = unknown_name("parameter", sweep.parameter, its, f"the law {law!r}")
+            raise InputError(f"compare.sweep: {said}")
+        for value in sweep.values:
+            make_law(law, {sweep.parameter: value})  # refuses now what would fail after hours
+            made = synthetic.model_copy(update={"law": law, "parameters": {sweep.parameter: value}})
+            data = study.data.model_copy(update={"synthetic": made})
+            studies.append((law, value, study.model_copy(update={"data": data})))
+    return studies
+
+
+def sweep_points(
+    asked: Sequence[Asked],
+    learning: Learning,
+    model: DeclaredModel,
+    seed: int | None,
+    step: Callable[[int, str], Progress],
+) -> list[SweepPoint]:
+    """Return what each learner of a study finds at each point of its sweep.
+
+    `asked`: the points, as `sweep_studies` returns them. `learning`: where learners are trained, of
+    the study whose sweep it is. `model`: the known part. `seed`: overrides the study's seed of the
+    noise. `step`: returns what is called with what is going on, of the number of learners that are
+    done and a title.
+    """
+    options, points = learning.study.compare, []
+    for i, (law, value, other) in enumerate(asked):
+        data = thinned_to(load_study_data(other, seed), options.most_samples)
+        flow = comparison_flows(data, ())[len(data.fit)]
+        alone = Frame(model, data, [flow], [flow])
+        elsewhere, found = replace(learning, study=other, made=None), {}
+        for j, learner in enumerate(options.learners):
+            part = f"sweep_{law}_{value:g}_{learner}"
+            say = step(i * len(options.learners) + j, part)
+            found[learner] = elsewhere.outcome(learner, alone, say, part)
+        assert options.sweep is not None
+        points.append(SweepPoint(law, options.sweep.parameter, value, flow, found))
+    return points
+
+
+def data_in_words(data: StudyData, study: Study) -> str:
+    """Return what is fitted of which data."""
+    samples = sum(len(run) for run in data.fit)
+    recorded = in_words(run.quantity for run in data.fit)
+    # what is recorded beside σ12 is data of its own, and no other run
+    fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
+    runs = f"{recorded} of {_runs(fitted)} ({samples} samples)"
+    made = study.data.synthetic
+    if made is None:
+        kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
+        text = f"{runs} of {data.dataset.name}; {_runs(held_out)} held out"
+        return f"{text}. {kept}" if kept else text
+    law = LAWS[made.law].described(made.parameters)
+    noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
+    return f"{runs} computed from the {law} law, {noise}"
+
+
+def _runs(number: int) -> str:
+    return f"{number} run{'' if number == 1 else 's'}"
+
+
+def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
+    """Return what was known before, and what was fitted with the likeliest hypothesis."""
+    text = _law_and_modes(frame.model, study)
+    if declared.free_constants:
+        text += f" ({', '.join(declared.free_constants)} fitted)"
+    if frame.effects:
+        taken = ", ".join(effect.text for effect in frame.effects)
+        text += f"; corrected for in the data: {taken}"
+    return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
+
+
+def _law_and_modes(model: DeclaredModel, study: Study) -> str:
+    if not study.model.known_relaxation:
+        return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
+    named = LAWS.get(model.law_name)
+    title = model.law_name if named is None else named.described(model.parameters)
+    modes = len(model.modulus)
+    source = " from the linear sweep" if study.model.from_ is None else ""
+    text = title if modes == 1 else f"{title}, {modes} relaxation modes{source}"
+    if model.solvent_viscosity:
+        text += f", a solvent of {model.solvent_viscosity:.4g} Pa s"
+    return f"{text}; {model.solid.rstrip('.')}" if model.solid else text
+
 
 _SEARCH = 0.15
 """Share of the time that the search among hypotheses takes, about."""
@@ -68,27 +170,12 @@ def compare(
     values of its likeliest hypothesis, and what that holds of the instrument is taken out of the
     records, so that learners learn the fluid. Then each learner's law is a hypothesis too.
 
-    Parameters
-    ----------
-    study
-        The study.
-    seed
-        Overrides the study's seeds, of the noise and of the learners.
-    progress
-        Called with what is going on and the fraction done.
-    store
-        Where finished learners are kept and found again.
-    data, declared
-        Data and known part that are at hand, in place of the study's.
-    made
-        Learners that are fitted already: what they found, by learner.
-    library
-        The terms that they searched, in place of the study's.
-
-    Raises
-    ------
-    InputError
-        If the study asks for something that its data cannot give.
+    `study`: the study. `seed`: overrides the study's seeds, of the noise and of the learners.
+    `progress`: called with what is going on and the fraction done. `store`: where finished learners
+    are kept and found again. `data`, `declared`: data and known part that are at hand, in place of
+    the study's. `made`: learners that are fitted already: what they found, by learner. `library`:
+    the terms that they searched, in place of the study's. Raises InputError if the study asks for
+    something that its data cannot give.
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)

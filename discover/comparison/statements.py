@@ -5,16 +5,22 @@ measured is conditional, and nothing is said where no law describes the data to 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from discover.comparison.bands import Band
-from discover.comparison.flows import MEASURED, QUANTITIES, Flow
+from discover.comparison.flows import MEASURED, QUANTITIES, Flow, relative_errors
+from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import law_structure
+from discover.equations import Equation, Tested, combined, law_parts
+from discover.equations.equation import box_of, flow_numbers
+from discover.errors import InputError
 from discover.identify import Structure
+from discover.learners.registry import learner_title
 from discover.protocols.kinematics import LINEAR_STRAIN, ONLY_STATES
+from discover.study.declared_model import DeclaredModel
 from discover.words import percent_of
 
 Determined = Literal["no", "if_the_law_is_in_the_library"]
@@ -39,21 +45,12 @@ _TITLES = {"sigma12": "σ12"}
 class Statement:
     """What the data say of a quantity.
 
-    Attributes
-    ----------
-    quantity
-        One of `QUANTITIES`.
-    determined
-        On which condition the data decide it.
-    text
-        The reason, for a reader.
-    of_transients
-        Whether it is about transients alone, and not about steady and periodic states.
+    `of_transients`: whether it is about transients alone, and not about steady and periodic states.
     """
 
-    quantity: str
-    determined: Determined
-    text: str
+    quantity: str  # one of `QUANTITIES`
+    determined: Determined  # on which condition the data decide it
+    text: str  # the reason, for a reader
     of_transients: bool = False
 
     @property
@@ -95,20 +92,10 @@ def make_statements(
 ) -> list[Statement]:
     """Return what the training data say of N1 and N2, with the reason.
 
-    Parameters
-    ----------
-    verdict
-        Of the comparison.
-    bands
-        By the key of the flow.
-    structure
-        What σ12 could say of the library at the law found.
-    spread
-        Relative difference of N1 and N2 between laws that describe the runs as well, where known.
-    normal_stresses_used
-        Whether measured normal stresses were part of the fit.
-    terms
-        Of the law found.
+    `verdict`: of the comparison. `bands`: by the key of the flow. `structure`: what σ12 could say
+    of the library at the law found. `spread`: relative difference of N1 and N2 between laws that
+    describe the runs as well, where known. `normal_stresses_used`: whether measured normal stresses
+    were part of the fit. `terms`: of the law found.
     """
     asked = [q for q in _NORMAL_STRESSES if not (normal_stresses_used and _is_measured(q, flows))]
     if verdict == "no_signal":
@@ -188,3 +175,63 @@ def _flows_in(flow: Flow) -> int:
     if flow.protocol.control == "oscillation":
         return int(np.count_nonzero(np.asarray(flow.strain) > LINEAR_STRAIN))
     return len(flow.times) if flow.is_of_states else 1
+
+
+_PROJECTION = (
+    "This is the network put into words (its projection on the library). The network itself has no "
+    "closed form, and the errors are its own."
+)
+
+
+def known_equation(model: DeclaredModel) -> Equation | None:
+    """Return the known part of a study as an equation; None where it cannot be written out."""
+    try:
+        named, terms = law_parts(model.law)
+    except InputError:
+        return None
+    return Equation(
+        terms,
+        tuple(float(g) for g in model.modulus),
+        tuple(float(time) for time in model.relaxation_time),
+        model.law.linear_relaxation,
+        float(model.solvent_viscosity),
+        named=named,
+    )
+
+
+def outcome_equation(
+    known: Equation, outcome: LearnerOutcome, flows: Sequence[Flow], study: str
+) -> Equation:
+    """Return the known part with what a learner found."""
+    who = learner_title(outcome.learner)
+    who = f"the {who}" if outcome.learner == "tbnn_ude" else who
+    found = tuple(term.in_law for term in outcome.terms)
+    time = known.mean_relaxation_time
+    judged = [flow for flow in flows if flow.kind in ("test", "held_out")]
+    learned_in = box_of(_numbers(flow, time) for flow in flows if flow.kind == "training")
+    tested = None
+    if learned_in is not None:
+        judged_in = box_of(_numbers(flow, time) for flow in judged)
+        tested = Tested(learned_in, judged_in, _worst(outcome, judged))
+    return replace(
+        known,
+        # without a known part in the way, the terms keep their intervals
+        terms=combined(known.terms + found) if known.terms else found,
+        title=f"Law found by {who} in the study '{study}'.",
+        notes=(_PROJECTION,) if outcome.learner == "tbnn_ude" else (),
+        tested=tested,
+    )
+
+
+def _numbers(flow: Flow, time: float) -> tuple[float, float]:
+    return flow_numbers(flow.times, flow.rate, time, flow.frequency)
+
+
+def _worst(outcome: LearnerOutcome, judged: Sequence[Flow]) -> dict[str, float]:
+    rows = [relative_errors(outcome.predictions[flow.key], flow.reference) for flow in judged]
+    worst = {}
+    for quantity in QUANTITIES:
+        values = [value for row in rows if (value := row[quantity]) is not None]
+        if values:
+            worst[quantity] = max(values)
+    return worst

@@ -13,8 +13,8 @@ from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.dataset.run_table import run_line
 from discover.errors import InputError, Problems
-from discover.notebook_view import NotebookView
 from discover.plain_numbers import short
+from discover.summary_view import NotebookView
 from discover.words import unknown_name
 
 

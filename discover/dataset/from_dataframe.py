@@ -10,7 +10,8 @@ from typing import Any
 import pandas as pd
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.load import DATA_FILES, INDEX_FILE, load_dataset
+from discover.dataset.load import DATA_FILES, load_dataset
+from discover.dataset.read_run import INDEX_FILE
 from discover.errors import InputError
 from discover.plain_numbers import short
 from discover.words import unknown_name

@@ -11,9 +11,8 @@ from jaxtyping import Float
 from discover.dataset.linear.mode_search import ModeFit, ModeSearch, relative_moduli
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
-from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.noise_model import independent_samples, rms
 from discover.statistics.noise.whiteness import FEWEST_FAST, noise_probability, separate_probability
-from discover.statistics.projection import rms
 from discover.statistics.residual import slow_part
 
 MOST_MODES = 30

@@ -12,13 +12,13 @@ from jaxtyping import Float
 
 from discover.dataset.tables.table import as_column
 from discover.errors import InputError
-from discover.notebook_view import NotebookView
 from discover.protocols.between_samples import RateStep
 from discover.protocols.control import paced_by
 from discover.protocols.history import after_steady_flow
 from discover.protocols.kinematics import MODULI, STATES, FlowKind, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, recording
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
+from discover.summary_view import NotebookView
 
 # Relative error of one run above which two do not differ by their loading: fillings and trimmings
 # of one sample differ by some per cent, and what differs by more, as a run told in minutes does,

@@ -14,16 +14,12 @@ from discover.effects.base import (
     StateEffect,
     WrittenState,
 )
-from discover.effects.known import KnownEffect, known_effects
-from discover.effects.library_term import (
-    LibraryTerm,
-    library_effects,
-    library_term,
-    simplest_terms,
-)
+from discover.effects.library_term import LibraryTerm, library_effects, library_term, simplest_terms
 from discover.effects.registry import (
+    KnownEffect,
     built_in_effects,
     effects_table,
+    known_effects,
     make_effect,
     named_effects,
 )

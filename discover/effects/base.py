@@ -20,11 +20,10 @@ class WrittenState:
     ``shear_stress``: the size of the rate √(½ γ̇:γ̇) in 1/s, and the stress in Pa of a shear of that
     size that does the same work.
 
-    `rates`: of change of each level, in 1/s, in their order.
     `modulus_factor`, `time_factor`: on the stress and on the relaxation time of every mode.
     """
 
-    rates: tuple[Any, ...]
+    rates: tuple[Any, ...]  # of change of each level, in 1/s, in their order
     modulus_factor: Any = 1
     time_factor: Any = 1
 
@@ -55,16 +54,12 @@ class EffectParameter:
     A value outside of the range is not fitted, and one that a fit drives to the end of it is no
     finding: what the data ask for is then another effect.
 
-    `name`: name in JSON and reports.
-    `symbol`: LaTeX.
-    `unit`: SI unit; empty for a pure number.
     `low`, `high`: physical range, in the unit or, where `range_scale` names one, in a property of
         the data.
     `range_source`: where the range comes from: literature, or the argument in a sentence.
     `range_scale`: data property in which `low` and `high` are measured; ``one`` where they are in
         `unit`.
     `ends`: those of `low` and `high` that something real can have, such as no recovery at all.
-    `scale`: data property in which `first_trial` is measured.
     `first_trial`: size of the first trial value, in that scale; for an inner parameter its starting
         value.
     `endless`: of a time: what the effect cannot be told from where no record lasts as long; empty
@@ -73,12 +68,12 @@ class EffectParameter:
         otherwise.
     """
 
-    name: str
-    symbol: str
-    unit: str = ""
+    name: str  # name in JSON and reports
+    symbol: str  # LaTeX
+    unit: str = ""  # SI unit; empty for a pure number
     low: float = -jnp.inf
     high: float = jnp.inf
-    scale: Scale = "one"
+    scale: Scale = "one"  # data property in which `first_trial` is measured
     first_trial: float = 0.1
     range_source: str = field(kw_only=True)
     range_scale: Scale = field(default="one", kw_only=True)
@@ -91,21 +86,16 @@ class EffectParameter:
 class AbstractEffect(ABC):
     """An effect. Its first parameter is the amplitude: at zero it changes nothing.
 
-    `name`: name in studies, JSON and reports.
-    `parameters`: the amplitude first, then any inner parameters.
-    `equation`: LaTeX of what the effect adds or changes.
-    `source`: literature.
-    `check`: what a user should do in the laboratory to confirm it.
     `visible`: size from which it shows, in words: the amplitude that changes the stress by about 5
         % in a flow that it affects.
     `complexity`: used to prefer the simpler of two explanations that the data cannot separate.
     """
 
-    name: str
-    parameters: tuple[EffectParameter, ...]
-    equation: str
-    source: str
-    check: str
+    name: str  # name in studies, JSON and reports
+    parameters: tuple[EffectParameter, ...]  # the amplitude first, then any inner parameters
+    equation: str  # LaTeX of what the effect adds or changes
+    source: str  # literature
+    check: str  # what a user should do in the laboratory to confirm it
     visible: str = ""
     complexity: int = 1
     kind: ClassVar[Kind]
@@ -184,10 +174,7 @@ class StateEffect(ConstitutiveEffect):
 
     @abstractmethod
     def source_and_decay(
-        self,
-        values: Float[Array, " p"],
-        shear_rate: Float[Array, ""],
-        stress: Float[Array, ""],
+        self, values: Float[Array, " p"], shear_rate: Float[Array, ""], stress: Float[Array, ""]
     ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
         """Return source and decay in 1/s.
 
@@ -225,9 +212,6 @@ class Record:
     """A signal of one run on a grid of times.
 
     `times` in s, shape (n,), increasing; from 0, or from before where a steady flow came before.
-    `rate`: felt by the fluid, in 1/s, shape (n,).
-    `stress`: shear stress in Pa, shape (n,).
-    `clock_factor`: time on the instrument's clock is ``times / clock_factor``.
     `strain_before`: strain, added up without regard to its sign, that the sample had seen in
         earlier runs.
     `tool_rate`: of the driven tool, as a nominal shear rate in 1/s, shape (n,); by default that of
@@ -236,9 +220,9 @@ class Record:
     """
 
     times: Float[Array, " n"]
-    rate: Float[Array, " n"]
-    stress: Float[Array, " n"]
-    clock_factor: Float[Array, ""]
+    rate: Float[Array, " n"]  # felt by the fluid, in 1/s, shape (n,)
+    stress: Float[Array, " n"]  # shear stress in Pa, shape (n,)
+    clock_factor: Float[Array, ""]  # time on the instrument's clock is ``times / clock_factor``
     strain_before: Float[Array, ""] | float = 0.0
     tool_rate: Float[Array, " n"] = None  # type: ignore[assignment]  # set below
 

@@ -14,7 +14,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
-from discover.notebook_view import NotebookView
+from discover.summary_view import NotebookView
 from discover.words import percent_of
 from tensor_library.law_terms import Interval, LawTerm, LawTerms
 

@@ -15,7 +15,7 @@ from discover.equations.formats.latex_file import equation_latex
 from discover.equations.formats.rheotool import rheotool_text
 from discover.equations.formats.ufl import ufl_code
 from discover.errors import InputError
-from discover.plain_json import json_text, parse_json
+from discover.plain_numbers import json_text, parse_json
 from discover.words import unknown_name
 
 COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"

@@ -31,7 +31,6 @@ from tensor_library.law_terms import LawTerm
 class NamedPart:
     """A law by its name.
 
-    `law`: key of `discover.laws.LAWS`.
     `constants`: its parameters, dimensionless: once for all modes, or once for each.
 
     Raises InputError if there is no such law, or a parameter is missing, unknown or outside its
@@ -43,7 +42,7 @@ class NamedPart:
     ('yield_strain',)
     """
 
-    law: str
+    law: str  # key of `discover.laws.LAWS`
     constants: tuple[Mapping[str, float], ...]
 
     def __post_init__(self):
@@ -101,9 +100,6 @@ class StatePart:
     The state is one for all modes. It multiplies their stress, or their relaxation times wherever
     these occur in their equations.
 
-    `effect`: name of the effect, one of `dc.effects()` with a state.
-    `values`: its parameters by name, in their units.
-
     Raises InputError if there is no such effect, it has no state or nobody said how it is written,
     or a parameter is missing, unknown or outside its range.
 
@@ -113,8 +109,8 @@ class StatePart:
     (1.0,)
     """
 
-    effect: str
-    values: Mapping[str, float]
+    effect: str  # name of the effect, one of `dc.effects()` with a state
+    values: Mapping[str, float]  # its parameters by name, in their units
 
     def __post_init__(self):
         self.written  # noqa: B018  # whatever is wrong is said here
@@ -207,16 +203,12 @@ def combined(terms: tuple[LawTerm, ...]) -> tuple[LawTerm, ...]:
 
 
 class AugmentedLaw(AbstractExtendedLaw):
-    """A law with the extra terms of constitutive effects.
+    """A law with the extra terms of constitutive effects."""
 
-    `base`: the declared law.
-    `linear_relaxation`: as in the declared law.
-    """
-
-    base: AbstractConstitutiveLaw
+    base: AbstractConstitutiveLaw  # the declared law
     values: tuple[Float[Array, " _"], ...]
     effects: tuple[ConstitutiveEffect, ...] = eqx.field(static=True)
-    linear_relaxation: bool = eqx.field(static=True, default=True)
+    linear_relaxation: bool = eqx.field(static=True, default=True)  # as in the declared law
 
     def trace_relaxation(self, stress: State) -> Float[Array, ""]:
         """Return that of the declared law: at rest what an effect adds may have no derivative."""

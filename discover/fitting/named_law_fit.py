@@ -18,9 +18,8 @@ from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
 from discover.loop.run_record import RunRecord
-from discover.page_view import PageView
 from discover.statistics import LackOfFit
-from discover.summary_view import Estimate, SummaryView
+from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
 
 _LABELS = {"modulus_Pa": "G", "relaxation_time_s": "λ"}
@@ -116,7 +115,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
     written: Equation | None = None
     title: str = ""
 
-    _page: ClassVar[str] = "discover.report.fit:fit_page"
+    _page: ClassVar[str] = "discover.report.in_memory:fit_page"
 
     @property
     def error(self) -> float:

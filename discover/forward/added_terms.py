@@ -17,21 +17,15 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, LibraryTerm
-from tensor_library.contraction import contracted
-from tensor_library.integrity_basis import integrity_basis
-from tensor_library.invariants import scalar_invariants
+from tensor_library.algebra import contracted, integrity_basis, scalar_invariants
 from tensor_library.kinematics import rate_of_deformation
 
 
 class LibraryMatrix:
     """Coefficients of library terms, basis tensors × monomials of the invariants.
 
-    Parameters
-    ----------
-    terms
-        Terms without a closed form.
-    positions
-        Of their coefficients in the parameter vector.
+    `terms`: terms without a closed form. `positions`: of their coefficients in the parameter
+    vector.
     """
 
     def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
@@ -77,38 +71,25 @@ ModesRate = Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "
 class InUse(NamedTuple):
     """Which branches a parameter vector takes.
 
-    Attributes
-    ----------
-    library
-        0 without library terms, 1 with terms of one basis tensor, 2 with terms of several.
-    tensor
-        That one tensor, by its position among those that occur in the library.
-    others
-        0 without other terms, i + 1 with the i-th alone, one past the last with several.
-    states
-        0 without states of the fluid, i + 1 with the i-th alone, one past the last with several.
-    times
-        1 where a state changes the relaxation times.
+    `library`: 0 without library terms, 1 with terms of one basis tensor, 2 with terms of several.
+    `others`: 0 without other terms, i + 1 with the i-th alone, one past the last with several.
+    `states`: 0 without states of the fluid, i + 1 with the i-th alone, one past the last with
+        several.
     """
 
     library: np.int32
-    tensor: np.int32
+    tensor: np.int32  # that one tensor, by its position among those that occur in the library
     others: np.int32
     states: np.int32 = np.int32(0)
-    times: np.int32 = np.int32(0)
+    times: np.int32 = np.int32(0)  # 1 where a state changes the relaxation times
 
 
 class AddedTerms:
     """Terms of the law of each mode that effects add.
 
-    Parameters
-    ----------
-    effects
-        Effects of the fluid; those that add no term are passed over.
-    slices
-        Where the parameters of each effect stand in the vector.
-    varying
-        Where, of effects whose amplitude may differ from mode to mode, what varies it stands.
+    `effects`: effects of the fluid; those that add no term are passed over. `slices`: where the
+    parameters of each effect stand in the vector. `varying`: where, of effects whose amplitude may
+    differ from mode to mode, what varies it stands.
     """
 
     def __init__(

@@ -15,9 +15,8 @@ from discover.effects import (
     StateEffect,
 )
 from discover.forward.added_terms import AddedTerms, InUse
-from discover.forward.by_mode import DEGREE, constants_of_modes, decades
+from discover.forward.declared import DEGREE, Structure, constants_of_modes, decades
 from discover.forward.dynamics import Dynamics, Modes, Series
-from discover.forward.structure import Structure
 from discover.laws import LAWS, AbstractConstitutiveLaw
 from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
 from discover.protocols.kinematics import Kinematics
@@ -26,15 +25,10 @@ from discover.protocols.kinematics import Kinematics
 class OfModes(NamedTuple):
     """What a vector of parameters says of each mode.
 
-    Attributes
-    ----------
-    law
-        With the values of its free parameters, and constants of its own for each mode where these
-        differ.
-    declared, extra
-        The declared modes, and those of effects.
-    amplitudes
-        Of effects whose amplitude differs from mode to mode, by name.
+    `law`: with the values of its free parameters, and constants of its own for each mode where
+        these differ.
+    `declared`, `extra`: the declared modes, and those of effects.
+    `amplitudes`: of effects whose amplitude differs from mode to mode, by name.
     """
 
     law: AbstractConstitutiveLaw
@@ -46,16 +40,11 @@ class OfModes(NamedTuple):
 class AugmentedFluid:
     """What a structure makes of a vector of parameters: the fluid, and what gives way beside it.
 
-    Attributes
-    ----------
-    slices
-        Where the parameters of each effect stand in the vector, by name.
-    of_effects, instants
-        Where the parameters of all effects stand, and the instants of steps of the rate.
-    size
-        Length of the vector.
-    series
-        Effects that give way in series with the fluid.
+    `slices`: where the parameters of each effect stand in the vector, by name.
+    `of_effects`, `instants`: where the parameters of all effects stand, and the instants of steps
+        of the rate.
+    `size`: length of the vector.
+    `series`: effects that give way in series with the fluid.
     """
 
     def __init__(self, structure: Structure):
@@ -187,12 +176,9 @@ class AugmentedFluid:
     ) -> Dynamics:
         """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
 
-        Parameters
-        ----------
-        numbers, used, theta
-            What is data to the program, the branches that the vector takes, and the vector.
-        flow, in_one_piece
-            The flow, and whether steps are one piece of machine code.
+        `numbers`, `used`, `theta`: what is data to the program, the branches that the vector takes,
+        and the vector. `flow`, `in_one_piece`: the flow, and whether steps are one piece of machine
+        code.
         """
         law, declared, extra, amplitudes = self.of_modes(numbers, theta)
         of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)

@@ -15,19 +15,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
-from discover.forward.batches import (
-    Batch,
-    PeriodicFlows,
-    SteadyFlows,
-    StressFlows,
-    TransientFlows,
-)
-from discover.forward.by_mode import LARGEST, decades
-from discover.forward.declared import DeclaredModel, FreeParameter
+from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
+from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
 from discover.forward.linearised import Linearised, Point, linearised, widths_of
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.forward.structure import Structure
 from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
@@ -43,14 +35,10 @@ class AugmentedModel:
     Models that differ in numbers only (moduli, times, scales of the data) share one compiled
     program for each shape of the runs.
 
-    Parameters
-    ----------
-    effects
-        Candidates; their parameters follow one another in the vector, after the declared ones.
-        Those that the declared model knows follow, if they are not among them, and last the
-        instants at which rates step.
-    scales
-        Size of each property of the data in which parameters are scaled; see `data_scales`.
+    `effects`: candidates; their parameters follow one another in the vector, after the declared
+    ones. Those that the declared model knows follow, if they are not among them, and last the
+    instants at which rates step. `scales`: size of each property of the data in which parameters
+    are scaled; see `data_scales`.
     """
 
     def __init__(
@@ -187,14 +175,9 @@ class AugmentedModel:
     ) -> Float[np.ndarray, "trials runs n"]:
         """Return the predicted records of any number of parameter vectors.
 
-        Parameters
-        ----------
-        thetas, batch
-            Parameter vectors, and the runs that each predicts.
-        moduli
-            Of the declared modes in Pa for each vector, and behind them the viscosity of the
-            solvent in Pa s. By default as declared. One that an error of a sweep moves may be
-            negative.
+        `thetas`, `batch`: parameter vectors, and the runs that each predicts. `moduli`: of the
+        declared modes in Pa for each vector, and behind them the viscosity of the solvent in Pa s.
+        By default as declared. One that an error of a sweep moves may be negative.
         """
         return self._predicted(thetas, batch, moduli, normal=False)[..., 0]
 
@@ -210,11 +193,6 @@ class AugmentedModel:
         shear, the tensile stress in extension, and a strain at a given stress. N1 is σ11 − σ22 and
         N2 is σ22 − σ33 in any flow. They are not numbers where a test has none, as a sweep, and at
         a given stress with a user's own effect that lanes do not know.
-
-        Parameters
-        ----------
-        thetas, batch, moduli
-            As in `predictions`. An effect of the torque's signal does not change N1 and N2.
         """
         return self._predicted(thetas, batch, moduli, normal=True)
 
@@ -248,15 +226,10 @@ class AugmentedModel:
 
         Those of runs that are loadings of their own are what the factors of these leave.
 
-        Parameters
-        ----------
-        thetas, batch, moduli
-            As in `predictions`.
-        limits
-            Sums of squares from which on a vector is of no use: its residuals are infinite. What
-            has reached its limit is not followed to the end of its runs, nor, in tests that are
-            quickly predicted, asked about the others, of which a periodic state takes a hundred
-            times as long as a steady one.
+        `limits`: sums of squares from which on a vector is of no use: its residuals are infinite.
+        What has reached its limit is not followed to the end of its runs, nor, in tests that are
+        quickly predicted, asked about the others, of which a periodic state takes a hundred times
+        as long as a steady one.
         """
         if limits is None:
             return batch.records.residual(self.predictions(thetas, batch, moduli))
@@ -289,17 +262,11 @@ class AugmentedModel:
     ) -> Linearised:
         """Return the weighted residuals of a vector and their derivatives, from one call.
 
-        Parameters
-        ----------
-        theta, batch
-            The vector, and the runs.
-        positions
-            Parameters by which to differentiate, by differences of one side, away from an end of
-            their range.
-        moves
-            Of the moduli in Pa and of the solvent in Pa s: half the difference between what is left
-            after each move and after its opposite follows the derivatives. It is the change by the
-            move where records are linear in the moduli.
+        `theta`, `batch`: the vector, and the runs. `positions`: parameters by which to
+        differentiate, by differences of one side, away from an end of their range. `moves`: of the
+        moduli in Pa and of the solvent in Pa s: half the difference between what is left after each
+        move and after its opposite follows the derivatives. It is the change by the move where
+        records are linear in the moduli.
         """
         if moves is None or not len(moves):
             return linearised(self, [Point(theta, positions)], batch)[0]

@@ -2,14 +2,80 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float
 
-from discover.effects import AbstractEffect, ConstitutiveEffect, KnownEffect, make_effect
+from discover.effects import (
+    AbstractEffect,
+    ConstitutiveEffect,
+    KnownEffect,
+    ModeEffect,
+    built_in_effects,
+    make_effect,
+)
 from discover.errors import InputError
-from discover.forward.by_mode import DEGREE
 from discover.laws import LAWS, AbstractConstitutiveLaw, UpperConvectedMaxwell, make_law
+
+DEGREE = 2
+"""Highest degree of the polynomial in log λ."""
+
+LARGEST = 10.0
+"""Largest coefficient, and largest deviation of one mode, on the link's scale: e^10 either way."""
+
+
+def decades(
+    modulus: Float[Array, " k"],
+    relaxation_time: Float[Array, " k"],
+    of: Float[Array, " m"] | None = None,
+    beyond: bool = False,
+) -> Float[Array, " m"]:
+    """Return log10(λ/λ̄), with λ̄ the geometric mean of the times by viscosity.
+
+    `modulus`, `relaxation_time`: of the declared modes, in Pa and s. `of`: times in s; by default
+    the declared ones. Beyond these the end counts, for a polynomial says nothing there. `beyond`:
+    whether times beyond the declared ones count as they are: of modes by which a polynomial is
+    told, too.
+    """
+    own = jnp.log10(relaxation_time)
+    viscosity = modulus * relaxation_time
+    asked = own if of is None else jnp.log10(of)
+    if not beyond:
+        asked = jnp.clip(asked, jnp.min(own), jnp.max(own))
+    return asked - jnp.sum(viscosity * own) / jnp.sum(viscosity)
+
+
+def constants_of_modes(
+    mean: Float[Array, ""],
+    low: float,
+    high: float,
+    coefficients: Float[Array, " degree"],
+    deviations: Float[Array, " k"],
+    places: Float[Array, " k"],
+) -> Float[Array, " k"]:
+    """Return the constant of each mode: that at λ̄, with its link moved by a polynomial.
+
+    The link is the logarithm of (c − low)/(high − c), or of c − low where there is no upper bound:
+    so every mode keeps the range in which the law is one, whatever the coefficients. With all of
+    them zero each mode has the very constant of the mean.
+
+    `mean`: the constant at λ̄, dimensionless. `low`, `high`: its range. `coefficients`: of the
+    first and the second power of `places`. `deviations`: of each mode from the polynomial.
+    `places`: of the modes, from `decades`.
+    """
+    powers = jnp.stack([places ** (i + 1) for i in range(DEGREE)])
+    change = coefficients @ powers + deviations
+    if not np.isfinite(low):
+        # mirrored where only the upper bound is one, and no link where neither is
+        return mean + change if not np.isfinite(high) else high - (high - mean) * jnp.exp(-change)
+    if not np.isfinite(high):
+        return low + (mean - low) * jnp.exp(change)
+    share, odds = (mean - low) / (high - low), jnp.exp(change)
+    return low + (high - low) * share * odds / (1.0 - share + share * odds)
+
 
 MODULUS, RELAXATION_TIME = "modulus_Pa", "relaxation_time_s"
 """Names of the two common factors that may be fitted."""
@@ -29,58 +95,39 @@ class FreeParameter:
 class DeclaredModel:
     """A law, its modes, and which of them are still to be fitted.
 
-    Attributes
-    ----------
-    law
-        The law of every mode, with starting values where parameters are free.
-    modulus
-        G_k in Pa, shape (k,).
-    relaxation_time
-        λ_k in s, shape (k,).
-    solvent_viscosity
-        In Pa s.
-    fit_modulus, fit_relaxation_time
-        Whether one common factor on all moduli, or on all times, is fitted.
-    law_name, parameters
-        Name and parameters of a named law; needed only if some are free.
-    free_parameters
-        Parameters of the law to fit.
-    linear_error
-        Relative error with which the modes describe the linear data they come from; no prediction
-        can be expected to do better.
-    linear_pattern
-        Relative size of what in that error is no noise of the linear data; 0 where all may be, None
-        where no number of modes follows them.
-    modulus_covariance
-        Of the moduli in Pa², shape (k, k), as those data leave them, and of the solvent behind
-        them, shape (k + 1, k + 1), where it comes from them; None where they are exact.
-    effects
-        What is known beside the law: effects of fluid and instrument, with values or to be fitted.
-    step_instants
-        How many instants of steps of the rate in the fitted runs are fitted; `Run.rate_steps` say
-        which is whose.
-    by_mode
-        Free parameters of the law, and effects by the amplitude of their term, that may differ from
-        mode to mode, as a smooth function of the time; see `discover.forward.by_mode`.
-    added_modes
-        How many modes beside the declared ones, which effects add, have constants by mode of their
-        own; without, these have the constants of the declared spectrum at their times.
+    `law`: the law of every mode, with starting values where parameters are free.
+    `fit_modulus`, `fit_relaxation_time`: whether one common factor on all moduli, or on all times,
+        is fitted.
+    `law_name`, `parameters`: name and parameters of a named law; needed only if some are free.
+    `linear_error`: relative error with which the modes describe the linear data they come from; no
+        prediction can be expected to do better.
+    `linear_pattern`: relative size of what in that error is no noise of the linear data; 0 where
+        all may be, None where no number of modes follows them.
+    `modulus_covariance`: of the moduli in Pa², shape (k, k), as those data leave them, and of the
+        solvent behind them, shape (k + 1, k + 1), where it comes from them; None where they are
+        exact.
+    `effects`: what is known beside the law: effects of fluid and instrument, with values or to be
+        fitted.
+    `step_instants`: how many instants of steps of the rate in the fitted runs are fitted;
+        `Run.rate_steps` say which is whose.
+    `by_mode`: free parameters of the law, and effects by the amplitude of their term, that may
+        differ from mode to mode, as a smooth function of the time; see `discover.forward.declared`.
+    `added_modes`: how many modes beside the declared ones, which effects add, have constants by
+        mode of their own; without, these have the constants of the declared spectrum at their
+        times.
 
-    Raises
-    ------
-    InputError
-        If modes are none, or a constant by mode cannot be one, or has one mode alone.
+    Raises InputError if modes are none, or a constant by mode cannot be one, or has one mode alone.
     """
 
     law: AbstractConstitutiveLaw
-    modulus: Float[np.ndarray, " k"]
-    relaxation_time: Float[np.ndarray, " k"]
-    solvent_viscosity: float = 0.0
+    modulus: Float[np.ndarray, " k"]  # G_k in Pa, shape (k,)
+    relaxation_time: Float[np.ndarray, " k"]  # λ_k in s, shape (k,)
+    solvent_viscosity: float = 0.0  # in Pa s
     fit_modulus: bool = False
     fit_relaxation_time: bool = False
     law_name: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
-    free_parameters: tuple[FreeParameter, ...] = ()
+    free_parameters: tuple[FreeParameter, ...] = ()  # parameters of the law to fit
     linear_error: float = 0.0
     linear_pattern: float | None = 0.0
     effects: tuple[KnownEffect, ...] = ()
@@ -157,16 +204,8 @@ class DeclaredModel:
     ) -> "DeclaredModel":
         """Return a named law with these modes.
 
-        Parameters
-        ----------
-        law_name, parameters
-            As in `discover.laws.make_law`; starting values for those that are free.
-        modulus, relaxation_time
-            In Pa and s, one or several.
-        free
-            What to fit: parameters of the law, ``modulus_Pa``, ``relaxation_time_s``.
-        **options
-            Other attributes.
+        `modulus`, `relaxation_time` in Pa and s, one or several. `free`: what to fit: parameters of
+        the law, ``modulus_Pa``, ``relaxation_time_s``. `**options`: other attributes.
         """
         law = make_law(law_name, parameters)
         ranges = LAWS[law_name].parameters
@@ -238,3 +277,49 @@ def may_differ_by_mode(effect: AbstractEffect) -> bool:
     """Return whether an effect scales a term of each mode's law by a dimensionless amplitude."""
     adds = isinstance(effect, ConstitutiveEffect) and effect.adds_term
     return adds and effect.parameters[0].range_scale == "one"
+
+
+class Numbers(eqx.Module):
+    """What of a declared model is data to the compiled program."""
+
+    law: AbstractConstitutiveLaw
+    modulus: Float[Array, " k"]
+    relaxation_time: Float[Array, " k"]
+    solvent_viscosity: Float[Array, ""]
+
+
+class Structure(NamedTuple):
+    """What decides which program is compiled; models that share it share the program."""
+
+    effects: tuple[AbstractEffect, ...]
+    free_parameters: tuple[str, ...]
+    law_name: str
+    parameters: tuple[tuple[str, float], ...]
+    fit_modulus: bool
+    by_mode: tuple[tuple[str, int, int], ...] = ()
+    """Constants that may differ from mode to mode, and where what varies them begins and ends."""
+    step_instants: int = 0
+    """How many instants of steps of the rate are fitted, each as a share of its interval."""
+    added_modes: int = 0
+    """How many modes that effects add have constants by mode of their own."""
+
+    def with_every_effect(self) -> "Structure":
+        """Return the structure that all sets of effects share: an absent one is at zero.
+
+        It has every effect that is built in, and after them, by name, those of a user's own that
+        are asked for. What a declared model leaves as it is, is not moved.
+        """
+        asked = {effect.name: effect for effect in self.effects}
+        every = {name: asked.pop(name, effect) for name, effect in built_in_effects().items()}
+        every |= {name: asked[name] for name in sorted(asked)}
+        if self.added_modes:
+            # their constants follow one another in the order of these modes
+            added = [e for e in self.effects if isinstance(e, ModeEffect)]
+            plain = [e for e in every.values() if not isinstance(e, ModeEffect)]
+            every = {effect.name: effect for effect in (*added, *plain)}
+        return self._replace(effects=tuple(every.values()), fit_modulus=True)
+
+    def without_constants(self) -> "Structure":
+        """Return the structure of the effects alone: constants of a law are data to its code."""
+        of_effects = (name for name, *_ in self.by_mode if name not in self.free_parameters)
+        return Structure(self.effects, (), "", (), True, tuple((name, 0, 0) for name in of_effects))

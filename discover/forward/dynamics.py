@@ -16,7 +16,7 @@ from discover.forward.integrators.exponential_weights import (
 )
 from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
 
 Levels = tuple[Float[Array, "..."], ...]
 """States of the fluid."""
@@ -32,10 +32,7 @@ class Modes(NamedTuple):
 class Series(NamedTuple):
     """Elements in series with the fluid: slip s in 1/(Pa s) and compliance C in 1/Pa.
 
-    Attributes
-    ----------
-    slip_by_stress
-        What slip is beyond that at a stress in Pa; None for nothing.
+    `slip_by_stress`: what slip is beyond that at a stress in Pa; None for nothing.
     """
 
     slip: Float[Array, ""]
@@ -49,23 +46,15 @@ class Series(NamedTuple):
 
 @compiled
 def declared_weights(
-    times: Float[Array, "runs m"],
-    relaxation_time: Float[Array, " k"],
-    decay: Float[Array, ""],
+    times: Float[Array, "runs m"], relaxation_time: Float[Array, " k"], decay: Float[Array, ""]
 ) -> Float[Array, "runs s 1 11 k"]:
     """Return the weights of all steps of runs for modes whose trace relaxes as the rest does.
 
     They are a quarter of what a prediction with ten modes and more costs, and the same in each that
     has the same times.
 
-    Parameters
-    ----------
-    times
-        Ends and middles of steps in turn, in s.
-    relaxation_time
-        Of the modes, in s.
-    decay
-        Rate over 1/λ of the relaxation that is integrated exactly.
+    `times`: ends and middles of steps in turn, in s. `relaxation_time`: of the modes, in s.
+    `decay`: rate over 1/λ of the relaxation that is integrated exactly.
     """
     h = jnp.diff(times[:, ::2], axis=1)[..., None] / relaxation_time
     return jnp.stack(krogstad_weights(-decay * h, h), axis=2)[:, :, None]
@@ -74,56 +63,35 @@ def declared_weights(
 class Dynamics(NamedTuple):
     """How the modes change, and what changes with them.
 
-    Attributes
-    ----------
-    slope
-        Dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
+    `slope`: dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
         shape (k,), in simple shear, else four components, shape (4, k). Where the law has structure
         variables, σ stands for σ with these behind it, here and below.
-    linear_relaxation
-        Whether −σ is part of it; it is then integrated exactly.
-    declared, extra
-        The declared modes, and those of effects. Apart, because the weights of the declared ones
-        depend on no trial and are then computed once for all trials.
-    states
-        State effects and their parameters.
-    series
-        Elements in series with the fluid; None where there can be none.
-    viscosity
-        Stress that drives the flow beside that of the modes, at unit rate, in Pa s.
-    relaxations
-        Rates at which each tensor of a mode at rest, and its trace, relax beside −σ, over 1/λ, as
-        the law's, shape (t, 2, k); these too are integrated exactly. None where chains do not
-        retract.
-    times_change
-        1 where a state changes the relaxation times, else 0.
-    states_in_use
-        0 for none, i + 1 for the i-th alone, one past the last for several; None computes all. One
-        that is not in use stays at rest.
-    variables
-        Structure variables of each mode that the law has.
-    shares
-        Of each tensor that stands first among them, of each mode, as the law's.
-    in_one_piece
-        Whether no matrix product stands in the steps; see `contracted`.
-    columns
-        How many derivatives stand beside each number of the modes: σ then has shape (s, 1 +
+    `declared`, `extra`: the declared modes, and those of effects. Apart, because the weights of the
+        declared ones depend on no trial and are then computed once for all trials.
+    `viscosity`: stress that drives the flow beside that of the modes, at unit rate, in Pa s.
+    `relaxations`: rates at which each tensor of a mode at rest, and its trace, relax beside −σ,
+        over 1/λ, as the law's, shape (t, 2, k); these too are integrated exactly. None where chains
+        do not retract.
+    `states_in_use`: 0 for none, i + 1 for the i-th alone, one past the last for several; None
+        computes all. One that is not in use stays at rest.
+    `shares`: of each tensor that stands first among them, of each mode, as the law's.
+    `columns`: how many derivatives stand beside each number of the modes: σ then has shape (s, 1 +
         columns, k), and `slope` is of all of it. 0 leaves σ as it is.
     """
 
     slope: Callable
-    linear_relaxation: bool
+    linear_relaxation: bool  # whether −σ is part of it; it is then integrated exactly
     declared: Modes
     extra: Modes | None
-    states: dict[StateEffect, Float[Array, " p"]]
-    series: Series | None
+    states: dict[StateEffect, Float[Array, " p"]]  # state effects and their parameters
+    series: Series | None  # elements in series with the fluid; None where there can be none
     viscosity: Float[Array, ""]
     relaxations: Float[Array, "t 2 k"] | None = None
-    times_change: Int[Array, ""] | int = 0
+    times_change: Int[Array, ""] | int = 0  # 1 where a state changes the relaxation times, else 0
     states_in_use: Int[Array, ""] | None = None
-    variables: int = 0
+    variables: int = 0  # structure variables of each mode that the law has
     shares: Float[Array, "tensors k"] | None = None
-    in_one_piece: bool = True
+    in_one_piece: bool = True  # whether no matrix product stands in the steps; see `contracted`
     columns: int = 0
 
     @property
@@ -177,22 +145,14 @@ class Dynamics(NamedTuple):
     ) -> StressWeights:
         """Return the weights of one step.
 
-        Parameters
-        ----------
-        pieces
-            Those of `weights`.
-        width
-            Of the step in s.
-        slow
-            The factor on all times in its middle. A step in time over it is exact for the
-            relaxation as it is there: a structure may shorten times a hundredfold, which explicit
-            steps of the length that the flow asks for cannot follow.
+        `pieces`: those of `weights`. `width`: of the step in s. `slow`: the factor on all times in
+        its middle. A step in time over it is exact for the relaxation as it is there: a structure
+        may shorten times a hundredfold, which explicit steps of the length that the flow asks for
+        cannot follow.
         """
         if any(effect.changes_times for effect in self.states):
             pieces = jax.lax.cond(
-                self.times_change,
-                lambda: self.weights_alone(width / slow),
-                lambda: pieces,
+                self.times_change, lambda: self.weights_alone(width / slow), lambda: pieces
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
         whole = KrogstadWeights(*joined[0])
@@ -267,19 +227,9 @@ class Dynamics(NamedTuple):
     ) -> Callable[[Float[Array, "s *c k"], tuple], Float[Array, "s *c k"]]:
         """Return what is evaluated in each stage of a step.
 
-        Parameters
-        ----------
-        w
-            Weights of the step.
-        slow
-            The factor on all times in its middle.
-        flow
-            Which flow it is; None is simple shear.
-
-        Returns
-        -------
-        From the stress in a stage, and the rate and the factor on all times there, to what of the
-        change is not relaxation at the rates of the weights.
+        `w`: weights of the step. `slow`: the factor on all times in its middle. `flow`: which flow
+        it is; None is simple shear. What is returned takes the stress in a stage, and the rate and
+        the factor there, to what of the change is not relaxation at the rates of the weights.
         """
 
         def remainder(stress, given):
@@ -298,12 +248,7 @@ class Dynamics(NamedTuple):
     ) -> Float[Array, "s *c k"]:
         """Return the modes after a step at a given rate, where no state changes with them.
 
-        Parameters
-        ----------
-        rates
-            At its beginning, in its middle and at its end, in 1/s.
-        width
-            Of the step in s.
+        `rates`: at its beginning, in its middle and at its end, in 1/s. `width`: of the step in s.
         """
         w = self.weights_of_step(self.weights_alone(width), width, 1.0)
         stage = self.stage(w, 1.0, flow)

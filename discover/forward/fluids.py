@@ -13,14 +13,20 @@ from typing import NamedTuple, TypeVar
 import diffrax
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.grids.flow_batch import FlowBatch
 from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.integrators.at_given_rate import Observe, begun, follow, without_derivatives
 from discover.forward.integrators.by_diffrax import solve_in_reverse
-from discover.forward.integrators.imposed_stress import answer_to_stress
+from discover.forward.integrators.stepping import (
+    Observe,
+    answer_to_stress,
+    begun,
+    follow,
+    without_derivatives,
+)
 from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
@@ -37,20 +43,15 @@ _GROUP = 8
 class AtSamples(NamedTuple):
     """What is seen of a fluid at the samples.
 
-    Attributes
-    ----------
-    observed
-        What is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of which a
-        run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are zero.
-    states
-        Dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
-    rate
-        In 1/s, shape (n,); of an oscillation its amplitude.
+    `observed`: what is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of
+        which a run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are
+        zero.
+    `states`: dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
     """
 
     observed: Inexact[Array, "n 3"]
     states: Float[Array, "n k s"]
-    rate: Float[Array, " n"]
+    rate: Float[Array, " n"]  # in 1/s, shape (n,); of an oscillation its amplitude
 
 
 def at_samples(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid) -> AtSamples:
@@ -84,17 +85,10 @@ def solve_on_grid(
 ) -> Float[Array, "n 4"]:
     """Return the stresses at a given rate at the samples of one grid.
 
-    Parameters
-    ----------
-    fluid, protocol, grid
-        As in `follow`.
-    adjoint
-        How diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``. None
-        is for values and forward mode: the same steps, traced and compiled in a third of the time.
+    `adjoint`: how diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``.
+    None is for values and forward mode: the same steps, traced and compiled in a third of the time.
 
-    Returns
-    -------
-    σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
+    Returns σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
     """
     if adjoint is None or protocol.control == "steady":
         return _at_given_rate(fluid, protocol, grid, lambda s, rate: fluid.stress(s.T, rate))
@@ -131,20 +125,11 @@ def solved_on_grid(
     numbers: Numbers,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    together: bool = False,
 ) -> AtSamples:
     """Return what is seen where the rate is solved for: at a given stress, and of oscillations.
 
-    Parameters
-    ----------
-    make
-        The fluid of some numbers; derivatives pass through these alone.
-    numbers
-        A tree.
-    protocol, grid
-        Of one run, from `lay_out`.
-    together
-        Whether the samples are of use only together, and not one is solved for once another cannot.
+    `make`: the fluid of some numbers; derivatives pass through these alone. `numbers`: a tree.
+    `protocol`, `grid`: of one run, from `lay_out`.
     """
     dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
@@ -152,33 +137,17 @@ def solved_on_grid(
 
     phase = grid.phase
     assert phase is not None  # of oscillations
-    axis = "states" if together else None
 
     def one(number):
         strain, rate = protocol.strain_in_table(number), protocol.rate(number)
-        found = periodic_state(dynamics, fixed, strain, rate / strain, phase, axis)
+        found = periodic_state(dynamics, fixed, strain, rate / strain, phase)
         return AtSamples(found.modulus * jnp.array([1.0, 0.0, 0.0]), found.stress.T, rate)
 
-    solve = jax.vmap(one, axis_name=axis)
-
-    def group(wanted, numbers):
-        if not together:
-            return wanted, solve(numbers)
-        shapes = jax.eval_shape(solve, numbers)
-        found = jax.lax.cond(
-            wanted,
-            solve,
-            lambda _: jax.tree.map(lambda leaf: jnp.full(leaf.shape, jnp.nan, leaf.dtype), shapes),
-            numbers,
-        )
-        return wanted & jnp.all(jnp.isfinite(found.observed)), found
-
-    # alike ones side by side, for all of a group take as many steps as the slowest; and the largest
-    # strain first, for it is where a law has no state
+    # alike ones side by side, for all of a group take as many steps as the slowest
     order = jnp.argsort(-jax.vmap(protocol.strain_in_table)(grid.times))
     size = min(len(order), _GROUP)
     places = jnp.pad(order, (0, -len(order) % size), mode="edge")
-    _, found = jax.lax.scan(group, jnp.asarray(True), grid.times[places].reshape(-1, size))
+    found = jax.lax.map(jax.vmap(one), grid.times[places].reshape(-1, size))
     of_sample = jnp.argsort(order)[grid.sample_index]  # not those that pad a record
     return jax.tree.map(lambda leaf: leaf.reshape(-1, *leaf.shape[2:])[of_sample], found)
 
@@ -221,3 +190,37 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
         variables=law.variables,
         shares=of_modes("shares") if law.tensors else None,
     )
+
+
+_TOLERANCE = 1e-4
+"""Change of the recorded stress on halving every step, relative to its size in the run."""
+
+_MOST_PIECES = 8
+"""What is observed of every step is kept, and more would not fit into memory."""
+
+
+def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
+    """Return flows in steps that follow a fluid's chains as they retract.
+
+    The length of steps is chosen by the flow, which is what all else in a law follows. Of a law
+    that does not retract they are returned as they are.
+
+    `fluid`: the fluid; where it runs away steps stay as they are. `flows`: from `lay_out`.
+    """
+    followed = all(protocols.control in FOLLOWED for protocols, _ in flows.parts)
+    if not fluid.law.retracts or not followed:
+        return flows
+    pieces, coarse = 1, np.asarray(solve_batch(fluid, flows))
+    while pieces < _MOST_PIECES:
+        finer = flows.in_pieces(2 * pieces)
+        fine = np.asarray(solve_batch(fluid, finer))
+        size = np.sqrt(np.mean(fine**2, axis=(1, 2)))
+        apart = np.sqrt(np.mean((fine - coarse) ** 2, axis=(1, 2)))
+        # not a number where the shorter steps run away too
+        if not np.any(apart > _TOLERANCE * size) and np.all(np.isfinite(apart)):
+            break
+        pieces, coarse = 2 * pieces, fine
+    else:
+        if not np.all(np.isfinite(coarse)):
+            return flows
+    return flows.in_pieces(pieces)

@@ -18,33 +18,22 @@ _BEYOND = 1e-3
 class Linearised(NamedTuple):
     """Residuals of runs at one vector of parameters, and their derivatives.
 
-    Attributes
-    ----------
-    residual
-        Weighted residuals; not finite where the vector runs away.
-    jacobian
-        Their derivatives by the parameters at `positions`, in the units of these, and behind them
-        their change with each move of the moduli.
-    positions
-        In the vector.
+    `residual`: weighted residuals; not finite where the vector runs away.
+    `jacobian`: their derivatives by the parameters at `positions`, in the units of these, and
+        behind them their change with each move of the moduli.
     """
 
     residual: Float[np.ndarray, "runs n"]
     jacobian: Float[np.ndarray, "columns runs n"]
-    positions: tuple[int, ...]
+    positions: tuple[int, ...]  # in the vector
 
 
 class Point(NamedTuple):
     """A vector of parameters, and what is asked about it.
 
-    Attributes
-    ----------
-    theta, positions
-        The vector, and by which of its parameters to differentiate.
-    residual
-        Its weighted residuals, where they are known.
-    limit
-        Their sum of squares from which on it is of no use; see `AugmentedModel.residuals`.
+    `theta`, `positions`: the vector, and by which of its parameters to differentiate.
+    `residual`: its weighted residuals, where they are known.
+    `limit`: their sum of squares from which on it is of no use; see `AugmentedModel.residuals`.
     """
 
     theta: Float[np.ndarray, " p"]
@@ -70,12 +59,8 @@ def widths_of(
 def linearised(model: Any, points: Sequence[Point], batch: Batch) -> list[Linearised]:
     """Return what is asked about several vectors, from one call for all of them.
 
-    Parameters
-    ----------
-    model, batch
-        An `AugmentedModel` whose residuals are asked for, and of which runs.
-    points
-        The vectors.
+    `model`, `batch`: an `AugmentedModel` whose residuals are asked for, and of which runs.
+    `points`: the vectors.
     """
     vectors, limits, widths = [], [], []
     for point in points:

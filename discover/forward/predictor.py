@@ -23,9 +23,8 @@ from discover.forward.batches import (
     StressFlows,
     TransientFlows,
 )
-from discover.forward.declared import DeclaredModel
+from discover.forward.declared import DeclaredModel, Numbers
 from discover.forward.program import Program
-from discover.forward.structure import Numbers
 from discover.programs import in_threads, on_device
 from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 
@@ -55,20 +54,11 @@ no padding."""
 class Predictor:
     """Predictions of a declared model with effects, part by part of a batch.
 
-    Parameters
-    ----------
-    declared
-        The declared model.
-    program, of_every_effect
-        What is compiled of it: of the effects that there are, and of all that there may be.
+    `declared`: the declared model. `program`, `of_every_effect`: what is compiled of it: of the
+    effects that there are, and of all that there may be.
     """
 
-    def __init__(
-        self,
-        declared: DeclaredModel,
-        program: Program,
-        of_every_effect: Program,
-    ):
+    def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
         self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
@@ -105,11 +95,8 @@ class Predictor:
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records that a part of a batch holds, in the order of its rows.
 
-        Parameters
-        ----------
-        normal
-            Whether N1 and N2 are to stand behind what is recorded: not a number where a test has
-            none.
+        `normal`: whether N1 and N2 are to stand behind what is recorded: not a number where a test
+        has none.
         """
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):

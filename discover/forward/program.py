@@ -10,22 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import (
-    AbstractEffect,
-    KinematicEffect,
-    Record,
-    SignalEffect,
-)
+from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.batches import (
-    Flows,
-    PeriodicFlows,
-    SteadyFlows,
-    StressFlows,
-    TransientFlows,
-)
-from discover.forward.integrators.imposed_stress import answer_to_stress, strain_in_series
-from discover.forward.integrators.with_effects import integrate
+from discover.forward.batches import Flows, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
+from discover.forward.declared import Numbers, Structure
+from discover.forward.integrators.stepping import answer_to_stress, integrate, strain_in_series
 from discover.forward.side_by_side import (
     Kernel,
     PeriodicCode,
@@ -38,11 +27,9 @@ from discover.forward.side_by_side import (
     code_of,
     intervals,
 )
-from discover.forward.starts.half_cycles import first_harmonic
-from discover.forward.starts.periodic_start import Cycle
+from discover.forward.starts.half_cycles import Cycle, first_harmonic
 from discover.forward.starts.periodic_states import PHASE, complex_modulus
 from discover.forward.starts.steady_states import steady_states
-from discover.forward.structure import Numbers, Structure
 from discover.laws import LAWS
 from discover.programs import compiled
 from discover.programs.lanes import NotTranslatable
@@ -113,11 +100,7 @@ class Program:
         return self._kernels[kind]
 
     def _in_lanes(
-        self,
-        numbers: Numbers,
-        control: type,
-        flow: Kinematics | None,
-        choices: dict[str, bool],
+        self, numbers: Numbers, control: type, flow: Kinematics | None, choices: dict[str, bool]
     ):
         given, made_from = (self.fluid, numbers, flow), self._made_from
         if control is SteadyFlows:

@@ -19,8 +19,8 @@ from discover.forward.declared import DeclaredModel
 from discover.inference.least_squares import fit_batch
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of
+from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import separate_probability
-from discover.statistics.projection import rms
 from discover.statistics.residual import summarise
 from discover.words import percent_of
 

@@ -2,10 +2,9 @@
 
 from discover import first_use as first_use  # double precision, before any array is made
 from discover.callable_package import answer_calls
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
-from discover.laws.named import NamedLaw
 from discover.laws.registry import LAWS, laws_table, make_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.laws.textbook.fene_p import FenePeterlin

@@ -1,6 +1,8 @@
 """The interface of every constitutive law."""
 
 from abc import abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 import equinox as eqx
 import jax
@@ -10,6 +12,7 @@ from jaxtyping import Array, Float
 
 from discover.plain_numbers import as_numbers
 from tensor_library.algebra import Symmetric, identity_like, trace
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.kinematics import (
     VelocityGradient,
     rate_of_deformation,
@@ -151,12 +154,9 @@ class AbstractConstitutiveLaw(eqx.Module):
 
 
 class AbstractExtendedLaw(AbstractConstitutiveLaw):
-    """A law that adds to h of another, whose states it carries along.
+    """A law that adds to h of another, whose states it carries along."""
 
-    `base`: the other law, or None.
-    """
-
-    base: eqx.AbstractVar[AbstractConstitutiveLaw | None]
+    base: eqx.AbstractVar[AbstractConstitutiveLaw | None]  # the other law, or None
 
     @property
     def variables(self) -> int:
@@ -204,3 +204,35 @@ def as_parameter(value: ArrayLike) -> Float[Array, ""]:
     if not isinstance(value, jax.Array):  # what is traced is one
         value = as_numbers("A parameter of a law or a fluid", value, finite=False)
     return jnp.asarray(value, dtype=jnp.result_type(float))
+
+
+@dataclass(frozen=True)
+class NamedLaw:
+    """A law that can be asked for by name.
+
+    `build`: makes the law from its parameters, in the order of `parameters`.
+    `parameters`: name and physical range of each parameter; laws are dimensionless, and so are
+        these.
+    `range_sources`: where each range comes from: literature, or the argument in a sentence.
+    `written`: returns h with its constants as letters, by the names of `parameters`, so that the
+        law can be written out; None where nobody said.
+    `is_one_mode`: whether at small strain the law is one Maxwell mode. One that is not brings a
+        spectrum of its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it
+        out.
+    `contains`: laws that this one is, exactly or in the limit, with some of its constants at these
+        values and the others as those of the law of that name.
+    """
+
+    title: str  # name as a rheologist writes it
+    build: Callable[..., AbstractConstitutiveLaw]
+    parameters: Mapping[str, tuple[float, float]]
+    range_sources: Mapping[str, str] = field(default_factory=dict)
+    source: str = ""  # literature on the law
+    written: Callable[[], IsotropicFunction] | None = None
+    is_one_mode: bool = True
+    contains: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+
+    def described(self, values: Mapping[str, float]) -> str:
+        """Return the title with the values of the parameters, by their names in study files."""
+        text = ", ".join(f"{key} = {value:g}" for key, value in values.items())
+        return f"{self.title} ({text})" if text else self.title

@@ -24,13 +24,10 @@ class LawOfEachMode(AbstractConstitutiveLaw):
     It stands for a law where a fluid takes one, alone or below the terms that a learner adds. What
     follows the modes of a fluid takes it apart by `over_modes` or `law_of_mode`; in there it is the
     law of that one mode.
-
-    `law`: the law, with a leading axis of modes on every array.
-    `linear_relaxation`: as in the law.
     """
 
-    law: AbstractConstitutiveLaw
-    linear_relaxation: bool = eqx.field(static=True, default=True)
+    law: AbstractConstitutiveLaw  # the law, with a leading axis of modes on every array
+    linear_relaxation: bool = eqx.field(static=True, default=True)  # as in the law
 
     @property
     def variables(self) -> int:

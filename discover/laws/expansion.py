@@ -26,15 +26,13 @@ class LibraryExpansion(AbstractExtendedLaw):
     """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
 
     `coefficients`: cₙ, one for each term; a zero leaves the term out without recompiling anything.
-    `inner`: inner parameters in the order of ``library.inner_names``.
-    `base`: a known law whose extra term is added, or None.
     """
 
     coefficients: Float[Array, " n"]
-    inner: Float[Array, " m"]
+    inner: Float[Array, " m"]  # inner parameters in the order of ``library.inner_names``
     library: TermLibrary = eqx.field(static=True)
     linear_relaxation: bool = eqx.field(static=True, default=True)
-    base: AbstractConstitutiveLaw | None = None
+    base: AbstractConstitutiveLaw | None = None  # a known law whose extra term is added, or None
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h = Σ cₙ termₙ(σ, γ̇), plus the base law's."""

@@ -134,7 +134,7 @@ class Fluid(eqx.Module):
         import pandas as pd
 
         from discover.laws.registry import LAWS, name_of
-        from discover.notebook_view import as_html
+        from discover.summary_view import as_html
 
         named = name_of(self.law)
         law = type(self.law).__name__ if named is None else LAWS[named[0]].described(named[1])
@@ -153,10 +153,7 @@ class Fluid(eqx.Module):
 
     @classmethod
     def from_sweep(
-        cls,
-        sweep: HasSpectrum | None,
-        law: AbstractConstitutiveLaw | None = None,
-        **options: Any,
+        cls, sweep: HasSpectrum | None, law: AbstractConstitutiveLaw | None = None, **options: Any
     ) -> "Fluid":
         """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
 

@@ -5,27 +5,72 @@ are registered, by a program or by an installed package: see docs/adding-a-law.m
 """
 
 import importlib
+import inspect
 import math
 import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.typing import ArrayLike
+from jaxtyping import Array, Float
 
 from discover.errors import InputError, Problems
 from discover.laws import textbook
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.named import NamedLaw
-from discover.laws.of_function import law_of_function
-from discover.new_names import require_new_name
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, State, as_parameter
+from discover.laws.each_mode import law_of_mode
 from discover.plain_numbers import as_number, short
+from discover.validation import require_new_name
 from discover.words import nearest, unknown_name
 from tensor_library.algebra import Symmetric
+from tensor_library.closed_forms import Registry
 from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.registry import Registry
+
+
+class LawOfFunction(AbstractConstitutiveLaw):
+    """A law with h(σ, γ̇) as a function.
+
+    `function`: h of stress, rate and the parameters by name.
+    """
+
+    values: tuple[Float[Array, ""], ...]  # of the parameters, in the order of `names`
+    function: Callable[..., Symmetric] = eqx.field(static=True)
+    names: tuple[str, ...] = eqx.field(static=True)  # names of the parameters
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: State, rate: Symmetric) -> Any:  # a user's, checked by its shape
+        """Return h of the function."""
+        return self.function(stress, rate, **dict(zip(self.names, self.values, strict=True)))
+
+
+def law_of_function(
+    name: str, function: Callable[..., Symmetric], names: tuple[str, ...]
+) -> Callable[..., LawOfFunction]:
+    """Return what makes the law from the values of its parameters, in their order.
+
+    Raises InputError if the function does not take stress, rate and exactly these parameters.
+    """
+    wanted = f"def {name}(stress, rate{''.join(f', {one}' for one in names)})"
+    if not callable(function):
+        raise InputError(f"extra_term must be a function, {wanted}; got {function!r}.")
+    try:
+        inspect.signature(function).bind(None, None, **dict.fromkeys(names))
+    except TypeError as error:
+        raise InputError(
+            f"extra_term of the law {name!r} must be a function {wanted}: {error}. Give the range "
+            "of each of its parameters in parameters."
+        ) from None
+
+    def build(*values: ArrayLike) -> LawOfFunction:
+        return LawOfFunction(
+            values=tuple(map(as_parameter, values)), function=function, names=names
+        )
+
+    return build
+
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -279,3 +324,30 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
         values.append(value)
     problems.require_none()
     return entry.build(*values)
+
+
+def check_law(law: AbstractConstitutiveLaw) -> None:
+    """Check that a law gives a rate of stress with as many components as the stress.
+
+    A term of another shape would be spread over all components without a word.
+    """
+    law = law_of_mode(law, 0)
+    name = type(law).__name__
+    stress, rate = law.rest(), jnp.zeros(())
+    try:
+        made = [jax.eval_shape(law.stress_rate, stress, rate)]
+        if type(law).stress_rate is AbstractConstitutiveLaw.stress_rate:
+            made.append(jax.eval_shape(law.extra_term, stress, stress[:4]))
+    except Exception as error:  # whatever a user's own code raises
+        text = str(error).partition("\n")[0] or "no reason given"
+        raise InputError(
+            f"The law {name} cannot be computed: {type(error).__name__}, {text} Its extra_term "
+            "takes σ and γ̇ with four components each and returns h with four, in jax.numpy."
+        ) from error
+    for part in made:
+        shape = getattr(part, "shape", None)
+        if shape != stress.shape:
+            raise InputError(
+                f"The law {name} must return the four components 11, 22, 33, 12; got "
+                f"{'no array' if shape is None else f'the shape {shape}'}."
+            )

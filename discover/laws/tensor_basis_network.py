@@ -13,9 +13,7 @@ from discover.laws.base import (
     as_state,
     stress_in,
 )
-from tensor_library.algebra import Symmetric
-from tensor_library.integrity_basis import TENSOR_NAMES, integrity_basis
-from tensor_library.invariants import scalar_invariants
+from tensor_library.algebra import TENSOR_NAMES, Symmetric, integrity_basis, scalar_invariants
 from tensor_library.law_terms import LawTerm
 
 N_COEFFICIENTS = 8
@@ -39,20 +37,17 @@ class TensorBasisNetwork(AbstractExtendedLaw):
     The network of the paper has cₙ = 0 and takes the invariants as they are.
 
     `network`: eight invariants in, eight numbers out; None where all coefficients are constant.
-    `constants`: cₙ, shape (8,).
-    `network_mask`: mₙ, 0 or 1, shape (8,): which coefficients may vary.
     `invariant_scale`: typical size of each invariant, shape (8,); the network sees
         asinh(invariant/scale), which is linear for small ones and tame for large ones. None for the
         bare invariants.
-    `base`: a known law whose extra term is added, or None.
     """
 
     network: eqx.nn.MLP | None
-    constants: Float[Array, "8"]
-    network_mask: Float[Array, "8"]
+    constants: Float[Array, "8"]  # cₙ, shape (8,)
+    network_mask: Float[Array, "8"]  # mₙ, 0 or 1, shape (8,): which coefficients may vary
     invariant_scale: Float[Array, "8"] | None = None
     linear_relaxation: bool = eqx.field(static=True, default=True)
-    base: AbstractConstitutiveLaw | None = None
+    base: AbstractConstitutiveLaw | None = None  # a known law whose extra term is added, or None
 
     @classmethod
     def initialise(

@@ -43,38 +43,26 @@ _EXTENSION = {"extension": in_flow(start_up(0.3), "uniaxial")}
 class Distillation:
     """What a student learned.
 
-    Attributes
-    ----------
-    penalised, debiased
-        Parameters by name, with the penalty and without.
-    penalty
-        κ of the penalised objective.
-    misfit
-        Root-mean-square of the difference in σ12 over that of the teacher's σ12, debiased, over
-        all training flows.
-    viscosity_ratio, relaxation_time_ratio
-        Of the debiased surrogate to the teacher's linear limit, where the student is a Maxwell
-        law.
-    errors
-        For each test flow, relative L2 errors ``sigma12``, ``N1`` and ``N2`` of the debiased
-        student (N2's relative to N1's norm), in extension ``tensile_stress``; None where a law
-        runs away.
-    latex
-        The debiased law.
-    law
-        The debiased law, dimensionless.
+    `penalised`, `debiased`: parameters by name, with the penalty and without.
+    `misfit`: root-mean-square of the difference in σ12 over that of the teacher's σ12, debiased,
+        over all training flows.
+    `viscosity_ratio`, `relaxation_time_ratio`: of the debiased surrogate to the teacher's linear
+        limit, where the student is a Maxwell law.
+    `errors`: for each test flow, relative L2 errors ``sigma12``, ``N1`` and ``N2`` of the debiased
+        student (N2's relative to N1's norm), in extension ``tensile_stress``; None where a law runs
+        away.
     """
 
     student: str
     penalised: Mapping[str, float]
     debiased: Mapping[str, float]
-    penalty: float
+    penalty: float  # κ of the penalised objective
     misfit: float
     viscosity_ratio: float | None
     relaxation_time_ratio: float | None
     errors: Mapping[str, Mapping[str, float] | None]
-    latex: str
-    law: AbstractConstitutiveLaw
+    latex: str  # the debiased law
+    law: AbstractConstitutiveLaw  # the debiased law, dimensionless
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the law, JSON-able."""
@@ -163,26 +151,13 @@ def distil(
     κ Σ |parameter|. The sum over flows, not their mean, is what reproduces the paper's numbers; the
     penalty biases them by some 2 %, so the minimum without it is found too.
 
-    Parameters
-    ----------
-    teacher
-        A dimensionless law or a fluid.
-    student
-        Key of `STUDENTS` or of `LAWS`, or a `Student`. It has the teacher's moduli and relaxation
-        times. A law of `LAWS` beyond the paper's is taught from several starts.
-    protocols
-        Training flows, by default the paper's eight.
-    penalty
-        κ.
-    n_samples, duration
-        Equally spaced samples of each training flow, and its length in the teacher's units.
-    tests
-        Flows on which errors are reported, by default the paper's three and uniaxial extension.
-
-    Raises
-    ------
-    InputError
-        If the student is unknown or an argument is out of range.
+    `teacher`: a dimensionless law or a fluid. `student`: key of `STUDENTS` or of `LAWS`, or a
+    `Student`. It has the teacher's moduli and relaxation times. A law of `LAWS` beyond the paper's
+    is taught from several starts. `protocols`: training flows, by default the paper's eight.
+    `penalty`: κ. `n_samples`, `duration`: equally spaced samples of each training flow, and its
+    length in the teacher's units. `tests`: flows on which errors are reported, by default the
+    paper's three and uniaxial extension. Raises InputError if the student is unknown or an argument
+    is out of range.
     """
     fluid = teacher if isinstance(teacher, Fluid) else Fluid.dimensionless(teacher)
     pupil = student if isinstance(student, Student) else student_of(student)
@@ -248,17 +223,8 @@ def compare_fluids(
 
     N2's error is relative to N1's norm, since N2 may vanish.
 
-    Parameters
-    ----------
-    truth, other
-        The reference, and the fluid to judge.
-    protocol, duration
-        The flow and its length.
-
-    Returns
-    -------
-    ``{"sigma12", "N1", "N2"}``, in extension ``{"tensile_stress"}``; None where a fluid runs away
-    in this flow.
+    `truth`, `other`: the reference, and the fluid to judge. The keys are ``sigma12``, ``N1`` and
+    ``N2``, in extension ``tensile_stress``. None where a fluid runs away in this flow.
     """
     times = np.linspace(0.0, duration, 401)
     try:

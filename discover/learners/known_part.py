@@ -12,8 +12,8 @@ from jaxtyping import Float
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.checking import check_law
 from discover.laws.multimode import Fluid
+from discover.laws.registry import check_law
 from discover.laws.textbook.maxwell import UpperConvectedMaxwell
 from discover.learners.settings import per_mode
 from discover.protocols.kinematics import FOLLOWED
@@ -32,25 +32,16 @@ _HELD_BY_BASE = (
 class KnownPart:
     """The known fluid, to which a learner adds terms.
 
-    Attributes
-    ----------
-    law
-        A known dimensionless law; None for upper convected Maxwell.
-    modulus, relaxation_time
-        In Pa and s, shape (k,).
-    solvent_viscosity
-        In Pa s.
-    linear_relaxation
-        Whether −σ is known.
-    modulus_covariance
-        Of the moduli in Pa², shape (k, k); None where they are exact.
+    `law`: a known dimensionless law; None for upper convected Maxwell.
+    `modulus`, `relaxation_time` in Pa and s, shape (k,).
+    `modulus_covariance`: of the moduli in Pa², shape (k, k); None where they are exact.
     """
 
     law: AbstractConstitutiveLaw | None
     modulus: Float[np.ndarray, " k"]
     relaxation_time: Float[np.ndarray, " k"]
-    solvent_viscosity: float
-    linear_relaxation: bool
+    solvent_viscosity: float  # in Pa s
+    linear_relaxation: bool  # whether −σ is known
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
 
     @property
@@ -63,17 +54,9 @@ class KnownPart:
 def known_part(estimator: Any) -> KnownPart:
     """Return what an estimator is told of the fluid: by `base`, or part by part.
 
-    Parameters
-    ----------
-    estimator
-        Has `base`, `modulus`, `relaxation_time`, `base_law`, `known_relaxation`, and perhaps
-        `solvent_viscosity`.
-
-    Raises
-    ------
-    InputError
-        If `base` is no fluid, or something that it holds is given too; or a part is not as it
-        should be.
+    `estimator`: has `base`, `modulus`, `relaxation_time`, `base_law`, `known_relaxation`, and
+    perhaps `solvent_viscosity`. Raises InputError if `base` is no fluid, or something that it holds
+    is given too; or a part is not as it should be.
     """
     base = estimator.base
     if base is None:

@@ -4,7 +4,7 @@ import os
 from pathlib import Path
 
 from discover.errors import InputError
-from discover.learners.files.estimator_file import EstimatorFile
+from discover.learners.files import EstimatorFile
 from discover.learners.tbnn_ude import TBNNUDE
 from discover.learners.tensor_sindy import TensorSINDy
 

@@ -7,16 +7,13 @@ from time import perf_counter
 from discover.dataset import Run
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.learners.results.result import LearnerResult
-from discover.new_names import require_new_name
+from discover.learners.results import LearnerResult
+from discover.validation import require_new_name
 from discover.words import unknown_name
+from tensor_library.closed_forms import Registry
 from tensor_library.library import TermLibrary
-from tensor_library.registry import Registry
 
-BUILT_IN: Mapping[str, str] = {
-    "tensor_sindy": "sparse regression",
-    "tbnn_ude": "neural network",
-}
+BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": "neural network"}
 """Titles of the learners of this package."""
 
 
@@ -24,24 +21,13 @@ BUILT_IN: Mapping[str, str] = {
 class LearningTask:
     """What a learner of a user's own is given.
 
-    Attributes
-    ----------
-    runs
-        Runs to learn from; stresses in Pa, times in s.
-    base
-        The known fluid, whose law the learner adds to: its modes and its solvent stay.
-    library
-        The candidate terms of the study.
-    seed
-        Of whatever is random in the learner.
-    progress
-        To be called with what is going on and the fraction done, 0 to 1.
+    `progress`: to be called with what is going on and the fraction done, 0 to 1.
     """
 
-    runs: tuple[Run, ...]
-    base: Fluid
-    library: TermLibrary
-    seed: int
+    runs: tuple[Run, ...]  # runs to learn from; stresses in Pa, times in s
+    base: Fluid  # the known fluid, whose law the learner adds to: its modes and its solvent stay
+    library: TermLibrary  # the candidate terms of the study
+    seed: int  # of whatever is random in the learner
     progress: Callable[[str, float], None]
 
 
@@ -49,16 +35,11 @@ class LearningTask:
 class NamedLearner:
     """A learner of a user's own.
 
-    Attributes
-    ----------
-    learn
-        Takes a `LearningTask` and returns a `LearnerResult` whose law holds the known one.
-    title
-        Name for readers.
+    `learn`: takes a `LearningTask` and returns a `LearnerResult` whose law holds the known one.
     """
 
     learn: Callable[[LearningTask], LearnerResult]
-    title: str
+    title: str  # name for readers
 
 
 LEARNERS: Registry[NamedLearner] = Registry("learner", "discover.learners", dict)
@@ -116,10 +97,7 @@ def learner_title(name: str) -> str:
 def learn_with(name: str, task: LearningTask) -> tuple[LearnerResult, Fluid]:
     """Return what a learner of a user's own finds, and the fluid that it makes.
 
-    Raises
-    ------
-    InputError
-        If there is no such learner, or it returns something else than a result.
+    Raises InputError if there is no such learner, or it returns something else than a result.
     """
     if name not in LEARNERS:
         raise InputError(unknown_name("learner", name, learner_names()))

@@ -13,13 +13,11 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
-from discover.forward.enough_steps import in_enough_steps
-from discover.forward.fluids import observed_in_batch
+from discover.forward.fluids import in_enough_steps, observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
-from discover.learners.files.estimator_file import EstimatorFile, write_estimator
-from discover.learners.files.provenance import Provenance, provenance_of
+from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
 from discover.learners.known_part import KnownPart, known_part, require_known_rate
-from discover.learners.results.term_tables import estimates_of
+from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
 from discover.learners.settings import ARITHMETIC, check_settings
 from discover.linear_algebra_threads import in_one_thread
@@ -33,7 +31,7 @@ if TYPE_CHECKING:
 
     from discover.equations import Equation
     from discover.laws.multimode import Fluid
-    from discover.learners.results.result import LearnerResult
+    from discover.learners.results import LearnerResult
 
 _Learner = TypeVar(
     "_Learner", bound="RunPrediction"
@@ -67,17 +65,8 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
         """Find the law of these runs.
 
-        Parameters
-        ----------
-        X
-            Runs (`Run`), or a data set.
-        y
-            Ignored: the observations are part of the runs.
-
-        Raises
-        ------
-        InputError
-            If a parameter or a run is unusable.
+        `X`: runs (`Run`), or a data set. `y`: ignored: the observations are part of the runs.
+        Raises InputError if a parameter or a run is unusable.
         """
         del y
         check_settings(self.get_params(deep=False))
@@ -242,7 +231,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         InputError
             If there is nothing to draw, or xarray is not installed (extra ``xarray``).
         """
-        from discover.learners.results.labelled import labelled_draws, labelled_members
+        from discover.learners.results import labelled_draws, labelled_members
 
         check_is_fitted(self, "fluid_")
         if hasattr(self, "members_"):

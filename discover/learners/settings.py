@@ -28,10 +28,7 @@ DEFAULT_DEGREE = 1
 def check_settings(settings: Mapping[str, Any]) -> None:
     """Check settings that several estimators share.
 
-    Raises
-    ------
-    InputError
-        If a count or a seed is no whole number, or `progress` cannot be called.
+    Raises InputError if a count or a seed is no whole number, or `progress` cannot be called.
     """
     for name, least in _WHOLE.items():
         value = settings.get(name)
@@ -45,10 +42,7 @@ def check_settings(settings: Mapping[str, Any]) -> None:
 def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
     """Return a setting with one value for each mode.
 
-    Raises
-    ------
-    InputError
-        If a value is no number, or is not positive and finite.
+    Raises InputError if a value is no number, or is not positive and finite.
     """
     values = np.atleast_1d(np.asarray(value))
     numbers = values.dtype.kind in "iuf" and values.ndim == 1 and values.size

@@ -37,25 +37,15 @@ class MaxwellSurrogate(AbstractConstitutiveLaw):
 class Student:
     """A law with parameters to teach.
 
-    Attributes
-    ----------
-    name
-        For tables.
-    build
-        Makes the law from its parameters, in the order of `bounds`.
-    bounds
-        Name and admissible range of each parameter.
-    latex
-        The law with ``%s`` where each parameter's value goes.
-    more_starts
-        Further starts: several constants may have a misfit with several minima.
+    `build`: makes the law from its parameters, in the order of `bounds`.
+    `more_starts`: further starts: several constants may have a misfit with several minima.
     """
 
-    name: str
+    name: str  # for tables
     build: Callable[..., AbstractConstitutiveLaw]
-    bounds: Mapping[str, tuple[float, float]]
+    bounds: Mapping[str, tuple[float, float]]  # name and admissible range of each parameter
     start: tuple[float, ...]
-    latex: str
+    latex: str  # the law with ``%s`` where each parameter's value goes
     more_starts: tuple[tuple[float, ...], ...] = ()
 
 
@@ -116,10 +106,7 @@ STUDENTS: Mapping[str, Student] = {
 def student_of(law: str) -> Student:
     """Return any law with a name as a student, with all its constants to teach.
 
-    Parameters
-    ----------
-    law
-        Key of `STUDENTS` or of `LAWS`.
+    `law`: key of `STUDENTS` or of `LAWS`.
     """
     if law in STUDENTS:
         return STUDENTS[law]

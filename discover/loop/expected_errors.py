@@ -14,7 +14,7 @@ from discover.linear_algebra_threads import in_one_thread
 from discover.protocols import FlowProtocol, in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 from discover.protocols.protocol import shear_rates
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""

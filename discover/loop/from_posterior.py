@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.forward.by_mode import DEGREE, constants_of_modes
+from discover.forward.declared import DEGREE, constants_of_modes
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS

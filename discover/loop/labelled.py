@@ -7,7 +7,7 @@ import numpy as np
 
 from discover.effects.registry import make_effect
 from discover.errors import InputError
-from discover.labelled_arrays import xarray_module
+from discover.plain_numbers import xarray_module
 
 if TYPE_CHECKING:
     import xarray

@@ -42,10 +42,8 @@ from discover.loop.parts import (
 )
 from discover.loop.reading import Reading, read_residual
 from discover.loop.run_record import RunRecord
-from discover.notebook_view import table_of
-from discover.page_view import PageView
-from discover.plain_json import json_text, plain
-from discover.summary_view import Estimate, SummaryView
+from discover.plain_numbers import json_text, plain
+from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from discover.words import percent_of
 from tensor_library.law_terms import LawTerm
 

@@ -12,9 +12,9 @@ from scipy.special import logsumexp
 from discover.effects import AbstractEffect
 from discover.inference.engine import Explanation as Told
 from discover.inference.engine import Posterior
+from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_functions import FreeFunction
-from discover.inference.engine.posterior import quantiles
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search
 from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict

@@ -22,7 +22,7 @@ from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, states_of
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 _MOST = 8
 """Laws with a name, the likeliest, that are fitted without each run."""

@@ -12,7 +12,7 @@ from discover.loop.parts import ErrorPair
 from discover.loop.runs import strain_of
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES, Control, FlowKind
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 
 @dataclass(frozen=True)

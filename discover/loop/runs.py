@@ -14,7 +14,7 @@ from discover.forward import DeclaredModel
 from discover.inference.step_instants import with_rate_steps
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
 
 FEWEST_SAMPLES = 5

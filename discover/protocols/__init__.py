@@ -1,10 +1,7 @@
 """Protocols: the rate of deformation in time, the flow that has it, and what came before."""
 
 from discover import first_use as first_use  # double precision, before any array is made
-from discover.protocols.between_samples import (
-    another_between_samples,
-    sampled_rate,
-)
+from discover.protocols.between_samples import another_between_samples, sampled_rate
 from discover.protocols.control import imposed_stress, oscillations, steady_rates
 from discover.protocols.history import (
     after_alternation,

@@ -227,16 +227,13 @@ class RateStep:
     """A step of the rate between two samples.
 
     `start`, `end`: times of the two samples in s.
-    `change`: of the rate in 1/s, from the one to the other.
-    `share`: of the interval at whose end the rate steps, if that is not fitted.
-    `place`: which of the fitted shares is its own; None if it is not fitted.
     """
 
     start: float
     end: float
-    change: float
-    share: float = 0.5
-    place: int | None = None
+    change: float  # of the rate in 1/s, from the one to the other
+    share: float = 0.5  # of the interval at whose end the rate steps, if that is not fitted
+    place: int | None = None  # which of the fitted shares is its own; None if it is not fitted
 
     def at(self, share: float) -> float:
         """Return a time in s from a share of the interval."""

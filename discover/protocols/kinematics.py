@@ -17,7 +17,7 @@ from jaxtyping import Array, Bool, Float
 from discover.errors import InputError
 from discover.programs import on_device
 from discover.words import listed, unknown_name
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
 
 FlowKind = Literal["shear", "uniaxial", "planar", "biaxial"]
 
@@ -82,7 +82,6 @@ _IN_WORDS = {
 class Kinematics(eqx.Module):
     """A homogeneous flow at unit rate, and the stress that is recorded in it.
 
-    `gradient`: L11, L22, L33, L12 at unit rate.
     `recorded`: weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, or one of its
         normal stress differences; σ11 − σ22 in extension.
     `intensity`: √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in
@@ -91,7 +90,7 @@ class Kinematics(eqx.Module):
         and 6 in uniaxial, planar and biaxial extension [Trouton 1906, Proc. R. Soc. A 77, 426].
     """
 
-    gradient: Float[Array, "*batch 4"]
+    gradient: Float[Array, "*batch 4"]  # L11, L22, L33, L12 at unit rate
     recorded: Float[Array, "*batch 4"]
     intensity: Float[Array, "*batch"]
     viscous: Float[Array, "*batch"]

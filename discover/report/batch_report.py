@@ -7,7 +7,8 @@ from typing import Any
 from discover.equations.spelling.markup import number, term_mathml
 from discover.learners.registry import learner_title
 from discover.report.page import render
-from discover.report.wording import FIGURE_SYMBOLS, RULES, effect_title
+from discover.report.wording import RULES
+from discover.words import FIGURE_SYMBOLS, effect_title
 
 _COMPARED = ("sigma12", "N1", "N2")
 
@@ -15,12 +16,8 @@ _COMPARED = ("sigma12", "N1", "N2")
 def batch_page(studies: Sequence[Any], rows: Sequence[Any]) -> str:
     """Return the page over a batch.
 
-    Parameters
-    ----------
-    studies
-        How each study ended, `discover.batch.status.StudyStatus`.
-    rows
-        What each found, `discover.batch.status.StudyRow`, in the same order.
+    `studies`: how each study ended, `discover.batch.status.StudyStatus`. `rows`: what each found,
+    `discover.batch.status.StudyRow`, in the same order.
     """
     learners = list(dict.fromkeys(name for row in rows for name in row.learners))
     rules = list(dict.fromkeys(rule for row in rows for rule in row.chosen))

@@ -30,7 +30,7 @@ from discover.report.plots.style import (
     runs_through_decades,
 )
 from discover.report.wording import percent, recorded_symbol
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,32 +46,17 @@ _MOST_MARKED = 60
 class Curves:
     """One run as a panel shows it.
 
-    Attributes
-    ----------
-    name
-        Of the run.
-    label, along
-        What it is drawn against, in words with the unit, and its values, shape (n,).
-    quantity
-        What was recorded.
-    measured
-        Its values, shape (n,).
-    lines
-        The predictions; the error of the last stands above the panel.
-    states
-        Whether samples are steady or periodic states.
-    decades
-        Whether it goes through decades of time.
+    `label`, `along`: what it is drawn against, in words with the unit, and its values, shape (n,).
     """
 
-    name: str
+    name: str  # of the run
     label: str
     along: Float[np.ndarray, " n"]
-    quantity: str
-    measured: Float[np.ndarray, " n"]
-    lines: Sequence[Drawn]
-    states: bool = False
-    decades: bool = False
+    quantity: str  # what was recorded
+    measured: Float[np.ndarray, " n"]  # its values, shape (n,)
+    lines: Sequence[Drawn]  # the predictions; the error of the last stands above the panel
+    states: bool = False  # whether samples are steady or periodic states
+    decades: bool = False  # whether it goes through decades of time
 
     @property
     def title(self) -> str:
@@ -189,10 +174,7 @@ def draw_curves(curves: Sequence[Curves], drawing, axes, panels) -> None:
 def curves_figure(result: Any) -> "Figure":
     """Return every run of a result as a figure of matplotlib, for a notebook.
 
-    Raises
-    ------
-    InputError
-        If the result holds no run.
+    Raises InputError if the result holds no run.
     """
     curves = curves_of(result)
     if not curves:

@@ -27,12 +27,7 @@ _REPLACEMENTS = (
 def formula(latex: str, name: str) -> str:
     """Return a formula as inline SVG, or in plain signs where matplotlib cannot set it.
 
-    Parameters
-    ----------
-    latex
-        Without dollar signs.
-    name
-        Unique on the page.
+    `latex`: without dollar signs. `name`: unique on the page.
     """
     text = latex.strip().strip("$")
     for old, new in _REPLACEMENTS:

@@ -28,21 +28,11 @@ Points = Mapping[tuple[str, str], tuple[Float[np.ndarray, " m"], Float[np.ndarra
 
 @dataclass(frozen=True)
 class Source:
-    """An overlay before anything of it is predicted.
+    """An overlay before anything of it is predicted."""
 
-    Attributes
-    ----------
-    label
-        What stands in legends and tables.
-    asked
-        What the study says of it.
-    points
-        Of a file; None of a law.
-    """
-
-    label: str
-    asked: OverlayAsked
-    points: Points | None = None
+    label: str  # what stands in legends and tables
+    asked: OverlayAsked  # what the study says of it
+    points: Points | None = None  # of a file; None of a law
 
     def fluid(self, modes: Fluid) -> Fluid:
         """Return the law in these modes, or in those that the study gives."""
@@ -58,15 +48,11 @@ class Source:
 class Overlay:
     """A labelled curve in every run of which something is known.
 
-    Attributes
-    ----------
-    label
-        What stands in legends and tables.
-    curves
-        By name of a run, or key of a flow, and by quantity, at its samples; NaN where unknown.
+    `curves`: by name of a run, or key of a flow, and by quantity, at its samples; NaN where
+        unknown.
     """
 
-    label: str
+    label: str  # what stands in legends and tables
     curves: Mapping[str, Mapping[str, Float[np.ndarray, " n"]]]
 
     def of(self, name: str, quantity: str) -> Float[np.ndarray, " n"] | None:
@@ -77,10 +63,7 @@ class Overlay:
 def read_overlays(study: Study) -> list[Source]:
     """Return what a study wants drawn beside its own curves.
 
-    Raises
-    ------
-    InputError
-        If a law's parameter or a file is wrong.
+    Raises InputError if a law's parameter or a file is wrong.
     """
     sources = []
     for number, asked in enumerate(study.report.overlay, 1):
@@ -112,16 +95,9 @@ def loop_overlays(
 ) -> tuple[Overlay, ...]:
     """Return the curves at the samples of a loop's records, without effects of the instrument.
 
-    Parameters
-    ----------
-    sources
-        From `read_overlays`.
-    records
-        Runs as the loop left them.
-    dataset
-        The data that they come from.
-    modes
-        The declared fluid, whose modes and solvent a law gets that has none of its own.
+    `sources`: from `read_overlays`. `records`: runs as the loop left them. `dataset`: the data that
+    they come from. `modes`: the declared fluid, whose modes and solvent a law gets that has none of
+    its own.
     """
     found = []
     for source in sources:
@@ -157,12 +133,7 @@ def comparison_overlays(
 ) -> tuple[Overlay, ...]:
     """Return the curves at the samples of a comparison's flows.
 
-    Parameters
-    ----------
-    sources, modes
-        As in `loop_overlays`.
-    flows
-        Of the comparison. One through which a law cannot be integrated has no curve of it.
+    `flows`: of the comparison. One through which a law cannot be integrated has no curve of it.
     """
     drawn = [flow for flow in flows if flow.kind != "pipkin"]
     found = []

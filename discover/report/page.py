@@ -1,26 +1,30 @@
 """Templates → one self-contained page. The only place that knows jinja2."""
 
+import logging
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup
 
 from discover._version import __version__
-from discover.report.palette import style_sheet
-from discover.report.wording import (
-    estimate,
-    interval,
-    percent,
-    percent_range,
-    readable,
-    significant,
-)
+from discover.answer import Answer
+from discover.answer.sentences import SYMBOLS, description, expected, further, law, where
+from discover.equations import Equation
+from discover.equations.files import FORMATS
+from discover.equations.spelling.markup import law_element
+from discover.errors import InputError
+from discover.plain_numbers import json_text
+from discover.report.mathtext import formula
+from discover.report.plots.style import style_sheet
+from discover.report.wording import percent, percent_range
+from discover.words import estimate, interval, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -28,14 +32,8 @@ _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysin
 def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: str) -> dict:
     """Return what a page says of the run that made it; every table links to it.
 
-    Parameters
-    ----------
-    fingerprint
-        Of the study, its data and the version of this software.
-    command
-        What makes it again.
-    files
-        Written beside the page.
+    `fingerprint`: of the study, its data and the version of this software. `command`: what makes it
+    again. `files`: written beside the page.
     """
     packages = [f"Python {platform.python_version()}"]
     for name in _CALCULATES:
@@ -67,15 +65,9 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     Everything is escaped except pictures and mathematics that this package wrote itself.
 
-    Parameters
-    ----------
-    template
-        File in ``templates``.
-    data
-        Text of files that each picture links to, by name. The page carries those that are not too
-        long, so that it hands them out where it stands alone; the others lie beside it.
-    content
-        Its variables.
+    `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
+    The page carries those that are not too long, so that it hands them out where it stands alone;
+    the others lie beside it. `content`: its variables.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
@@ -116,3 +108,116 @@ def _environment() -> Environment:
 def safe_name(name: str) -> str:
     """Return a file name without anything that a file system could take amiss."""
     return "".join(c if c.isalnum() or c in "._-" else "_" for c in name)[:100]
+
+
+_log = logging.getLogger(__name__)
+_LONGEST = 200
+
+Part = TypeVar("Part")
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A part of a page that could not be drawn."""
+
+    title: str  # the part, as the subject of a sentence
+    reason: str  # what went wrong
+
+    @property
+    def sentence(self) -> str:
+        """What the page says in place of the part."""
+        return f"{self.title} could not be drawn: {self.reason}."
+
+
+def attempt(title: str, draw: Callable[[], Part]) -> Part | Missing:
+    """Return a part of a page, or what stands in its place where it cannot be drawn.
+
+    A report comes after minutes or hours of computing, and its numbers lie in JSON already. No
+    fault of one picture or table is worth the rest of the page. The logger of this module has the
+    traceback, at level debug.
+
+    `title`: the part, as the subject of a sentence. `draw`: makes it.
+    """
+    try:
+        return draw()
+    except Exception as error:
+        _log.debug("%s could not be drawn", title, exc_info=True)
+        text = " ".join(str(error).split())[:_LONGEST].rstrip(". ")
+        return Missing(title, f"{type(error).__name__}, {text}" if text else type(error).__name__)
+
+
+_COPIED = {"rheoTool": "rheotool", "Python": "python", "LaTeX": "latex"}
+"""Buttons, with the formats that they copy; JSON is that of the answer."""
+
+
+def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
+    """Return what the template ``answer.html`` shows; None shows nothing."""
+    if answer is None:
+        return None
+    found: dict[str, Any] = {
+        "headline": law(answer),
+        "quality": " ".join(filter(None, [description(answer), where(answer)])),
+        "open": not answer.title or answer.adequate is False,
+        "law": "", "constants": (), "expected": (), "modes": (), "solvent": "", "copies": (),
+        "lines": further(answer),
+        "next_test": answer.next_test,
+    }  # fmt: skip
+    if not answer.title:
+        return found
+    rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
+    return found | {
+        "law": _typeset(answer),
+        "constants": answer.constants,
+        "expected": [
+            {
+                "symbol": symbol,
+                "inside": expected(one, "inside"),
+                "beyond": expected(one, "beyond"),
+                "known": one.is_known,
+                "note": one.note,
+            }
+            for symbol, one in rows
+        ],
+        "modes": [
+            (significant(mode.modulus_Pa), significant(mode.relaxation_time_s))
+            for mode in answer.modes
+        ],
+        "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
+        "copies": _copies(answer),
+    }
+
+
+def _typeset(answer: Answer) -> str:
+    if answer.equation is not None:
+        return _law(answer.equation)
+    written = answer.written.get("formula")
+    return f'<p class="scroll">{formula(written, "answer")}</p>' if written else ""
+
+
+def _law(equation: Equation) -> str:
+    """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
+    if equation.states:
+        return ""
+    plain = (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
+    modes = 0 if plain else len(equation.modulus)
+    solvent = equation.solvent_viscosity > 0.0
+    try:
+        return law_element(
+            equation.terms, equation.linear_relaxation, equation.named, modes, solvent
+        )
+    except InputError:  # nobody said how a law of their own is written
+        return ""
+
+
+def _copies(answer: Answer) -> list[Mapping[str, str]]:
+    """Return the law in every format that a button copies, or why it is not there."""
+    found = []
+    for name, form in _COPIED.items():
+        text, reason = answer.written.get(form, ""), "This law cannot be written in this format."
+        if answer.equation is not None:
+            try:
+                text = FORMATS[form](answer.equation)
+            except InputError as error:
+                reason = str(error)
+        found.append({"name": name, "text": text, "reason": reason})
+    return [*found, {"name": "JSON", "text": json_text(answer.to_json()), "reason": ""}]

@@ -46,12 +46,8 @@ def comparison_predictions(
     where nothing was.
     A law that cannot be integrated through a flow has no line there.
 
-    Parameters
-    ----------
-    comparison
-        Flows over which only errors are mapped are left out.
-    overlays
-        Curves that the study asks for; their sources are their labels.
+    `comparison`: flows over which only errors are mapped are left out. `overlays`: curves that the
+    study asks for; their sources are their labels.
     """
     curves: dict[str, Mapping[str, Any]] = {"before": comparison.before}
     curves |= {name: outcome.predictions for name, outcome in comparison.outcomes.items()}

@@ -4,15 +4,18 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from discover.answer.sentences import A_TRANSIENT as A_TRANSIENT
-from discover.answer.sentences import IF_LOADINGS as IF_LOADINGS
 from discover.comparison.outcome import LearnerOutcome
 from discover.learners.registry import learner_title
+from discover.loop import FreeForm
 from discover.protocols.kinematics import MODULI
-from discover.words import FIGURE_SYMBOLS, estimate, interval, percent_of, readable
-from discover.words import effect_title as effect_title
-from discover.words import effects_title as effects_title
-from discover.words import significant as significant
+from discover.words import (
+    FIGURE_SYMBOLS,
+    effect_title,
+    estimate,
+    interval,
+    percent_of,
+    readable,
+)
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2"}
 
@@ -31,10 +34,7 @@ SMALL_FAULTS = (
 )
 """What an interval allows for."""
 
-_LEARNERS = {
-    "tensor_sindy": "Sparse regression",
-    "tbnn_ude": "The neural network",
-}
+_LEARNERS = {"tensor_sindy": "Sparse regression", "tbnn_ude": "The neural network"}
 
 
 def learner_as_subject(name: str) -> str:
@@ -137,3 +137,25 @@ def chosen_names(support: Sequence[str]) -> list[str]:
 
 _MOST_NAMED = 8
 """Terms that a sentence bears: a rule may choose half a library."""
+
+
+_WHAT = {
+    "recorded_stress": "a function of the recorded stress alone",
+    "drift": "a function of the time alone",
+    "rate": "a function of the shear rate alone",
+    "network": "a factor that depends on the strain alone",
+    "position": "a function of the tool's position alone",
+    "gap": "a factor that depends on the tool's position alone",
+    "phase": "a function of the phase of the cycle alone",
+    "relaxation": "a rate of relaxation that depends on the {variable} alone",
+    "breakdown": "a structure that flow breaks at a rate that depends on the {variable} alone",
+    "slip": "a rate of slip that depends on the {variable} alone",
+}
+
+
+def free_form_sentence(found: FreeForm) -> str:
+    """Return what a free function is and where it stands, without a full stop."""
+    beside = " and ".join(map(effect_title, found.beside)) or "the declared model"
+    shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
+    what = _WHAT[found.slot].format(variable=found.variable)
+    return f"{what}{shape}, with {beside} explains the residual"

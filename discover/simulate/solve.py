@@ -34,14 +34,10 @@ class SimulationError(RuntimeError):
 
 @dataclass(frozen=True)
 class ShearStress:
-    """Stresses in simple shear at sampling times.
+    """Stresses in simple shear at sampling times."""
 
-    `times` in s, shape (n,).
-    `components`: σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
-    """
-
-    times: Float[np.ndarray, " n"]
-    components: Float[np.ndarray, "n 4"]
+    times: Float[np.ndarray, " n"]  # in s, shape (n,)
+    components: Float[np.ndarray, "n 4"]  # σ11, σ22, σ33, σ12 in Pa, shape (n, 4)
 
     @property
     def shear_stress(self) -> Float[np.ndarray, " n"]:

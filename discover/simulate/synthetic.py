@@ -23,19 +23,18 @@ from discover.protocols.protocol import (
     shear_rates,
 )
 from discover.simulate.solve import ShearStress, simulate
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 
 @dataclass(frozen=True, repr=False)
 class SyntheticDataset(Dataset):
     """A data set whose law is known.
 
-    `truth`: the fluid that made it.
     `exact`: noise-free stresses of each run, normal stresses included.
     `noise`: standard deviation of the noise over the root-mean-square stress of each run.
     """
 
-    truth: Fluid | None = None
+    truth: Fluid | None = None  # the fluid that made it
     exact: Mapping[str, ShearStress] | None = None
     noise: float = 0.0
 

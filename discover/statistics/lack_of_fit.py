@@ -7,12 +7,15 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from discover.statistics.noise.dead_records import holds_signal
-from discover.statistics.noise.outliers import stray
+from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.outliers import holds_signal, stray
 from discover.statistics.noise.same_correlation import same_correlation_probability
-from discover.statistics.noise.same_place import repeated
-from discover.statistics.noise.whiteness import FEWEST_TESTED, SIGNIFICANCE, noise_probability
-from discover.statistics.projection import rms
+from discover.statistics.noise.whiteness import (
+    FEWEST_TESTED,
+    SIGNIFICANCE,
+    noise_probability,
+    repeated,
+)
 from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
 from discover.words import percent_of
 
@@ -44,22 +47,17 @@ class LackOfFit:
 
     `verdict`: ``"explained"`` if it is noise (and the error of the linear data), ``"no_signal"`` if
         the records hold nothing that a law could be told from, ``"unexplained"`` otherwise.
-    `misfit`: root-mean-square residual over rms measurement, mean over runs.
-    `noise`: relative noise of the records, mean over runs.
-    `lag_one_correlation`: of neighbouring residuals, mean over runs.
     `probability`: of residuals as structured as these, if they are noise; None where all runs
         together are too short to look for a pattern.
-    `outliers`: number of samples that are far outside the noise and do not vote.
-    `reason`: the verdict in one sentence.
     """
 
     verdict: FitVerdict
-    misfit: float
-    noise: float
-    lag_one_correlation: float
+    misfit: float  # root-mean-square residual over rms measurement, mean over runs
+    noise: float  # relative noise of the records, mean over runs
+    lag_one_correlation: float  # of neighbouring residuals, mean over runs
     probability: float | None
-    outliers: int = 0
-    reason: str = ""
+    outliers: int = 0  # number of samples that are far outside the noise and do not vote
+    reason: str = ""  # the verdict in one sentence
 
     @property
     def described(self) -> str:

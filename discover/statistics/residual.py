@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
-from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.noise_model import independent_samples
 from discover.statistics.noise.whiteness import (
     FEWEST_FAST,
     FEWEST_TESTED,
@@ -22,12 +22,11 @@ class ResidualSummary:
     """Noise and structure in the residuals of some runs.
 
     `noise`: relative noise of each run, from third differences of its residual.
-    `autocorrelation`: correlation of neighbouring residuals of each run.
     `effective_samples`: number of independent samples that the residuals of all runs are worth.
     """
 
     noise: Float[np.ndarray, " runs"]
-    autocorrelation: Float[np.ndarray, " runs"]
+    autocorrelation: Float[np.ndarray, " runs"]  # correlation of neighbouring residuals of each run
     effective_samples: float
 
 
@@ -193,14 +192,12 @@ STRUCTURE = 1.5
 class Expectation:
     """What a complete model may leave of the data.
 
-    `noise`: relative noise, where it is known.
-    `linear_error`: relative error of the linear data that the declared modes come from.
     `repeat_error`: relative error of a run as its repeats tell it, noise and loading together; 0
         without any.
     """
 
-    noise: float | None = None
-    linear_error: float = 0.0
+    noise: float | None = None  # relative noise, where it is known
+    linear_error: float = 0.0  # relative error of the linear data that the declared modes come from
     repeat_error: float = 0.0
 
     @property

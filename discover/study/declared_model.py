@@ -35,31 +35,26 @@ MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 class DeclaredModel:
     """The declared law with starting values for what is to be fitted.
 
-    `law`: the dimensionless law.
     `law_name`, `parameters`: as declared, with numbers for those to be fitted.
     `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
     `free`: names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
-    `spectrum`: where the modes come from, if from a linear sweep.
-    `solvent_viscosity` in Pa s.
     `effects`: effects known beside the law, with values or to be fitted.
-    `source`: what was taken from an earlier result, in words; empty where nothing was.
     `by_mode`: parameters of the law, and effects, that may differ from mode to mode.
-    `choice`: named laws to choose the law from; none where it is declared.
     `solid`: what is to be known of an elastic constant among the modes; empty where there is none.
     """
 
-    law: AbstractConstitutiveLaw
+    law: AbstractConstitutiveLaw  # the dimensionless law
     law_name: str
     parameters: dict[str, float]
     modulus: np.ndarray
     relaxation_time: np.ndarray
     free: tuple[str, ...]
-    spectrum: RelaxationSpectrum | None
-    solvent_viscosity: float = 0.0
+    spectrum: RelaxationSpectrum | None  # where the modes come from, if from a linear sweep
+    solvent_viscosity: float = 0.0  # in Pa s
     effects: tuple[KnownEffect, ...] = ()
-    source: str = ""
+    source: str = ""  # what was taken from an earlier result, in words; empty where nothing was
     by_mode: tuple[str, ...] = ()
-    choice: tuple[str, ...] = ()
+    choice: tuple[str, ...] = ()  # named laws to choose the law from; none where it is declared
     solid: str = ""
 
     @property

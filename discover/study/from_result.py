@@ -26,24 +26,19 @@ _AGAIN = "Run the command that made it again with --overwrite."
 class EarlierResult:
     """What a study takes over from an earlier result.
 
-    `file`: where it was read.
-    `equation`: the law with its modes.
-    `effects`: effects beside the law, with their values.
     `of_modes`: terms that effects add to the law of each mode, with constants of its own: for every
         such effect its values in the order of the modes.
-    `text`: what was taken, in words.
     `intervals`: 95 % intervals that its constants had, by effect, or "" of a term of the law, and
         name.
-    `doubt`: that it did not explain its own data, in words, or empty.
     """
 
-    file: Path
-    equation: Equation
-    effects: tuple[KnownEffect, ...]
+    file: Path  # where it was read
+    equation: Equation  # the law with its modes
+    effects: tuple[KnownEffect, ...]  # effects beside the law, with their values
     of_modes: tuple[tuple[KnownEffect, ...], ...]
-    text: str
+    text: str  # what was taken, in words
     intervals: Mapping[tuple[str, str], tuple[float, float]]
-    doubt: str
+    doubt: str  # that it did not explain its own data, in words, or empty
 
     def told(self, replaced: Collection[str]) -> str:
         """Return in words what was taken, and what is not known of it.

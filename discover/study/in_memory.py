@@ -12,10 +12,9 @@ from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
 from discover.errors import InputError
-from discover.laws.checking import check_law
 from discover.laws.each_mode import differs_by_mode
 from discover.laws.multimode import Fluid
-from discover.laws.registry import name_of
+from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel

@@ -11,7 +11,7 @@ from typing import Any
 
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.plain_json import parse_json
+from discover.plain_numbers import parse_json
 from discover.study.atomic import PART_SUFFIX, lock_folder, make_folder, require_ours, write_text
 
 STATE_FOLDER = "state"

@@ -6,11 +6,10 @@ import time
 
 import pytest
 
-from discover.batch.status import BatchResult, LearnerRow, StudyRow, StudyStatus, read_row
-from discover.batch.summary import Summary
+from discover.batch.status import BatchResult, LearnerRow, StudyRow, StudyStatus, Summary, read_row
 from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page
-from discover.report.wording import effect_title
+from discover.words import effect_title
 
 GOOD = {
     "learners": {
@@ -140,7 +139,7 @@ def test_a_damaged_result_is_an_empty_row(tmp_path, text):
 
 
 def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("discover.batch.summary._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
     summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     end = time.monotonic() + 60.0
@@ -156,7 +155,7 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch
 def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(
     tmp_path, monkeypatch, capfd
 ):
-    monkeypatch.setattr("discover.batch.summary._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
     summary = Summary(tmp_path / "gone", [("a", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     timer = summary._timer

@@ -21,8 +21,8 @@ from collections import Counter
 
 import pytest
 
-from discover.batch import cluster, workers
 from discover.batch import run as batch
+from discover.batch import workers
 from discover.errors import InputError
 from discover.study.atomic import LOCK_FILE
 
@@ -30,8 +30,8 @@ STAND_IN = """
 import json, os, time
 import numpy as np
 from discover.batch import run as batch
-from discover.batch.tasks import TaskResult
-from discover.study.read import fingerprint, read_study
+from discover.batch.run import TaskResult
+from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
 
 def compare(path, out, seed, overwrite, progress):
@@ -98,7 +98,7 @@ def computed(folder):
 def command(folder, pause=5.0):
     """The command line with the stand-in, to be completed by arguments."""
     code = f"import runpy; runpy.run_path({str(folder / 'stand_in.py')!r})\n"
-    code += f"from discover.batch import summary, workers; summary._PAUSE = {pause}\n"
+    code += f"from discover.batch import status, workers; status._PAGE_PAUSE = {pause}\n"
     code += f"workers._COMMAND = {worker_with_stand_in(folder)!r}\n"
     # whoever started the tests may ignore the signal, as a shell's & does, or block it
     code += "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -376,7 +376,7 @@ def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_p
             return batch.StudyStatus("a", "compare", "done", "found")
 
     job = ("a.toml", "a", "compare", str(tmp_path / "a"), None, False)
-    status = cluster._status_of(Future(), job)
+    status = workers._status_of(Future(), job)
     assert status.status == "failed"
     assert "one file system" in status.text
 

@@ -309,15 +309,15 @@ def test_a_batch_refuses_two_studies_for_one_folder(tmp_path, names):
 
 
 def test_a_study_is_read_once_by_its_command(tmp_path, monkeypatch):
-    from discover.batch import tasks
+    from discover.batch import run
 
     def stop(*arguments):
         raise InputError("so far")
 
-    known, read = tasks.read_study, []
-    monkeypatch.setattr(tasks, "read_study", lambda path: read.append(path) or known(path))
-    monkeypatch.setattr("discover.study.read.read_study", lambda path: pytest.fail("read again"))
-    monkeypatch.setattr(tasks, "RunFolder", stop)
+    known, read = run.read_study, []
+    monkeypatch.setattr(run, "read_study", lambda path: read.append(path) or known(path))
+    monkeypatch.setattr("discover.study.data.read_study", lambda path: pytest.fail("read again"))
+    monkeypatch.setattr(run, "RunFolder", stop)
     (tmp_path / "s.toml").write_text(STUDY)
     assert "so far" in invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out").stderr
     assert read == [tmp_path / "s.toml"]

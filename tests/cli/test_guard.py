@@ -4,7 +4,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from discover.cli.guard import guarded
+from discover.cli.console import guarded
 from discover.errors import InputError
 
 

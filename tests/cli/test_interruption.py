@@ -8,17 +8,17 @@ import time
 
 import pytest
 
-from discover.cli import interruption
-from discover.cli.interruption import INTERRUPTED, INTERRUPTED_CODE, obeying_interrupts
+from discover.cli import console
+from discover.cli.console import INTERRUPTED, INTERRUPTED_CODE, obeying_interrupts
 
 # a call without a Python instruction for minutes, as the compiler's are
 AT_WORK = """
 import hashlib, signal, sys, time
-from discover.cli import interruption
-from discover.cli.interruption import obeying_interrupts
-from discover.stop_callbacks import on_stop
+from discover.cli import console
+from discover.cli.console import obeying_interrupts
+from discover.progress import on_stop
 
-interruption._PATIENCE = float(sys.argv[1])
+console._PATIENCE = float(sys.argv[1])
 # a shell's & has it ignored in all that it starts, the tests among them
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
@@ -64,7 +64,7 @@ def test_last_words_that_do_not_end_are_cut_short():
 
 
 def test_who_ignores_the_signal_goes_on_ignoring_it(monkeypatch):
-    monkeypatch.setattr(interruption, "run_stop_callbacks", lambda: pytest.fail("nobody pressed"))
+    monkeypatch.setattr(console, "run_stop_callbacks", lambda: pytest.fail("nobody pressed"))
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # as nohup and a shell's & do
     try:
         with obeying_interrupts():

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from discover.comparison.at_once import at_once
+from discover.comparison.hypotheses import at_once
 from discover.progress import Stopped, require_wanted, silent
 
 

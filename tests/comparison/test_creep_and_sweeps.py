@@ -10,10 +10,9 @@ from independent.sweeps import modulus_of, strain_at
 
 import discover as dc
 from discover.errors import InputError
-from discover.learners.tbnn_ude.initial_law import initial_law
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
-from discover.learners.tbnn_ude.variational import states_and_jacobian
-from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tbnn_ude.session import initial_law
+from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
 from discover.protocols import imposed_stress, oscillations
 from discover.report.predictions import comparison_predictions
 from tensor_library.library import build_library

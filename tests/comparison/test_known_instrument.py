@@ -5,9 +5,8 @@ import pytest
 from planted_instrument import MOBILITY, oscillations, slow_start_ups
 
 from discover.comparison import compare
-from discover.comparison.absorbed import absorbed
 from discover.comparison.in_memory import compare as compare_in_memory
-from discover.comparison.records import corrected
+from discover.comparison.records import absorbed, corrected
 from discover.effects import known_effects
 from discover.errors import InputError
 from discover.laws import Fluid, make_law

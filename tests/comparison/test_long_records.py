@@ -8,8 +8,8 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison import compare
-from discover.comparison.description import data_in_words
-from discover.comparison.prepared import thinned_to
+from discover.comparison.flows import thinned_to
+from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run
 from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
 from discover.protocols import measured_rate

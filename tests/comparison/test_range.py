@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discover.comparison.flows import Flow
-from discover.comparison.placement import place
+from discover.comparison.outcome import place
 from discover.protocols.protocol import in_flow, oscillatory_shear, start_up
 
 TIME = np.linspace(0.0, 20.0, 201)

@@ -5,7 +5,7 @@ import pytest
 from independent import Giesekus, start_up
 from independent.noise import white
 
-from discover.comparison.prepared import without_spikes_in_fit
+from discover.comparison.flows import without_spikes_in_fit
 from discover.dataset import Dataset, Run
 from discover.protocols import start_up as protocol
 from discover.study.data import StudyData

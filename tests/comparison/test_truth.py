@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.comparison.truth import true_terms
+from discover.comparison.flows import true_terms
 
 XI, ALPHA, EPSILON, LIMIT = 0.4, 0.3, 0.2, 12.0
 UNIT = np.eye(3)
@@ -146,8 +146,7 @@ def test_the_true_terms_of_fene_p_give_the_stress_of_its_conformation():
 
 def test_a_law_that_is_no_sum_of_terms_has_no_true_terms(monkeypatch):
     from discover.laws import LAWS as NAMED
-    from discover.laws.base import AbstractConstitutiveLaw
-    from discover.laws.named import NamedLaw
+    from discover.laws.base import AbstractConstitutiveLaw, NamedLaw
 
     class Other(AbstractConstitutiveLaw):
         linear_relaxation: bool = True

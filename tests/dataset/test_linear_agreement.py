@@ -13,7 +13,7 @@ from discover.dataset.linear.linear_tests import (
     spectrum_of,
 )
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
-from discover.report.data.linear_agreement import agreement_words
+from discover.report.data import agreement_words
 
 TIME = np.geomspace(0.01, 100.0, 40)
 OMEGA = np.geomspace(0.01, 100.0, 30)

@@ -13,7 +13,7 @@ from discover.dataset.linear.linear_tests import LinearTest, over_time
 from discover.dataset.linear.superposition import superpose
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.errors import InputError
-from discover.report.data.superposition import superposition_words
+from discover.report.data import superposition_words
 
 OMEGA = np.geomspace(0.1, 100.0, 25)
 CELSIUS = np.arange(100.0, 200.0, 15.0)

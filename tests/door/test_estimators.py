@@ -19,7 +19,7 @@ from sklearn.model_selection import cross_validate
 import discover as dc
 from discover.laws import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files.provenance import provenance_of
+from discover.learners.files import provenance_of
 from tensor_library import parse_term
 from tensor_library.library import TermLibrary
 

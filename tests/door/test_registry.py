@@ -12,9 +12,8 @@ from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, name_of
 from discover.loop.candidates import candidates_of
-from discover.study.data import load_study_data
+from discover.study.data import load_study_data, parse_study
 from discover.study.declared_model import declared_model
-from discover.study.read import parse_study
 from tensor_library.algebra import trace
 
 

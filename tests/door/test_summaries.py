@@ -8,8 +8,7 @@ from scipy.stats import norm
 import discover as dc
 from discover.comparison.comparison import Comparison
 from discover.fitting import NamedLawFit
-from discover.learners.results.recovered_term import RecoveredTerm
-from discover.learners.results.term_tables import estimates_of
+from discover.learners.results import RecoveredTerm, estimates_of
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import default_library
 from discover.loop.loop_result import LoopResult
@@ -137,7 +136,7 @@ def test_a_term_is_determined_if_nothing_speaks_against_it(verdict, ends, rivals
 
 
 def test_python_and_a_study_search_the_same_library():
-    from discover.comparison.training import study_library
+    from discover.comparison.learning import study_library
 
     study = parse_study({"data": {"folder": "a"}})
     assert study_library(study) == default_library()

@@ -17,8 +17,7 @@ from discover.effects.registry import named_effects
 from discover.equations import Equation, effect_terms, law_terms
 from discover.laws import make_law
 from tensor_library import LawTerm
-from tensor_library.integrity_basis import TENSOR_NAMES
-from tensor_library.invariants import INVARIANT_NAMES
+from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
 from tensor_library.library import build_library
 from tensor_library.terms import parse_term
 

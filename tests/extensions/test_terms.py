@@ -11,7 +11,7 @@ from discover.equations import Equation, equation_from_json, equation_to_json
 from discover.equations.formats.code import numpy_code, sympy_code
 from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
-from discover.programs.fingerprint import NotDescribable, fingerprint
+from discover.programs.store import NotDescribable, fingerprint
 from discover.study import read_study
 from tensor_library import (
     CLOSED_FORMS,

@@ -1,6 +1,7 @@
 """Sums of terms in a sentence."""
 
-from discover.identify.exact.relations import spell, spell_briefly
+from discover.identify.relations import spell_briefly
+from tensor_library.law_terms import spell
 
 
 def test_a_sum_of_few_terms_is_spelled_out():

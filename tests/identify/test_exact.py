@@ -6,18 +6,21 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.identify.exact.exact_series import (
+from discover.identify.exact_series import (
+    PRIME,
     compare_series,
+    exact_terms,
     hidden_change,
+    residue,
     solve_for_coefficient,
     stress_series,
 )
-from discover.identify.exact.exact_terms import PRIME, exact_terms, residue
-from discover.identify.exact.relations import feels_33, spell, term_relations
+from discover.identify.relations import feels_33, term_relations
 from discover.laws import Fluid, Giesekus
 from discover.protocols import measured_rate
 from discover.simulate import simulate
 from tensor_library import TermLibrary, build_library, parse_term
+from tensor_library.law_terms import spell
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 CUBIC = (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from discover.dataset import Run
-from discover.identify.structure.one_term_more import one_term_more
-from discover.identify.structure.structure import analyse_structure
+from discover.identify.structure import analyse_structure
+from discover.identify.twins import one_term_more
 from discover.protocols import start_up
 from tensor_library.law_terms import LawTerms
 from tensor_library.library import build_library

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from discover.forward.grids import lay_out
-from discover.identify.soundness.physics import check_physics
-from discover.identify.soundness.steady_states import (
+from discover.identify.physics import check_physics
+from discover.identify.physics_flows import (
     is_stable,
     is_steady,
     steady_shear,

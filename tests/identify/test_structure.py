@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discover.identify.exact.directions import weak_directions
-from discover.identify.structure.structure import analyse_structure
+from discover.identify.relations import weak_directions
+from discover.identify.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
 from tensor_library import build_library, parse_term

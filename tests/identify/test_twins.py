@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 
 from discover.forward.grids import make_grids
-from discover.identify.exact.exact_series import compare_series
-from discover.identify.side_by_side.histories import SAME, differences, random_histories
-from discover.identify.side_by_side.laws_side_by_side import stresses_of_laws
-from discover.identify.side_by_side.separation import separations
-from discover.identify.structure.hidden_stresses import hidden_stresses
-from discover.identify.structure.twins import find_twins
+from discover.identify.exact_series import compare_series
+from discover.identify.side_by_side import (
+    SAME,
+    differences,
+    random_histories,
+    separations,
+    stresses_of_laws,
+)
+from discover.identify.twins import find_twins, hidden_stresses
 from discover.laws import (
     ExponentialPhanThienTanner,
     Fluid,

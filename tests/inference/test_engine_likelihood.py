@@ -6,8 +6,8 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal, norm
 
 import discover as dc
+from discover.inference.engine.bands import quantiles
 from discover.inference.engine.noise import LEAST, Noise, NoiseModel
-from discover.inference.engine.posterior import quantiles
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
 from discover.protocols import start_up

@@ -15,13 +15,13 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.fluids import at_samples
 from discover.forward.grids import lay_out
-from discover.identify.soundness.physics import _extension
+from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
-from discover.laws.checking import check_law
 from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
-from discover.learners.files.plain_values import PlainReader, PlainWriter
-from discover.learners.tbnn_ude.initial_law import initial_law
+from discover.laws.registry import check_law
+from discover.learners.plain_values import PlainReader, PlainWriter
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
+from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import trajectories
 from discover.protocols import start_up
 from discover.protocols.control import steady_rates

@@ -8,10 +8,9 @@ import pytest
 from independent import Giesekus, start_up
 
 import discover as dc
-from discover.learners.tbnn_ude.initial_law import initial_law
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
-from discover.learners.tbnn_ude.variational import states_and_jacobian
-from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tbnn_ude.session import initial_law
+from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
 from discover.protocols.control import steady_rates
 from tensor_library.library import build_library
 

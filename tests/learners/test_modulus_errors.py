@@ -7,7 +7,7 @@ import pytest
 from independent import Giesekus, start_up
 
 import discover as dc
-from discover.comparison import training
+from discover.comparison import learning
 from discover.errors import InputError
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
@@ -159,7 +159,7 @@ def test_a_study_hands_every_learner_what_it_knows(monkeypatch):
     study = Study.model_validate({"data": {"folder": "planted"}, "model": {"law": "ucm"}})
     for learner in ("tensor_sindy", "tbnn_ude"):
         with pytest.raises(InterruptedError):
-            training.train(learner, study, declared, data.runs)
+            learning.train(learner, study, declared, data.runs)
     for name in ("TensorSINDy",):
         np.testing.assert_array_equal(met[name].modulus_covariance, declared.modulus_covariance)
 

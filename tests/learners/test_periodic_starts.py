@@ -11,8 +11,7 @@ from discover.dataset import Run
 from discover.laws import TensorBasisNetwork
 from discover.learners.runs import as_runs
 from discover.learners.tbnn_ude.problem import make_problem as training_problem
-from discover.learners.tbnn_ude.variational import states_and_jacobian
-from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
 from discover.learners.tensor_sindy import TensorSINDy
 from discover.protocols import after_alternation, oscillatory_shear, shear_rates, start_up
 from tensor_library.library import build_library

@@ -6,7 +6,7 @@ from independent import Giesekus, start_up
 from independent.folders import write_table
 
 import discover as dc
-from discover.learners import rough_grid
+from discover.learners import runs as learner_runs
 from discover.learners.known_part import known_part
 from discover.learners.tbnn_ude import estimator as of_network
 from discover.learners.tbnn_ude.problem import make_problem
@@ -37,9 +37,9 @@ def problem_of(runs, **limits):
 def test_where_the_fine_grid_follows_the_fastest_relaxation_so_does_the_rough_one():
     runs = records()
     followed = problem_of(runs, max_step=0.05)
-    assert rough_grid.rough_limits(followed.flows, TIME)["max_step"] == pytest.approx(0.1)
+    assert learner_runs.rough_limits(followed.flows, TIME)["max_step"] == pytest.approx(0.1)
     # else the slowest one sets the limit
-    assert rough_grid.rough_limits(problem_of(runs).flows, TIME)["max_step"] == pytest.approx(2.0)
+    assert learner_runs.rough_limits(problem_of(runs).flows, TIME)["max_step"] == pytest.approx(2.0)
 
 
 def test_the_network_sees_every_state_of_a_sweep_in_fewer_steps(tmp_path):

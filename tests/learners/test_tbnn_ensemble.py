@@ -12,17 +12,16 @@ from discover.laws import Fluid
 from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe
 from discover.learners.tbnn_ude.ensemble import (
     choose_member,
+    coefficient_spread,
     halves_of_runs,
     member_misfits,
+    member_predictions,
     seen_in,
     train_others,
 )
-from discover.learners.tbnn_ude.initial_law import initial_law, invariant_sizes
-from discover.learners.tbnn_ude.least_squares import Stopping
-from discover.learners.tbnn_ude.prior import sample_states
-from discover.learners.tbnn_ude.problem import make_problem
-from discover.learners.tbnn_ude.recipe import Trained
-from discover.learners.tbnn_ude.spread import coefficient_spread, member_predictions
+from discover.learners.tbnn_ude.least_squares import Stopping, sample_states
+from discover.learners.tbnn_ude.problem import Trained, make_problem
+from discover.learners.tbnn_ude.session import initial_law, invariant_sizes
 from discover.protocols import oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
 

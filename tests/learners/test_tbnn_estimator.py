@@ -12,10 +12,10 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, Giesekus
 from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe
-from discover.learners.tbnn_ude.initial_law import initial_law
-from discover.learners.tbnn_ude.prior import Cloud, sample_states
+from discover.learners.tbnn_ude.least_squares import Cloud, sample_states
 from discover.learners.tbnn_ude.problem import make_problem
 from discover.learners.tbnn_ude.projection import project
+from discover.learners.tbnn_ude.session import initial_law
 from discover.protocols import oscillatory_shear
 from discover.simulate import simulate, synthetic_dataset
 

@@ -11,11 +11,15 @@ import discover as dc
 from discover.laws import Fluid
 from discover.learners.tbnn_ude.ensemble import member_misfits
 from discover.learners.tbnn_ude.evidence import endures, posterior_draws, surprises
-from discover.learners.tbnn_ude.initial_law import initial_law
-from discover.learners.tbnn_ude.prior import least_variation, parts, prior_residual, sample_states
-from discover.learners.tbnn_ude.problem import make_problem
-from discover.learners.tbnn_ude.recipe import DefaultRecipe
-from discover.learners.tbnn_ude.recipe_default import train_default
+from discover.learners.tbnn_ude.least_squares import (
+    least_variation,
+    parts,
+    prior_residual,
+    sample_states,
+)
+from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
+from discover.learners.tbnn_ude.recipes import train_default
+from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import trajectories
 from discover.simulate import simulate
 

@@ -10,21 +10,25 @@ from independent.homogeneous import GiesekusFluid
 from discover.dataset import Run
 from discover.laws import Giesekus
 from discover.learners.tbnn_ude import TBNNUDE
-from discover.learners.tbnn_ude.initial_law import initial_law
-from discover.learners.tbnn_ude.least_squares import Objective, Stopping, minimise
-from discover.learners.tbnn_ude.prior import parts, prior_residual, reweighted, sample_states
-from discover.learners.tbnn_ude.problem import make_problem
-from discover.learners.tbnn_ude.recipe import DefaultRecipe
-from discover.learners.tbnn_ude.recipe_default import train_default
-from discover.learners.tbnn_ude.recipe_paper import (
+from discover.learners.tbnn_ude.least_squares import (
+    Objective,
+    Stopping,
+    minimise,
+    parts,
+    prior_residual,
+    reweighted,
+    sample_states,
+)
+from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
+from discover.learners.tbnn_ude.recipes import (
     PaperRecipe,
     make_network,
     paper_loss,
+    train_default,
     train_paper,
 )
-from discover.learners.tbnn_ude.session import Session, is_white
-from discover.learners.tbnn_ude.variational import side_by_side, states_and_jacobian
-from discover.learners.tbnn_ude.weights import Rebuild
+from discover.learners.tbnn_ude.session import Session, initial_law, is_white
+from discover.learners.tbnn_ude.variational import Rebuild, side_by_side, states_and_jacobian
 from discover.protocols import in_flow, oscillatory_shear, start_up
 from discover.simulate import synthetic_dataset
 

@@ -1,6 +1,6 @@
 import numpy as np
 
-from discover.learners.tensor_sindy.selection import (
+from discover.learners.tensor_sindy.search import (
     choose_by_held_out,
     choose_by_one_standard_error,
 )

@@ -14,7 +14,7 @@ from discover.dataset import Dataset, Run
 from discover.effects import known_effects, make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
-from discover.forward.by_mode import DEGREE
+from discover.forward.declared import DEGREE
 from discover.loop import DeclaredModel
 from discover.protocols import in_flow, start_up
 from discover.report.plots.by_mode import by_mode_picture

@@ -8,7 +8,7 @@ from independent.noise import white
 
 import discover as dc
 from discover.errors import InputError
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005

@@ -13,7 +13,7 @@ from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch, names_of_loadings
 from discover.protocols import imposed_stress, oscillatory_shear
 from discover.protocols import start_up as protocol
-from discover.report.loop.verdict import how_sure
+from discover.report.loop.tables import how_sure
 
 GROWTH, WAVE = np.linspace(0.1, 8.0, 80), np.linspace(0.1, 12.0, 120)
 FLOWS = {

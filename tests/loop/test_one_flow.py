@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset.records.repeats import count_flows
 from discover.protocols.control import steady_rates
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict
 
 TIMES = np.linspace(0.1, 6.0, 40)
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)

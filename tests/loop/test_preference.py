@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from discover.loop.preference import first_of, weights_of
+from discover.inference.engine.left_out import weights_of
+from discover.loop.preference import first_of
 
 
 def first(misses, named, runs=6):

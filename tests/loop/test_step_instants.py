@@ -15,9 +15,9 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches.rate_steps import RateSteps
+from discover.forward.batches.flows import RateSteps
 from discover.inference.step_instants import with_places, with_rate_steps
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict
 
 MODULUS, TIME, MOBILITY, NOISE = 100.0, 1.0, 0.3, 0.01
 INSTANTS = {"up.csv": 4.01, "down.csv": 3.99, "stop.csv": 4.02, "judge.csv": 3.02}

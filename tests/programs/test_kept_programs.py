@@ -16,27 +16,29 @@ from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.fluids import solve_batch
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
-from discover.programs.fingerprint import NotDescribable, fingerprint
+from discover.programs.program_cache import put_together, take_apart
 from discover.programs.store import (
     FOLDER,
     STAMP_FILE,
+    NotDescribable,
     _prepared,
+    fingerprint,
     load_program,
     program_folder,
     save_program,
 )
-from discover.programs.structure import put_together, take_apart
 from discover.protocols.protocol import oscillatory_shear, start_up
-from discover.simulate.solve import simulate, solve_batch
+from discover.simulate.solve import simulate
 from tensor_library.library import build_library
 
 GIESEKUS = Fluid.dimensionless(make_law("giesekus", {"alpha": 0.3}))
 ONE_START = """
 import logging, sys, numpy as np
 from discover.compilation_cache import enable_compilation_cache
-from discover.precision import enable_x64
+from discover.first_use import enable_x64
 enable_x64(); enable_compilation_cache(sys.argv[1])
 import jax
 traced = []

@@ -10,9 +10,8 @@ from discover.answer.naming import named_law
 from discover.answer.sentences import tolerance
 from discover.equations import Equation
 from discover.errors import InputError
-from discover.report.answer_screen import answer_screen
 from discover.report.loop.report import write_loop
-from discover.report.page import render
+from discover.report.page import answer_screen, render
 from discover.study import RunFolder
 from discover.study.schema import Verdict
 from discover.validation import validated

@@ -9,19 +9,12 @@ import pytest
 from made_up_comparison import NOT_THERE, TIMES, flow, made_up, outcome, page_of
 
 from discover.learners import RecoveredTerm
-from discover.report.comparison.learners import learner_lines
 from discover.report.comparison.report import write_comparison
-from discover.report.comparison.tables import error_rows
-from discover.report.parts import Missing, attempt
-from discover.report.wording import (
-    estimate,
-    interval,
-    percent,
-    percent_range,
-    significant,
-    terms_text,
-)
+from discover.report.comparison.tables import error_rows, learner_lines
+from discover.report.page import Missing, attempt
+from discover.report.wording import percent, percent_range, terms_text
 from discover.study import RunFolder
+from discover.words import estimate, interval, significant
 
 
 @pytest.mark.parametrize("number", NOT_THERE[:2])
@@ -63,7 +56,7 @@ def test_a_part_that_cannot_be_drawn_is_one_sentence_and_the_others_are_drawn(
         raise TypeError("'<' not supported\nbetween instances of 'NoneType' and 'float'.")
 
     monkeypatch.setattr("discover.report.comparison.tables.error_rows", broken)
-    monkeypatch.setattr("discover.report.comparison.pictures.selection_picture", broken)
+    monkeypatch.setattr("discover.report.comparison.report.selection_picture", broken)
     page = page_of(made_up(), tmp_path / "broken")
     why = "TypeError, '<' not supported between instances of 'NoneType' and 'float'."
     for part in ("The table of errors", "The picture of the selection"):

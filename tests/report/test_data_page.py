@@ -9,10 +9,10 @@ from independent.folders import maxwell_sweep, write_table
 from typer.testing import CliRunner
 
 from discover.cli.app import app
-from discover.cli.pages_on_data import write_import_page
+from discover.cli.import_options import write_import_page
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
-from discover.report.data.page import data_page, first_study
+from discover.report.data import data_page, first_study
 from discover.study import parse_study
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model

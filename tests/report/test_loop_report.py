@@ -14,16 +14,12 @@ from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stag
 from discover.loop.parts import Explanation, Explanations, Fold
 from discover.report.loop import report
 from discover.report.loop.report import write_loop
-from discover.report.loop.tables import noise_range
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict, noise_range
 from discover.report.page import render
-from discover.report.plots.cycles import in_last_cycle
-from discover.report.plots.loop.errors import run_error_picture
-from discover.report.plots.loop.lissajous import lissajous_picture
-from discover.report.plots.loop.residual import residual_picture
-from discover.report.plots.loop.rivals import rivals_picture
-from discover.report.plots.loop.runs import runs_picture
+from discover.report.plots.loop.residual import residual_picture, run_error_picture
+from discover.report.plots.loop.runs import lissajous_picture, rivals_picture, runs_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
+from discover.report.plots.style import in_last_cycle
 from discover.study import RunFolder
 
 

@@ -19,17 +19,17 @@ from discover.comparison import LearnerOutcome, compare
 from discover.comparison.bands import Band
 from discover.laws import Fluid, make_law
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.report.comparison.learners import learner_lines
 from discover.report.comparison.report import write_comparison
-from discover.report.comparison.tables import error_rows
+from discover.report.comparison.tables import error_rows, learner_lines
 from discover.report.page import safe_name
-from discover.report.palette import style_sheet
 from discover.report.plots.comparison.flows import curves, flow_picture, training_picture
-from discover.report.plots.comparison.pipkin import error_map_picture
-from discover.report.plots.comparison.selection import selection_picture
-from discover.report.plots.comparison.studies import third_harmonic
+from discover.report.plots.comparison.selection import (
+    error_map_picture,
+    selection_picture,
+    third_harmonic,
+)
 from discover.report.plots.residual_map import comparison_residual_map
-from discover.report.plots.style import SPARSE
+from discover.report.plots.style import SPARSE, style_sheet
 from discover.report.wording import (
     percent,
     selection_sentence,

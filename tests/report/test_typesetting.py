@@ -9,7 +9,7 @@ from discover.effects.library_term import library_term
 from discover.equations.spelling.markup import law_element, term_element
 from discover.learners import RecoveredTerm
 from discover.report.mathtext import formula, plain
-from discover.report.wording import readable
+from discover.words import readable
 from tensor_library.library import build_library
 from tensor_library.terms import parse_term
 

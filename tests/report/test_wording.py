@@ -4,15 +4,8 @@ import pytest
 from matplotlib.figure import Figure
 
 from discover.report.plots.style import make_percentage
-from discover.report.wording import (
-    estimate,
-    interval,
-    percent,
-    percent_range,
-    readable,
-    significant,
-)
-from discover.words import percent_of
+from discover.report.wording import percent, percent_range
+from discover.words import estimate, interval, percent_of, readable, significant
 
 
 def test_numbers_keep_what_tells_them_apart():

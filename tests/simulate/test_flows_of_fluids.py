@@ -74,28 +74,25 @@ def test_both_moduli_of_a_sweep_are_solved_for_once_and_each_run_has_its_own(of_
     np.testing.assert_allclose(found[1][flows.sample_mask[1]], alone, rtol=1e-7)
 
 
-def swept(law, strains, together):
-    """Return the moduli of a sweep, given up as a whole or state by state."""
+def swept(law, strains):
+    """Return the moduli of a sweep."""
     n = len(strains)
     protocol = oscillations(np.asarray(strains), np.full(n, FREQUENCY))
     ((flows, grids),) = lay_out([protocol], [np.arange(1.0, n + 1.0)]).parts
     flow, grid = jax.tree.map(lambda leaf: leaf[0], (flows, grids))
     make = partial(dynamics_of_fluid, protocol=flow)
-    solved = jax.jit(lambda law: solved_on_grid(make, law, flow, grid, together).observed)
+    solved = jax.jit(lambda law: solved_on_grid(make, law, flow, grid).observed)
     return np.asarray(solved(law)[:, 0])
 
 
 @pytest.mark.slow
-def test_once_one_strain_has_no_periodic_state_no_other_of_a_sweep_is_solved_for():
+def test_a_strain_that_has_no_periodic_state_takes_no_other_of_a_sweep_with_it():
     # a trial law that drives itself: periodic up to a strain of 0.437, where it takes many steps
     runaway, strains = Fluid(Giesekus(-1.2), MODULUS, TIME, SOLVENT), (0.1, 0.435, 10.0)
-    alone = swept(runaway, strains, together=False)
+    alone = swept(runaway, strains)
     np.testing.assert_array_equal(np.isfinite(alone), [True, True, False])
-    given_up = swept(runaway, strains, together=True)
-    # the first was found before the last was given up
-    np.testing.assert_array_equal(np.isfinite(given_up), [True, False, False])
-    # the control: without the last strain the other two are found, in longer steps
-    both = swept(runaway, strains[:2], together=True)
+    # without the last strain the other two are found, in longer steps
+    both = swept(runaway, strains[:2])
     np.testing.assert_allclose(both, alone[:2], rtol=1e-4)
 
 

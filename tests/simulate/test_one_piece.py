@@ -9,7 +9,7 @@ from discover.dataset.run import Run
 from discover.effects import library_effects, named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.protocols import imposed_stress, start_up
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
 
 TIMES = np.linspace(0.1, 2.0, 20)
 START_UP = Run("start", TIMES, start_up(2.0), np.full(20, 2.0), np.ones(20))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.statistics.lack_of_fit import what_is_left
-from discover.statistics.noise.same_place import same_place_probability
+from discover.statistics.noise.whiteness import same_place_probability
 from discover.statistics.residual import Expectation, noise_floor
 
 NOISE, SAMPLES = 0.01, 61

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 import discover
-from discover.cli.guard import guarded
+from discover.cli.console import guarded
 from discover.errors import InputError
 from discover.study import RunFolder, atomic
 from discover.study.atomic import LOCK_FILE, PART_SUFFIX, lock_folder, write_text

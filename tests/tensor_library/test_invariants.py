@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 
-from tensor_library.invariants import INVARIANT_NAMES, scalar_invariants
+from tensor_library.algebra import INVARIANT_NAMES, scalar_invariants
 
 
 def missing(stress, rate):

@@ -13,7 +13,7 @@ from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpect
 from discover.dataset.load import SWEEP_FILE
 from discover.dataset.run import LARGEST, Run
 from discover.statistics import HALF_BAND
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
 # A sweep begins where the fluid is linear; above this amplitude no edge stays whole for many cycles

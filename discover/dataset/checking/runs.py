@@ -10,9 +10,9 @@ from jaxtyping import Float
 
 from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, beside_a_step
 from discover.dataset.run import Run
-from discover.notebook_view import NotebookView
 from discover.protocols.kinematics import KINDS
-from discover.statistics.noise.held_values import read_times
+from discover.statistics.noise.noise_model import read_times
+from discover.summary_view import NotebookView
 from discover.words import counted
 
 FEWEST_SAMPLES = 10  # runs with fewer say little about a law

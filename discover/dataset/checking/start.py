@@ -9,7 +9,7 @@ from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpect
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.protocols.kinematics import kinematics_of
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 # A first stress below this share of the largest is near rest: start-ups are sampled so
 _FAR_FROM_REST = 0.25

@@ -14,14 +14,14 @@ from discover.dataset.importing.text_rows import (
     Constant,
     constants_of,
     is_number,
-    name_and_unit,
     with_points,
 )
 from discover.dataset.tables.table import read_bytes
+from discover.dataset.tables.units import name_and_unit
 from discover.errors import InputError
-from discover.new_names import require_new_name
+from discover.validation import require_new_name
 from discover.words import unknown_name
-from tensor_library.registry import Registry
+from tensor_library.closed_forms import Registry
 
 # bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects
 _LARGEST_PART = 10_000_000

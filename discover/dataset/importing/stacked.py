@@ -24,9 +24,9 @@ from discover.dataset.importing.quantities import (
 )
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
-from discover.dataset.importing.text_rows import Constant, is_number, name_and_unit
+from discover.dataset.importing.text_rows import Constant, is_number
 from discover.dataset.tables import units
-from discover.dataset.tables.units import read_unit
+from discover.dataset.tables.units import name_and_unit, read_unit
 from discover.errors import InputError
 
 # what a test measures; a table of several tests has one of these several times

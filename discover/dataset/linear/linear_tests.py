@@ -22,7 +22,7 @@ from discover.dataset.material_functions import read_over_time
 from discover.dataset.tables import units
 from discover.dataset.tables.table import read_table
 from discover.errors import InputError, Problems
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 from discover.words import did_you_mean
 
 SWEEP, RELAXATION, CREEP = SWEEP_FILE.removesuffix(".csv"), "relaxation", "creep"

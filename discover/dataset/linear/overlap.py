@@ -15,7 +15,7 @@ from scipy.stats import t as student
 
 from discover.dataset.linear.linear_tests import LinearTest, directions
 from discover.errors import InputError
-from discover.statistics.noise.independent_samples import independent_samples
+from discover.statistics.noise.noise_model import independent_samples
 
 _FEWEST = 4  # samples of each in the overlap, below which neighbours are not laid over
 _STEPS = 241

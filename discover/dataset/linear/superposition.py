@@ -29,7 +29,7 @@ from discover.dataset.linear.linear_tests import (
 from discover.dataset.linear.overlap import lay_over, overlap_misfit
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.errors import InputError
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 
 from discover.dataset.tables.units import Quantity, find_column
 from discover.errors import InputError, Problems
-from discover.inputs_kept import note_input
+from discover.validation import note_input
 from discover.words import did_you_mean, listed, nearest
 
 LARGEST_FILE = 300_000_000  # bytes; some five million samples, more than can be looked at
@@ -136,7 +136,7 @@ def read_bytes(
     """Return the content of a regular file of reasonable size; InputError if it is none.
 
     `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
-    whether a command that reads it must not write over it; see `discover.inputs_kept`.
+    whether a command that reads it must not write over it; see `discover.validation`.
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe

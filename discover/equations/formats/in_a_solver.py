@@ -21,14 +21,13 @@ _TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits 
 class InASolver:
     """The extremes over the edge of a law's box.
 
-    `weissenberg`: largest Wi of the box, at which the flows were.
     `smallest_eigenvalue`, `of_mode`: of the conformation, dimensionless (I + σ_k/G_k; of chains
         that end, I + σ_k/(k G_k)), and its mode counted from 1; NaN where the law ran away.
     `largest_step`, `limiting_mode`: longest stable step of explicit Euler for the stress of a mode,
         in s; infinite where nothing decays.
     """
 
-    weissenberg: float
+    weissenberg: float  # largest Wi of the box, at which the flows were
     smallest_eigenvalue: float
     of_mode: int
     largest_step: float

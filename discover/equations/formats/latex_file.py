@@ -3,7 +3,7 @@
 from discover.equations.equation import Equation
 from discover.equations.parts import StatePart
 from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
-from tensor_library.latex import LatexNotation, latex_number
+from tensor_library.notation import LatexNotation, latex_number
 
 
 def equation_latex(equation: Equation, digits: int = 9) -> str:

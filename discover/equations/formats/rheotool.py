@@ -44,21 +44,18 @@ _DIMENSIONS = {
 class RheoToolModel:
     """A law in rheoTool's words.
 
-    `type`: entry ``type``.
-    `options`: entries that are words.
     `parameters`: parameters by rheoTool's name, times over the relaxation time and stresses over
         the modulus.
     `drive`, `relax`: factors on modulus and relaxation rate that the terms ``gammadot`` and
         ``sigma`` amount to.
-    `notes`: what was passed over.
     """
 
-    type: str
-    options: dict[str, str]
+    type: str  # entry ``type``
+    options: dict[str, str]  # entries that are words
     parameters: dict[str, float]
     drive: float = 1.0
     relax: float = 1.0
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what was passed over
 
 
 _ROLIE_POLY = {"stretch_time_ratio": "lambdaR", "beta": "beta", "maximum_stretch": "chiMax"}

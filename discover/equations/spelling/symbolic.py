@@ -6,12 +6,12 @@ import sympy
 
 from discover.equations.parts import NamedPart
 from tensor_library.law_terms import LawTerm
-from tensor_library.symbolic import SympyNotation
+from tensor_library.notation import SympyNotation
 from tensor_library.terms import parse_term
 
 
 def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> sympy.Expr:
-    """Return h as an expression over the non-commuting tensors of `tensor_library.symbolic`.
+    """Return h as an expression over the non-commuting tensors of `tensor_library.notation`.
 
     Constants of a named law that differ from mode to mode stay letters, and so do its structure
     variables.

@@ -8,16 +8,18 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset import Run
-from discover.forward.batches.imposed_stress import StressFlows, at_given_stress
-from discover.forward.batches.records import Records, make_records
-from discover.forward.batches.states import (
+from discover.forward.batches.flows import (
     PeriodicFlows,
     Places,
     SteadyFlows,
+    StressFlows,
+    TransientFlows,
+    at_given_stress,
     oscillations,
     steady_states,
+    transients,
 )
-from discover.forward.batches.transient import TransientFlows, transients
+from discover.forward.batches.records import Records, make_records
 
 Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 """Flows of one control, which share one program; of all but oscillations one row for each run."""
@@ -26,20 +28,15 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 class Batch(eqx.Module):
     """Runs of one control or several, in parts of which each has a program of its own.
 
-    Attributes
-    ----------
-    parts, rows
-        The flows of each control, those in simple shear apart, and which runs they are.
-    moduli
-        Of each run that is a modulus, which one, and where its states stand in their part.
-    records
-        Of all runs in their order, of one kind, in arrays of NumPy.
+    `parts`, `rows`: the flows of each control, those in simple shear apart, and which runs they
+        are.
+    `moduli`: of each run that is a modulus, which one, and where its states stand in their part.
     """
 
     parts: tuple[Flows, ...]
     rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
     moduli: tuple[Places, ...] = eqx.field(static=True)
-    records: Records
+    records: Records  # of all runs in their order, of one kind, in arrays of NumPy
 
     @property
     def weight(self) -> Float[np.ndarray, "runs n"]:
@@ -64,12 +61,7 @@ class Batch(eqx.Module):
 def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
     """Return runs as a batch.
 
-    Parameters
-    ----------
-    runs
-        Of each record one.
-    strain_step
-        Largest strain of a step.
+    `runs`: of each record one. `strain_step`: largest strain of a step.
     """
     # simple shear apart from other flows, for it costs less
     kinds = [

@@ -9,17 +9,135 @@ up to the mean squared relative misfit of each run, of all runs, or of all value
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import equinox as eqx
 import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from discover.dataset.run import Run
-from discover.forward.batches.loadings import Loadings, Values, loadings
+from discover.dataset.run import Loading, Run
 from discover.programs import on_device
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
+from discover.statistics.noise.whiteness import FEWEST_FAST
+from discover.statistics.residual import fast_part
+
+_LEAST = 1e-3
+"""Relative noise below which none is taken to be: a law is not told to more digits."""
+
+_MOST = 1.0 / 3.0
+"""Of the deviation of loadings, up to which their noise is told from the records: what changes from
+sample to sample of few samples may be the flow, and a noise that is told too small leaves factors
+freer, and intervals wider."""
+
+
+Values = TypeVar("Values", Array, np.ndarray)
+"""Arrays of JAX, where programs hold the records, or else of NumPy."""
+
+
+class Loadings(eqx.Module):
+    """Which rows of records share a loading, and how much their factors may differ.
+
+    `members`: whether a row is a record of a loading, shape (loadings, rows).
+    `noise`: standard deviation of the weighted residuals of each row that is noise, shape (rows,).
+    """
+
+    members: Bool[Array | np.ndarray, "loadings rows"]
+    deviation: Float[Array | np.ndarray, ""]  # standard deviation of the factors
+    noise: Float[Array | np.ndarray, " rows"]
+
+    @property
+    def rows(self) -> tuple[tuple[int, ...], ...]:
+        """The rows of each loading's records."""
+        return tuple(tuple(np.flatnonzero(own).tolist()) for own in np.asarray(self.members))
+
+    def of_rows(self, rows: Sequence[int]) -> "Loadings":
+        """Return the loadings of some rows; those of one loading are all there, or none."""
+        at = list(rows)
+        return Loadings(self.members[:, at], self.deviation, self.noise[at])
+
+    def whitened(
+        self, residual: Float[Values, "*trials rows n"], predicted: Float[Values, "*trials rows n"]
+    ) -> Float[Values, "*trials rows n"]:
+        """Return weighted residuals with factors of their own, which the prior holds back.
+
+        `residual`, `predicted`: predictions minus records, and predictions, both weighted; arrays
+        of NumPy or JAX.
+        """
+        along, size = self._along(residual, predicted)
+        with np.errstate(all="ignore"):  # a trial that ran away
+            signal = self.deviation**2
+            # what the likely factor takes, and no more where nothing is predicted
+            share = (1.0 - (1.0 + signal * size) ** -0.5) * along / (size + (size == 0.0))
+            # a loading whose runs ran away leaves the others as they are
+            return residual - self.at_rows(share)[..., None] * predicted
+
+    def at_rows(self, values: Float[Values, "*trials loadings"]) -> Float[Values, "*trials rows"]:
+        """Return values of loadings at the rows of their records; zero at rows of none."""
+        return _where(self.members, values[..., :, None]).sum(-2)
+
+    def factors(
+        self,
+        residual: Float[np.ndarray, "trials rows n"],
+        predicted: Float[np.ndarray, "trials rows n"],
+    ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
+        """Return the factors less one that fit best without the prior, and their precisions.
+
+        The precision is one over the variance by noise. Parameters as in `whitened`.
+        """
+        along, size = self._along(residual, predicted)
+        return -along / np.where(size > 0.0, size, 1.0), size
+
+    def _along(self, residual, predicted):
+        """Return p·e and p·p of each loading, in units of the noise."""
+        with np.errstate(all="ignore"):
+            noise = self.noise[:, None]
+            along = (residual * predicted / noise**2).sum(-1)
+            size = ((predicted / noise) ** 2).sum(-1)
+            both = (_where(self.members, of[..., None, :]).sum(-1) for of in (along, size))
+            return tuple(both)
+
+
+def _where(chosen, values):
+    """Return values where they are chosen and zero elsewhere, of NumPy or JAX."""
+    return values.__array_namespace__().where(chosen, values, 0.0)
+
+
+def loadings(runs: Sequence[Run], unit: Float[np.ndarray, " runs"]) -> Loadings | None:
+    """Return the loadings of runs; None where they are none of their own.
+
+    What else was recorded of a run, and both moduli of a sweep, share its loading.
+
+    `runs`: of each record one. `unit`: the norm of the weighted residuals of one that misses by all
+    of its size, over the root of the number of its samples, shape (runs,).
+    """
+    deviations = {run.loading.deviation for run in runs if run.loading is not None}
+    if not deviations:
+        return None
+    (deviation,) = deviations
+    sources = np.array([run.source if run.loading is not None else "" for run in runs])
+    own = np.array(names_of_loadings(runs))
+    noise = [1.0 if (one := run.loading) is None else relative_noise(run, one) for run in runs]
+    told = np.array([run.loading is not None for run in runs])
+    return Loadings(
+        (sources == own[:, None]) & told, np.asarray(deviation), np.where(told, noise * unit, 1.0)
+    )
+
+
+def names_of_loadings(runs: Sequence[Run]) -> tuple[str, ...]:
+    """Return the name of each loading of some runs, in the order of `Loadings`."""
+    return tuple(dict.fromkeys(run.source for run in runs if run.loading is not None))
+
+
+def relative_noise(run: Run, loading: Loading) -> float:
+    """Return the noise of a run that is a loading of its own, relative to its size."""
+    noise = loading.noise
+    if noise is None:
+        most = _MOST * loading.deviation
+        fast = fast_part(run.recorded / run.sizes(run.recorded))
+        noise = float(np.clip(fast, _LEAST, most)) if len(run) >= FEWEST_FAST else most
+    return max(noise, _LEAST)
+
 
 # Of a radian: the time in which a change of a periodic stress is seen, in its phase
 _SEEN = 0.1
@@ -75,28 +193,19 @@ of that over the runs, or the mean over all values."""
 class Records(eqx.Module):
     """What was recorded in runs, and what every value weighs; arrays of NumPy or JAX.
 
-    Attributes
-    ----------
-    recorded
-        In Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is recorded,
-        N1 and N2, or (runs, n) of the first alone.
-    weight
-        Of each value, as above; zero where nothing was recorded or it is not looked at.
-    loadings
-        Which runs are loadings of their own; None where none is.
+    `recorded` in Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is
+        recorded, N1 and N2, or (runs, n) of the first alone.
+    `weight`: of each value, as above; zero where nothing was recorded or it is not looked at.
     """
 
     recorded: Float[Array | np.ndarray, "runs n *kinds"]
     weight: Float[Array | np.ndarray, "runs n *kinds"]
-    loadings: Loadings | None = None
+    loadings: Loadings | None = None  # which runs are loadings of their own; None where none is
 
     def only(self, keep: Bool[Array | np.ndarray, "*seen"]) -> "Records":
         """Return the records of which only some runs or samples are looked at.
 
-        Parameters
-        ----------
-        keep
-            Which, shape (runs,) or (runs, n).
+        `keep`: which, shape (runs,) or (runs, n).
         """
         keep = keep.reshape(*keep.shape, *(1,) * (self.weight.ndim - keep.ndim))
         return replace(self, weight=_looked_at(keep, self.weight))
@@ -150,9 +259,7 @@ class Records(eqx.Module):
         return self.residual(predicted) + self.weight * self.recorded
 
     def linearised(
-        self,
-        predicted: Float[Array, "runs n *kinds"],
-        columns: Float[Array, "runs n *kinds p"],
+        self, predicted: Float[Array, "runs n *kinds"], columns: Float[Array, "runs n *kinds p"]
     ) -> tuple[Float[Array, "runs n *kinds"], Float[Array, "runs n *kinds p"]]:
         """Return the residual and its derivatives, of predictions and theirs."""
         if self.loadings is None:
@@ -179,17 +286,9 @@ class Records(eqx.Module):
 def make_records(runs: Sequence[Run], n: int, mean: Mean, kinds: int = 1) -> Records:
     """Return what was recorded in runs, of three kinds, in arrays of NumPy.
 
-    Parameters
-    ----------
-    runs
-        Any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
-        stress difference.
-    n
-        Samples of each, with padding.
-    mean
-        What the squares of the residuals add up to.
-    kinds
-        How many of `OBSERVED`, where measured, are looked at.
+    `runs`: any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
+    stress difference. `n`: samples of each, with padding. `mean`: what the squares of the residuals
+    add up to. `kinds`: how many of `OBSERVED`, where measured, are looked at.
     """
     recorded = np.zeros((len(runs), n, len(OBSERVED)))
     weight, size = np.zeros_like(recorded), np.ones_like(recorded)
@@ -218,10 +317,7 @@ def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
     Ones but for a flow curve or a sweep, whose noise is in proportion to it.
 
-    Parameters
-    ----------
-    weight
-        Of its samples, without padding.
+    `weight`: of its samples, without padding.
     """
     least = float(np.min(weight))
     return least / weight if np.ptp(weight) > 1e-9 * least else np.ones_like(weight)

@@ -39,12 +39,8 @@ class FlowBatch(eqx.Module):
 
     G′ and G″ of one sweep are two runs of one flow: its periodic states are solved for once.
 
-    Attributes
-    ----------
-    parts
-        Protocols and grids of each control, both with a leading axis of flows.
-    shown
-        What each run of a part shows of them.
+    `parts`: protocols and grids of each control, both with a leading axis of flows.
+    `shown`: what each run of a part shows of them.
     """
 
     parts: tuple[tuple[FlowProtocol, IntegrationGrid], ...]
@@ -77,11 +73,9 @@ class FlowBatch(eqx.Module):
     def over(self, function: Callable[..., Any]) -> Any:
         """Return what a function makes of each flow and its grid, runs in their order.
 
-        Parameters
-        ----------
-        function
-            Of one protocol and its grid; it may return a tree of arrays, whose shapes do not depend
-            on the control. Where an array is complex, a run has the part that is its modulus.
+        `function`: of one protocol and its grid; it may return a tree of arrays, whose shapes do
+        not depend on the control. Where an array is complex, a run has the part that is its
+        modulus.
         """
         found, told = [], None
         for part, shown in zip(self.parts, self.shown, strict=True):
@@ -208,16 +202,9 @@ def lay_out(
     Of an oscillation that had gone on for ever the periodic state is solved for if the fluid
     relaxes; if not, the cycles with which its protocol begins are waited for.
 
-    Parameters
-    ----------
-    protocols, times
-        One flow and its sampling times for each run.
-    n_samples
-        Pad to so many samples, or to those of the longest run.
-    relaxation_time
-        Longest of the fluid, in s; None where only what is learned relaxes.
-    **limits
-        As `make_grids` takes them.
+    `protocols`, `times`: one flow and its sampling times for each run. `n_samples`: pad to so many
+    samples, or to those of the longest run. `relaxation_time`: longest of the fluid, in s; None
+    where only what is learned relaxes. `**limits`: as `make_grids` takes them.
     """
     n = max(n_samples, *(len(sampled) for sampled in times))
     parts, shown = [], []

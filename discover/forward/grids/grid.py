@@ -7,12 +7,96 @@ import equinox as eqx
 import jax
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
+from scipy.optimize import isotonic_regression
 
 from discover.errors import InputError
-from discover.forward.grids.stress_grid import MAX_GRID_POINTS, stress_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import FlowProtocol
+
+MAX_GRID_POINTS = 200_000
+"""Of one run: more come of a wrong unit."""
+
+# Steps of a jump, growth of those after it, steps between any two of these and of the samples,
+# their strain in that of a run at a given rate. So creep of 9 modes over five decades in 60 samples
+# errs by 2e-5 of the strain, that of a law with a solvent by as much
+_JUMP_STEPS, _GROWTH, _STEPS_BETWEEN, _LONGER = 24, 0.3, 2, 2.0
+
+# A stress jumps where it takes less than this share of the time from there to the next knot
+_SUDDEN = 0.01
+
+# A stress is constant while it changes by less than this share of the largest from sample to sample
+_CONSTANT = 0.01
+
+
+def stress_grid(
+    protocol: FlowProtocol, times: Float[np.ndarray, " n"], strain_step: float = 0.25
+) -> Float[np.ndarray, " s"]:
+    """Return step times for a run at a given stress.
+
+    Every sample and every kink of the imposed stress is a step, and there is one between any two
+    samples. A jump, which takes a short time, is gone through in even steps, and what follows it
+    in steps that grow with the time since. No step takes more than twice `strain_step` of the
+    strain recorded.
+
+    `protocol`: with the imposed stress as its table, and the strain recorded where there is a
+    record. `times`: of the samples, shape (n,). `strain_step`: half of the largest strain of one
+    step: the rate is solved for in its middle too.
+    """
+    begins, end = float(protocol.begins), float(times[-1])
+    knots = np.asarray(protocol.table_times)
+    levels = np.asarray(protocol.table_rates)
+    # a record of thousands at one level has a knot at each sample, and no kink there
+    slope = np.diff(levels) / np.diff(knots)
+    bends = np.concatenate([[True], np.diff(slope) != 0.0, [True]]) if len(knots) > 1 else True
+    knots_inside = knots[(knots >= begins) & (knots <= end) & bends]
+    parts = [np.array([begins]), times, knots_inside]
+    width = np.diff(knots)
+    jumps = np.flatnonzero((width[:-1] < _SUDDEN * width[1:]) & (np.diff(levels)[:-1] != 0.0))
+    for start, stop in zip(knots[jumps], knots[jumps + 1], strict=True):
+        parts.append(np.linspace(start, stop, _JUMP_STEPS + 1))
+        later = times[times > stop]
+        if later.size:
+            count = int(np.ceil(np.log((end - start) / (stop - start)) / np.log1p(_GROWTH)))
+            parts.append(start + np.geomspace(stop - start, end - start, max(count, 2)))
+    anchors = np.unique(np.concatenate(parts))
+    anchors = anchors[(anchors >= begins) & (anchors <= end)]
+    strain = np.zeros(1)
+    moved = np.zeros(len(anchors) - 1)
+    if protocol.table_strains is not None:
+        strain = np.asarray(protocol.table_strains)
+        moved = np.abs(np.diff(np.interp(anchors, knots, _without_noise(levels, strain))))
+    # a smooth stress has knots between its samples, which are steps enough
+    between = np.isin(anchors, np.setdiff1d(knots_inside, times)) & (anchors > 0.0)
+    least = np.where(between[1:] | between[:-1], 1, _STEPS_BETWEEN)
+    pieces = np.maximum(least, np.ceil(moved / (_LONGER * strain_step))).astype(int)
+    if np.sum(pieces) > MAX_GRID_POINTS:
+        raise InputError(
+            f"A run at a given stress with {len(times)} samples and strains up to "
+            f"{np.max(np.abs(strain)):g} would need {np.sum(pieces)} steps (at most "
+            f"{MAX_GRID_POINTS}). Check the unit of the strain, or thin the run."
+        )
+    filled = [
+        a + (b - a) * np.arange(n) / n
+        for a, b, n in zip(anchors[:-1], anchors[1:], pieces, strict=True)
+    ]
+    return np.concatenate([*filled, anchors[-1:]])
+
+
+def _without_noise(levels, strain) -> Float[np.ndarray, " n"]:
+    """Return the strain as it goes one way where the stress is constant.
+
+    Noise would be taken for flow: 1 % of a strain of 200 for ten steps from sample to sample.
+    """
+    changes = np.abs(np.diff(levels)) > _CONSTANT * np.max(np.abs(levels), initial=0.0)
+    pieces = np.split(strain, np.flatnonzero(changes) + 1)
+    return np.concatenate([_one_way(piece) if len(piece) > 2 else piece for piece in pieces])
+
+
+def _one_way(strain) -> Float[np.ndarray, " n"]:
+    ways = [isotonic_regression(strain, increasing=up).x for up in (True, False)]
+    return min(ways, key=lambda way: float(np.sum((way - strain) ** 2)))
+
 
 COARSEST_STRAIN = 1.0
 """Strain of one step beyond which the method may lose its stability in nonlinear flow."""
@@ -48,31 +132,21 @@ _DISTURBANCE, _GROWTH_AS_IT_SETTLES, _SURE, _ORDER = 0.01, 0.05, 0.5, 4
 class IntegrationGrid(eqx.Module):
     """Where to step and where to sample, for one run or, with a leading axis, a batch of runs.
 
-    Attributes
-    ----------
-    times
-        Step times in s, shape (s,), strictly increasing from where the protocol begins; padded past
-        the last sample.
-    sample_index
-        Position in `times` of every sample, shape (n,); padded with the last one.
-    sample_mask
-        False where a sample is padding, shape (n,).
-    phase
-        Of oscillations that have gone on until they are periodic: ωt at step ends and middles in
-        turn over half a cycle, shape (m,). None elsewhere.
-    cycle
-        Steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of a run
-        that had not, None where no run had.
-    cycle_steps
-        The most steps that such a cycle has.
+    `times`: step times in s, shape (s,), strictly increasing from where the protocol begins; padded
+        past the last sample.
+    `sample_index`: position in `times` of every sample, shape (n,); padded with the last one.
+    `phase`: of oscillations that have gone on until they are periodic: ωt at step ends and middles
+        in turn over half a cycle, shape (m,). None elsewhere.
+    `cycle`: steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of
+        a run that had not, None where no run had.
     """
 
     times: Float[Array, "*batch s"]
     sample_index: Int[Array, "*batch n"]
-    sample_mask: Bool[Array, "*batch n"]
+    sample_mask: Bool[Array, "*batch n"]  # false where a sample is padding, shape (n,)
     phase: Float[Array, "*batch m"] | None = None
     cycle: Int[Array, "*batch"] | None = None
-    cycle_steps: int = eqx.field(static=True, default=0)
+    cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
 
     @property
     def sample_times(self) -> Float[Array, "*batch n"]:
@@ -85,10 +159,7 @@ class IntegrationGrid(eqx.Module):
         States are few where samples are padded to those of a long record beside them: each is
         solved for once, and none for padding.
 
-        Parameters
-        ----------
-        solve
-            From the number of a state to a tree of arrays.
+        `solve`: from the number of a state to a tree of arrays.
         """
         found = jax.vmap(solve)(self.times)
         return jax.tree.map(lambda leaf: leaf[self.sample_index], found)
@@ -113,33 +184,19 @@ def make_grid(
     relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
     the method whatever its step, but stable in short ones only.
 
-    Parameters
-    ----------
-    times
-        Sampling times in s, increasing, from 0 on.
-    strain_step, phase_step
-        Largest strain and phase per step.
-    max_step
-        Largest step in s.
-    growth
-        While the rate of a table does not change, steps may grow to this fraction of the time since
-        it last did, up to `COARSEST_STRAIN` where `max_step` limits them too, else half of it: what
-        follows a change happens ever more slowly.
-        An oscillation of the fluid's own is not resolved in the steps that grow.
-    relaxation_time
-        Longest of the fluid, in s. Steps then grow while the rate of a table is constant, up to
-        `COARSEST_STRAIN` and this time, without adding to the largest error: what a change of the
-        rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow as
-        exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out
-        of it. Half of this relaxation is counted on. None leaves steps as they are.
-    from_cycle
-        Whether what had gone on for ever begins with its last cycle before the record, whose state
-        is solved for, and not with all that are waited for.
-
-    Raises
-    ------
-    InputError
-        If the run would need an absurd number of steps.
+    `times`: sampling times in s, increasing, from 0 on. `strain_step`, `phase_step`: largest strain
+    and phase per step. `max_step`: largest step in s. `growth`: while the rate of a table does not
+    change, steps may grow to this fraction of the time since it last did, up to `COARSEST_STRAIN`
+    where `max_step` limits them too, else half of it: what follows a change happens ever more
+    slowly. An oscillation of the fluid's own is not resolved in the steps that grow.
+    `relaxation_time`: longest of the fluid, in s. Steps then grow while the rate of a table is
+    constant, up to `COARSEST_STRAIN` and this time, without adding to the largest error: what a
+    change of the rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow
+    as exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out of
+    it. Half of this relaxation is counted on. None leaves steps as they are. `from_cycle`: whether
+    what had gone on for ever begins with its last cycle before the record, whose state is solved
+    for, and not with all that are waited for. Raises InputError if the run would need an absurd
+    number of steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in STATES:
@@ -302,12 +359,9 @@ def make_grids(
 ) -> IntegrationGrid:
     """Return the grids of several runs, padded to one shape with a leading batch axis.
 
-    Parameters
-    ----------
-    protocols, times
-        One flow of one control and its sampling times for each run; see `make_grid`.
-    relaxation_time, from_cycle, **limits
-        Step limits of `make_grid`, and where it begins.
+    `protocols`, `times`: one flow of one control and its sampling times for each run; see
+    `make_grid`. `relaxation_time`, `from_cycle`, `**limits`: step limits of `make_grid`, and where
+    it begins.
     """
     grids = [
         make_grid(p, t, relaxation_time=relaxation_time, from_cycle=from_cycle, **limits)

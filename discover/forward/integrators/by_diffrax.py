@@ -24,14 +24,8 @@ def solve_in_reverse(
 ) -> Float[Array, "n 4"]:
     """Return the stresses in Pa at the samples of one grid, from where the modes begin.
 
-    Parameters
-    ----------
-    fluid, protocol, grid
-        Of one run at a given rate in time.
-    start
-        Dimensionless modes at the first time.
-    adjoint
-        How diffrax differentiates.
+    `fluid`, `protocol`, `grid`: of one run at a given rate in time. `start`: dimensionless modes at
+    the first time. `adjoint`: how diffrax differentiates.
     """
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(vector_field),
@@ -71,17 +65,12 @@ class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     difference to the third-order solution that takes the last stage from the new point; where no
     error is asked for (fixed steps), that evaluation is compiled away and a step costs four.
 
-    Attributes
-    ----------
-    decay
-        Rates of linear relaxation in 1/s, broadcastable against the state. Any value is
+    `decay`: rates of linear relaxation in 1/s, broadcastable against the state. Any value is
         consistent: it decides accuracy, not the limit. No gradient flows through it.
-    tensors
-        Of how many tensors the rates are those of a state as `turned` gives it, each with its trace
-        first: chains that retract relax that faster than the rest, and both have to be exact where
-        steps are long beside a mode's time.
-    shares
-        What the first tensor has of the others, of which only the rest is followed; or None.
+    `tensors`: of how many tensors the rates are those of a state as `turned` gives it, each with
+        its trace first: chains that retract relax that faster than the rest, and both have to be
+        exact where steps are long beside a mode's time.
+    `shares`: what the first tensor has of the others, of which only the rest is followed; or None.
     """
 
     decay: Float[Array, " ..."]

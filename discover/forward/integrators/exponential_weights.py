@@ -43,17 +43,9 @@ def phi_functions(
 def with_shares(state, shares, factor: float, axis: int):
     """Return states whose first tensor has shares of the further ones more, times a factor.
 
-    Parameters
-    ----------
-    state
-        Components along an axis: four of each tensor, and what stands behind.
-    shares
-        Of each further tensor, or of each and of each mode along the last axis of `state`; None or
-        none leaves states as they are.
-    factor
-        1, or −1 to undo it.
-    axis
-        Of the components.
+    `state`: components along an axis: four of each tensor, and what stands behind. `shares`: of
+    each further tensor, or of each and of each mode along the last axis of `state`; None or none
+    leaves states as they are. `factor`: 1, or −1 to undo it. `axis`: of the components.
     """
     if shares is None or not len(shares):
         return state
@@ -122,22 +114,14 @@ class KrogstadWeights(NamedTuple):
 class StressWeights(NamedTuple):
     """The same for stresses of modes, (4, k), whose trace may relax faster than the rest.
 
-    Attributes
-    ----------
-    whole
-        Weights of each mode.
-    trace
-        Those of its trace; None where it relaxes as the rest does.
-    faster
-        By how much the trace relaxes faster, over 1/λ, shape (k,).
-    beside
-        The same of each further tensor of the law, each with by how much it relaxes as a whole
-        faster than −1; for a law with one tensor none.
-    shares
-        What σ has of each of these, of which only the rest is followed; None for none.
+    `trace`: those of its trace; None where it relaxes as the rest does.
+    `faster`: by how much the trace relaxes faster, over 1/λ, shape (k,).
+    `beside`: the same of each further tensor of the law, each with by how much it relaxes as a
+        whole faster than −1; for a law with one tensor none.
+    `shares`: what σ has of each of these, of which only the rest is followed; None for none.
     """
 
-    whole: KrogstadWeights
+    whole: KrogstadWeights  # weights of each mode
     trace: KrogstadWeights | None = None
     faster: Float[Array, " k"] | float = 0.0
     beside: tuple[tuple["StressWeights", Float[Array, " k"]], ...] = ()
@@ -167,16 +151,10 @@ class StressWeights(NamedTuple):
 
         A scan and not four lines: what a stage does is then compiled once and not four times.
 
-        Parameters
-        ----------
-        stress
-            Before the step.
-        stage
-            Of the stress in a stage and of its share of `inputs`; returns `remainder` and more.
-        inputs
-            A tree with a leading axis of four stages.
-        at_once
-            Stages that are compiled one after another: with 4 a small one takes a quarter less.
+        `stress`: before the step. `stage`: of the stress in a stage and of its share of `inputs`;
+        returns `remainder` and more. `inputs`: a tree with a leading axis of four stages.
+        `at_once`: stages that are compiled one after another: with 4 a small one takes a quarter
+        less.
         """
         if self.beside:
             return self._step_by_step(stress, stage, inputs)
@@ -254,12 +232,7 @@ def krogstad_weights(
 ) -> KrogstadWeights:
     """Return the weights of a step   [Krogstad 2005, JCP 203, 72].
 
-    Parameters
-    ----------
-    z
-        Minus the decay over the step.
-    step
-        Its length, in the unit of time of the remainders.
+    `z`: minus the decay over the step. `step`: its length, in the unit of time of the remainders.
     """
     half_first, half_second, half_third = phi_functions(0.5 * z)
     # those of z follow from those of its half   [Skaflestad & Wright 2009, Appl. Numer. Math. 59,
@@ -304,12 +277,7 @@ def turned(state: Float[Array, "k s *columns"], tensors: int = 1) -> Float[Array
 
     Done twice it changes nothing.
 
-    Parameters
-    ----------
-    state
-        Of each mode.
-    tensors
-        How many stand first in it, four components each.
+    `state`: of each mode. `tensors`: how many stand first in it, four components each.
     """
     for first in range(0, 4 * tensors, 4):
         normals = slice(first, first + 3)

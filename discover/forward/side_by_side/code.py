@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.declared import Numbers
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
-from discover.forward.structure import Numbers
 from discover.programs import compiled
 from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
 from discover.programs.lanes.arithmetic import INTEGER
@@ -27,17 +27,10 @@ def as_array(values: Sequence[Any]) -> np.ndarray:
 class Layout:
     """Trees of arrays as one axis of numbers, and back.
 
-    Parameters
-    ----------
-    tree
-        One of them; what of it is no array is left out.
-    axes
-        How many leading axes each leaf has that stay apart.
+    `tree`: one of them; what of it is no array is left out. `axes`: how many leading axes each leaf
+    has that stay apart.
 
-    Attributes
-    ----------
-    size
-        How many numbers there are.
+    `size`: how many numbers there are.
     """
 
     def __init__(self, tree: Any, axes: int):
@@ -84,15 +77,10 @@ def lanes_last(values: np.ndarray) -> np.ndarray:
 class Eights(NamedTuple):
     """Vectors in whole eights, the last again until they are full.
 
-    Attributes
-    ----------
-    pairs
-        Of each eight its vectors and their moduli.
-    modes, shared
-        What the vectors say of each mode, and of all of them, lanes first.
+    `modes`, `shared`: what the vectors say of each mode, and of all of them, lanes first.
     """
 
-    pairs: list[tuple[np.ndarray, np.ndarray]]
+    pairs: list[tuple[np.ndarray, np.ndarray]]  # of each eight its vectors and their moduli
     modes: np.ndarray
     shared: np.ndarray
 
@@ -115,23 +103,12 @@ class Eights(NamedTuple):
 class Code:
     """Machine code for the effects of a fluid and a law, with all constants and flows as data.
 
-    Attributes
-    ----------
-    flags
-        Which parts of it a vector needs.
-    counts, arrays
-        What it takes: whole numbers, and arrays.
-    wide, whole
-        Arrays of all lanes, and those of whole numbers.
+    `flags`: which parts of it a vector needs.
+    `counts`, `arrays`: what it takes: whole numbers, and arrays.
+    `wide`, `whole`: arrays of all lanes, and those of whole numbers.
 
-    Parameters
-    ----------
-    fluid
-        The effects, of a structure without constants of the law.
-    found
-        Shapes of what is data to it; see `laid_out`.
-    flow
-        Kinematics of one run; None where all are simple shear.
+    `fluid`: the effects, of a structure without constants of the law. `found`: shapes of what is
+    data to it; see `laid_out`. `flow`: kinematics of one run; None where all are simple shear.
     """
 
     counts: ClassVar[tuple[str, ...]]
@@ -155,14 +132,8 @@ class Code:
 
         The moduli are those of the declared modes, and behind them the viscosity of the solvent.
 
-        Parameters
-        ----------
-        fluid
-            The fluid with its effects, of which the vectors are.
-        made_from
-            What tells it from that of another structure.
-        axis
-            Where the vectors stand in what is returned.
+        `fluid`: the fluid with its effects, of which the vectors are. `made_from`: what tells it
+        from that of another structure. `axis`: where the vectors stand in what is returned.
         """
 
         def packed(numbers: Numbers, thetas, moduli):
@@ -222,17 +193,7 @@ class Code:
         return layout.tree([self._w.load(name, place) for place in places])
 
     def _record_modes(self, at: Any, factor: Any, first: int, stride: int) -> None:
-        """Write down σ11, σ22, σ33 and σ12 of all modes.
-
-        Parameters
-        ----------
-        at
-            Which of the places for them.
-        factor
-            On all moduli.
-        first, stride
-            Where in the scratch array the first mode stands, and how far the next is.
-        """
+        """Write down σ11, σ22, σ33 and σ12 of all modes."""
         w, a = self._w, self._arithmetic
         places = [w.at((at, 4), (i, 1)) for i in range(4)]
         for place in places:
@@ -283,21 +244,10 @@ def code_of(
 ) -> _Kind:
     """Return the machine code of a kind for a fluid, made once for all whose constants differ.
 
-    Parameters
-    ----------
-    kind, choices
-        Which code, and what else it takes.
-    fluid
-        The fluid with its effects.
-    numbers
-        One of those that it is called with; their values are data.
-    flow
-        Kinematics of one run; None where all are simple shear.
-
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
+    `kind`, `choices`: which code, and what else it takes. `fluid`: the fluid with its effects.
+    `numbers`: one of those that it is called with; their values are data. `flow`: kinematics of one
+    run; None where all are simple shear. Raises NotTranslatable if a law or an effect does what is
+    not known in lanes.
     """
     theta = jax.ShapeDtypeStruct((fluid.size,), float)
     found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)

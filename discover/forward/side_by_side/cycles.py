@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.forward.starts.modified_newton import (
+from discover.forward.starts.half_cycles import MOST, TOLERANCE
+from discover.forward.starts.steady_states import (
     FROM_REST,
     Approximation,
     goes_on,
     next_approximation,
     relative_change,
 )
-from discover.forward.starts.periodic_start import MOST, TOLERANCE
 from discover.programs.lanes.arithmetic import INTEGER
 
 if TYPE_CHECKING:
@@ -41,15 +41,10 @@ _ALIVE, _CHANGE, _SHIFT, _LARGEST, _PERIOD = range(5)
 def improved(relaxation_time, period, alive, moved, way, end, tangents):
     """Return the next approximation of a mode, by how much it moved, and whether there is hope.
 
-    Parameters
-    ----------
-    relaxation_time, period
-        Of the mode and of a cycle, in s.
-    alive, moved
-        Whether the approximation is looked for, and by how much states have moved since the last.
-    way, end, tangents
-        The approximation in one row, where a cycle from it ends, and that by direction and
-        component.
+    `relaxation_time`, `period`: of the mode and of a cycle, in s. `alive`, `moved`: whether the
+    approximation is looked for, and by how much states have moved since the last. `way`, `end`,
+    `tangents`: the approximation in one row, where a cycle from it ends, and that by direction and
+    component.
     """
     size = len(end)
     now = approximation(way, size)
@@ -82,20 +77,10 @@ def approximation(way, size: int) -> Approximation:
 class Cycles:
     """Writes passes through a run: of one that begins with a periodic state first its cycle's.
 
-    Parameters
-    ----------
-    code
-        What is written.
-    levels
-        Numbers of each state of the fluid, and what it is at rest.
-    levels_at, modes_at
-        Where in the scratch array these stand, and the modes.
-    size
-        Numbers of a mode.
-    first
-        Where there is room in the scratch array.
-    has_states
-        Whether any vector has states of the fluid.
+    `code`: what is written. `levels`: numbers of each state of the fluid, and what it is at rest.
+    `levels_at`, `modes_at`: where in the scratch array these stand, and the modes. `size`: numbers
+    of a mode. `first`: where there is room in the scratch array. `has_states`: whether any vector
+    has states of the fluid.
     """
 
     def __init__(
@@ -136,16 +121,9 @@ class Cycles:
 
         Yields the number of the first step and behind the last, and whether they are the run's.
 
-        Parameters
-        ----------
-        start, end
-            Of the cycle; the first is negative where there is none.
-        last
-            Behind the last step of the run.
-        period
-            Of the cycle in s.
-        settle
-            Writes what follows from the modes and states with which a cycle begins.
+        `start`, `end`: of the cycle; the first is negative where there is none. `last`: behind the
+        last step of the run. `period`: of the cycle in s. `settle`: writes what follows from the
+        modes and states with which a cycle begins.
         """
         w, b = self._w, self._w.builder
         has_cycle = b.icmp_signed(">=", start, INTEGER(0))
@@ -186,9 +164,9 @@ class Cycles:
         with self._w.builder.if_then(self._is(stage)), self._a.apart():
             yield
 
-    def _go_on(self, stage: int, index: int = 0) -> None:
+    def _go_on(self, stage: int) -> None:
         self._w.builder.store(INTEGER(stage), self._stage)
-        self._w.builder.store(INTEGER(index), self._index)
+        self._w.builder.store(INTEGER(0), self._index)
 
     def _keep(self, value: Any, place: int) -> None:
         self._code._keep(value, self._w.at((self._globals, 1), (place, 1)))

@@ -43,30 +43,15 @@ _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 class Kernel(Code):
     """Machine code for the effects of a fluid and a law, with all constants and runs as data.
 
-    Attributes
-    ----------
-    flags
-        Which parts of it a vector needs.
-    steps_taken
-        By eight vectors at once, in all calls so far.
+    `flags`: which parts of it a vector needs.
+    `steps_taken`: by eight vectors at once, in all calls so far.
 
-    Parameters
-    ----------
-    fluid
-        The effects, of a structure without constants of the law.
-    found
-        Shapes of what is data to it; see `laid_out`.
-    flow
-        Kinematics of one run; None where all are simple shear.
-    chooses
-        Whether vectors choose widths of steps; if not, all take those of the grid, in less code.
-    cycles
-        Whether some runs begin with a periodic state.
+    `fluid`: the effects, of a structure without constants of the law. `found`: shapes of what is
+    data to it; see `laid_out`. `flow`: kinematics of one run; None where all are simple shear.
+    `chooses`: whether vectors choose widths of steps; if not, all take those of the grid, in less
+    code. `cycles`: whether some runs begin with a periodic state.
 
-    Raises
-    ------
-    NotTranslatable
-        If a law or an effect does what is not known in lanes.
+    Raises NotTranslatable if a law or an effect does what is not known in lanes.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -103,18 +88,9 @@ class Kernel(Code):
         computed. That of the modes is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where
         normal stresses are asked for, and empty if not.
 
-        Parameters
-        ----------
-        runs
-            How many runs are followed.
-        tabled
-            Modes whose weights stand in the table.
-        used
-            Parts of the program that one of the vectors needs; see `Flags`.
-        given
-            The arrays beside these, by name.
-        normal
-            Whether normal stresses are asked for.
+        `runs`: how many runs are followed. `tabled`: modes whose weights stand in the table.
+        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
+        beside these, by name. `normal`: whether normal stresses are asked for.
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)

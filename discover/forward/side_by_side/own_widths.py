@@ -51,20 +51,10 @@ _ENOUGH = 10**9
 class OwnWidths:
     """Writes what stands around a step, which is written once.
 
-    Parameters
-    ----------
-    w, arithmetic
-        Where it is written.
-    at
-        Places in the scratch array of what is `OWN`.
-    state
-        Where the state begins that a step changes.
-    levels, modes
-        Where in it states of the fluid stand, and the modes.
-    variables
-        Structure variables of each mode.
-    has_states
-        Whether any of the vectors has states of the fluid.
+    `w`, `arithmetic`: where it is written. `at`: places in the scratch array of what is `OWN`.
+    `state`: where the state begins that a step changes. `levels`, `modes`: where in it states of
+    the fluid stand, and the modes. `variables`: structure variables of each mode. `has_states`:
+    whether any of the vectors has states of the fluid.
     """
 
     def __init__(

@@ -17,16 +17,15 @@ import numpy as np
 
 from discover.effects import ConstitutiveEffect, StateEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
+from discover.forward.declared import Numbers
 from discover.forward.integrators.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,
     relax,
 )
-from discover.forward.structure import Numbers
 from discover.laws.each_mode import apart, of_each_mode
-from tensor_library.contraction import contracted
-from tensor_library.integrity_basis import integrity_basis
+from tensor_library.algebra import contracted, integrity_basis
 from tensor_library.kinematics import rate_of_deformation
 
 WEIGHTS = 10
@@ -36,10 +35,8 @@ WEIGHTS = 10
 class Mode(NamedTuple):
     """What differs from mode to mode: each leaf has a leading axis of modes, or is of one mode.
 
-    Attributes
-    ----------
-    relaxations, shares
-        What decides how chains that retract are stepped through, as the law's; None for others.
+    `relaxations`, `shares`: what decides how chains that retract are stepped through, as the law's;
+        None for others.
     """
 
     modulus: Any
@@ -129,19 +126,10 @@ def beside_modes(fluid: AugmentedFluid) -> list[ConstitutiveEffect]:
 class Step:
     """The functions of which a step consists.
 
-    Parameters
-    ----------
-    fluid
-        The fluid with its effects.
-    law
-        What of the law is no array.
-    states
-        Those states of the fluid that are followed; by default all.
+    `fluid`: the fluid with its effects. `law`: what of the law is no array. `states`: those states
+    of the fluid that are followed; by default all.
 
-    Attributes
-    ----------
-    kept
-        How many weights of a step are kept of each mode.
+    `kept`: how many weights of a step are kept of each mode.
     """
 
     kept = WEIGHTS
@@ -236,16 +224,9 @@ class Step:
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.
 
-        Parameters
-        ----------
-        flow
-            Which flow it is; None is simple shear.
-        slow
-            The factor on all times at the start, in the middle and at the end.
-        rates
-            There, in 1/s, without what series elements take.
-        taken, earlier
-            Rate that these take in this step and in the one before.
+        `flow`: which flow it is; None is simple shear. `slow`: the factor on all times at the
+        start, in the middle and at the end. `rates`: there, in 1/s, without what series elements
+        take. `taken`, `earlier`: rate that these take in this step and in the one before.
         """
         w = self._of_step(mode, weights)
         first, middle, last = rates

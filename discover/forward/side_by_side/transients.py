@@ -17,11 +17,11 @@ from jaxtyping import Float
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, TransientFlows
+from discover.forward.declared import Numbers
 from discover.forward.dynamics import declared_weights
-from discover.forward.integrators.with_effects import JUMP
+from discover.forward.integrators.stepping import JUMP
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.step import WEIGHTS, Flags
-from discover.forward.structure import Numbers
 from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
 from discover.protocols.kinematics import normal_stress_differences
@@ -45,33 +45,19 @@ _OF_RUNS = (
 class _Runs(NamedTuple):
     """Runs as the kernel takes them, in arrays of NumPy.
 
-    Attributes
-    ----------
-    last
-        How many steps of each are taken.
-    width, jump
-        Of the steps, and the width up to which one only marks a jump of the rate, in s.
-    held, whole, least
-        Of how many steps that follow the commanded rate may be a straight line, from each on, how
-        long these are together, in s, and how short a vector's own may become; see `OwnWidths`.
-    cycle, period
-        Steps between which the cycle lies that a run's start brings back, the first negative where
-        there is none, and how long it is, in s.
-    flow
-        Kinematics of each run.
-    sample
-        Positions of the samples among step ends.
-    weight, recorded
-        What was measured, at step ends.
-    rate, tool_rate
-        Without effects of the instrument, with the lanes first.
-    in_lanes
-        The rate with the lanes last.
-    in_shear
-        Whether any of them is simple shear, where alone an instrument shapes and distorts.
+    `width`, `jump`: of the steps, and the width up to which one only marks a jump of the rate, in
+        s.
+    `held`, `whole`, `least`: of how many steps that follow the commanded rate may be a straight
+        line, from each on, how long these are together, in s, and how short a vector's own may
+        become; see `OwnWidths`.
+    `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
+        negative where there is none, and how long it is, in s.
+    `weight`, `recorded`: what was measured, at step ends.
+    `rate`, `tool_rate`: without effects of the instrument, with the lanes first.
+    `in_shear`: whether any of them is simple shear, where alone an instrument shapes and distorts.
     """
 
-    last: np.ndarray
+    last: np.ndarray  # how many steps of each are taken
     cycle: np.ndarray
     period: np.ndarray
     held: np.ndarray
@@ -79,13 +65,13 @@ class _Runs(NamedTuple):
     whole: np.ndarray
     least: np.ndarray
     jump: np.ndarray
-    flow: np.ndarray
-    sample: np.ndarray
+    flow: np.ndarray  # kinematics of each run
+    sample: np.ndarray  # positions of the samples among step ends
     weight: np.ndarray
     recorded: np.ndarray
     rate: np.ndarray
     tool_rate: np.ndarray
-    in_lanes: np.ndarray
+    in_lanes: np.ndarray  # the rate with the lanes last
     in_shear: bool
 
 
@@ -136,17 +122,11 @@ def _between(
 class SideBySide:
     """Predictions of transients for one structure of law and effects.
 
-    Parameters
-    ----------
-    fluid, kernel
-        The fluid with its effects, and its machine code.
-    rates
-        Of a vector, the effects that are present, and a run: the felt rate at ends and middles of
-        steps, without what series elements take, and the tool's rate at ends.
-    recorded
-        Of these, the stress, the felt rate and the tool's, what is recorded at samples.
-    made_from
-        What tells these from those of another structure.
+    `fluid`, `kernel`: the fluid with its effects, and its machine code. `rates`: of a vector, the
+    effects that are present, and a run: the felt rate at ends and middles of steps, without what
+    series elements take, and the tool's rate at ends. `recorded`: of these, the stress, the felt
+    rate and the tool's, what is recorded at samples. `made_from`: what tells these from those of
+    another structure.
     """
 
     def __init__(
@@ -189,19 +169,10 @@ class SideBySide:
     ) -> Float[np.ndarray, "trials runs n kinds"]:
         """Return what is recorded of the first runs, and N1 and N2 behind it if asked for.
 
-        Parameters
-        ----------
-        moduli
-            Of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
-        limits
-            Sums of squared residuals from which on a vector is of no use. Infinity follows it to
-            the end.
-        part, judging
-            Runs, and what was recorded of them.
-        runs
-            How many are asked for; those behind are padding.
-        normal
-            Whether N1 and N2 are.
+        `moduli`: of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
+        `limits`: sums of squared residuals from which on a vector is of no use. Infinity follows it
+        to the end. `part`, `judging`: runs, and what was recorded of them. `runs`: how many are
+        asked for; those behind are padding. `normal`: whether N1 and N2 are.
         """
         flags = self._flags.of(thetas)
         order = np.lexsort([thetas[:, 1], *flags.T])

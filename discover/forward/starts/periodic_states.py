@@ -16,7 +16,7 @@ from discover.forward.starts.half_cycles import (
     first_harmonic,
     half_cycle,
 )
-from discover.forward.starts.modified_newton import (
+from discover.forward.starts.steady_states import (
     FROM_REST,
     Approximation,
     first_approximation,
@@ -71,16 +71,9 @@ def complex_modulus(
     36, 1697]. Slip and compliance in series take their share of the first harmonic; that they also
     feel the higher ones is neglected.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid, with what gives way in series with it.
-    strain, frequency
-        Amplitude γ₀ and ω in rad/s.
-    steps
-        Over half a cycle.
-    beside
-        Recorded stress beside the modes in Pa, of rates in 1/s.
+    `dynamics`: the fluid, with what gives way in series with it. `strain`, `frequency`: amplitude
+    γ₀ and ω in rad/s. `steps`: over half a cycle. `beside`: recorded stress beside the modes in Pa,
+    of rates in 1/s.
     """
     half = counted_half_cycle(dynamics, frequency, steps)
 
@@ -172,18 +165,10 @@ class _Solving(NamedTuple):
 
 
 class PeriodicState(NamedTuple):
-    """Where a cycle of an oscillation begins and ends, at zero strain, and its moduli.
+    """Where a cycle of an oscillation begins and ends, at zero strain, and its moduli."""
 
-    Attributes
-    ----------
-    stress
-        Dimensionless, of the modes, shape (s, k).
-    modulus
-        G′ + iG″ in Pa of the first harmonic.
-    """
-
-    stress: Float[Array, "s k"]
-    modulus: Complex[Array, ""]
+    stress: Float[Array, "s k"]  # dimensionless, of the modes, shape (s, k)
+    modulus: Complex[Array, ""]  # G′ + iG″ in Pa of the first harmonic
 
 
 def periodic_state(
@@ -192,23 +177,13 @@ def periodic_state(
     strain: Float[Array, ""],
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
-    together: str | None,
 ) -> PeriodicState:
     """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
 
     They are those of the implicit function: none passes through the iteration.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; no state changes with it, and nothing gives way in series.
-    fixed
-        The same, through which no derivative passes.
-    strain, frequency, phase
-        As in `complex_modulus`.
-    together
-        The name of an axis of states that are of use only together, over which this is mapped: once
-        one of them is given up, so are the others.
+    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
+    same, through which no derivative passes.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
@@ -239,11 +214,7 @@ def periodic_state(
         return _Solving(following, change, jacobian, harmonics)
 
     def hopeful(now: _Solving):
-        further = goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
-        if together is None:
-            return further
-        given_up = ~further & ~(now.change < NEWTON_STEP)
-        return further & (jax.lax.pmax(given_up.astype(int), together) == 0)
+        return goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
 
     size, modes = fixed.rest()[0].shape
     # the cycles from rest need no derivative

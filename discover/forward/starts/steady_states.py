@@ -1,5 +1,6 @@
 """Steady states of a fluid, one for each rate of a flow curve."""
 
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax
@@ -7,16 +8,287 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from discover.forward.dynamics import Dynamics, Levels
-from discover.forward.starts.approach import (
-    MOST_STEPS,
-    Approach,
-    approach,
-    approach_step,
-    arrived,
-    moves,
-    newton_step,
-)
 from discover.protocols.kinematics import Kinematics
+
+FROM_REST = 2
+"""Cycles from rest before Newton's steps."""
+
+# A step that made things worse is tried again this much shorter; below the other, it is rounding
+_SHORTER, _EXACT = 0.25, 1e-12
+
+# Of a mode that relaxes over many cycles, a cycle tells so little that rounding moves the step
+_STATE_ROUNDING = 1e-13
+
+# Of a change beside the modes, what it may add to their misfit
+_BESIDE = 10.0
+
+# Five steps in a row that led astray: of sixty laws at six strengths none came round later than
+# that, but for states at the very edge of those that there are
+_HOPELESS = 5e-4
+
+
+class Approximation(NamedTuple):
+    """An approximation to the modes, and the best one of each that was tried.
+
+    `stress`, `best`: dimensionless, shape (s, k): four components of σ, and structure variables.
+    `best_misfit`, `best_step`: what a cycle changes in the best one, relative, and Newton's step
+        from it.
+    """
+
+    stress: Float[Array, "s k"]
+    best: Float[Array, "s k"]
+    best_misfit: Float[Array, " k"]
+    best_step: Float[Array, "s k"]
+    share: Float[Array, " k"]  # of that step that is taken
+    number: Float[Array, ""]  # of cycles gone through
+
+
+def first_approximation(stress: Float[Array, "s k"], number: int = 0) -> Approximation:
+    """Return where the iteration begins, after so many cycles from rest."""
+    free = jnp.full(stress.shape[1], jnp.inf)
+    return Approximation(
+        stress=stress,
+        best=stress,
+        best_misfit=free,
+        best_step=jnp.zeros_like(stress),
+        share=jnp.ones_like(free),
+        number=jnp.asarray(float(number)),
+    )
+
+
+def next_approximation(
+    now: Approximation,
+    after: Float[Array, "s k"],
+    jacobian: Float[Array, "k s s"],
+    moved: Float[Array, ""] | float = 0.0,
+) -> tuple[Approximation, Bool[Array, " k"]]:
+    """Return the next approximation, and of which modes this one was better than all before.
+
+    A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
+    Introduction to Numerical Analysis, section 5.4].
+
+    `now`, `after`: the modes, and what a cycle makes of them. `jacobian`: of that in these, for
+    each mode: direction, component. `moved`: by how much something beside the modes has changed
+    since, a state or what is felt. It puts the modes off, which is no step of theirs that led
+    astray.
+    """
+    difference = after - now.stress
+    misfit = _size(difference) / (1.0 + _size(now.stress))
+    begins = now.number <= FROM_REST
+    # never where it is not a number
+    better = (misfit <= now.best_misfit + _BESIDE * moved) | (misfit < _EXACT)
+    better = better | (begins & jnp.isfinite(misfit))
+    matrix = jnp.eye(len(after)) - jnp.swapaxes(jacobian, 1, 2)
+    step = jnp.linalg.solve(matrix, difference.T[:, :, None])[:, :, 0].T
+    step = jnp.where(now.number < FROM_REST, difference, step)
+    step = jnp.where(better, step, now.best_step)
+    best = jnp.where(better, now.stress, now.best)
+    share = jnp.where(better, 1.0, _SHORTER * now.share)
+    following = Approximation(
+        stress=best + share * step,
+        best=best,
+        best_misfit=jnp.where(better, misfit, now.best_misfit),
+        best_step=step,
+        share=share,
+        number=now.number + 1.0,
+    )
+    return following, better
+
+
+def goes_on(
+    now: Approximation, change: Float[Array, ""], most: int, tolerance: float
+) -> Bool[Array, ""]:
+    """Return whether to go through another cycle."""
+    begins = now.number <= FROM_REST
+    hopeful = (now.number < most) & (jnp.min(now.share) > _HOPELESS)
+    return begins | (hopeful & ~(change < tolerance))
+
+
+def relative_change(
+    now: Approximation, following: Approximation, slowness: Float[Array, " k"], tolerance: float
+) -> Float[Array, ""]:
+    """Return how far the modes moved, relative, but for what rounding moves of slow ones.
+
+    `now`, `following`: approximations one after the other. `slowness`: relaxation time of each mode
+    over that of a cycle. `tolerance`: change below which the iteration ends.
+    """
+    told = 1.0 + _STATE_ROUNDING / tolerance * slowness
+    moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))
+    return jnp.max(moved / told)
+
+
+def _size(stress: Float[Array, "s k"]) -> Float[Array, " k"]:
+    return jnp.max(jnp.abs(stress), axis=0)
+
+
+# A step that no chain could take (tr A = 3 + tr σ below zero) is taken again with the width of so
+# many steps before, and widths then grow twice as fast until they have caught up. At most so often,
+# so that there are steps left to arrive
+_BACK, _MOST_AGAIN = 3.0, 80
+
+# What may be left of the rate of change, of the largest there could be, and of what Newton's step
+# would move every number, of itself. Where nothing is left, no step needs to be possible
+_STILL, _NOTHING, _SMALL = 1e-3, 1e-9, 1e-3
+
+# By how much a step may move a structure variable. Of chains it is a logarithm, which runs away
+# where it has turned nearly all to zero that should hold it
+_MOST_MOVED = 1.0
+
+# Widths of steps, from a fraction of the fastest time of the flow to where a step is Newton's
+_WIDTHS = 60
+_FIRST, _LAST = 0.05, 1e8
+
+MOST_STEPS = 240
+"""So many are taken where chains stretch far, or nearly to their end; else some forty."""
+
+# Width in relaxation times from which on a step is Newton's to a thousandth, and what it moves by
+# rounding
+_LONG, _ROUNDING = 1e3, 1e-13
+
+
+class Approach(NamedTuple):
+    """A way towards a steady state.
+
+    `number`: of the next step of each mode, and how many were taken again, both of shape (k,).
+    """
+
+    stress: Float[Array, "s k"]  # of all modes
+    number: Float[Array, " k"]
+    again: Float[Array, " k"]  # see there
+
+
+def approach(stress: Float[Array, "s k"]) -> Approach:
+    """Return the way from modes at rest."""
+    nothing = jnp.zeros(stress.shape[1], stress.dtype)
+    return Approach(stress, nothing, nothing)
+
+
+def approach_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    way: Approach,
+    index: Float[Array, ""],
+    weissenberg_number: Float[Array, " k"],
+    scalars: int,
+) -> Approach:
+    """Return the way after one step.
+
+    Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
+
+    `change`: rate of change of all modes. `index`: of the step. `weissenberg_number`: of each mode.
+    `scalars`: how many structure variables that are no part of a tensor stand last in each mode.
+    """
+    width = pseudo_time_step(way.number, weissenberg_number)
+    moved = linearly_implicit_step(change, way.stress, width)
+    if scalars:
+        before = way.stress[-scalars:]
+        near = jnp.clip(moved[-scalars:], before - _MOST_MOVED, before + _MOST_MOVED)
+        moved = moved.at[-scalars:].set(near)
+    possible = jnp.all(jnp.isfinite(moved), axis=0) & _is_of_chains(moved)
+    taken = possible | (way.again >= _MOST_AGAIN)
+    onward = jnp.minimum(way.number + 2.0, jnp.minimum(index + 1.0, float(_WIDTHS)))
+    return Approach(
+        jnp.where(taken, moved, way.stress),
+        jnp.where(taken, onward, jnp.maximum(way.number - _BACK, 0.0)),
+        way.again + jnp.where(taken, 0.0, 1.0),
+    )
+
+
+def moves(
+    before: Approach,
+    after: Approach,
+    weissenberg_number: Float[Array, " k"],
+    beside: Sequence[tuple[Array, Array]] = (),
+) -> Bool[Array, ""]:
+    """Return whether another step may change anything: one of Newton's from here did, or none was.
+
+    A step that is taken again moves nothing either.
+
+    `before`, `after`: the way at the beginning and at the end of a step. `weissenberg_number`: of
+    each mode. `beside`: what else is on the way, before and after the step.
+    """
+    width = pseudo_time_step(before.number, weissenberg_number)
+    newton = jnp.all((after.number >= before.number) & (width > _LONG))
+    return ~(newton & are_still([(before.stress, after.stress), *beside]))
+
+
+def are_still(pairs: Sequence[tuple[Array, Array]]) -> Bool[Array, ""]:
+    """Return whether nothing changed by more than rounding, of pairs before and after a step."""
+    still = [jnp.all(jnp.abs(b - a) <= _ROUNDING * (1.0 + jnp.abs(a))) for a, b in pairs]
+    return jnp.all(jnp.stack(still))
+
+
+def arrived(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    way: Approach,
+    weissenberg_number: Float[Array, " k"],
+) -> Float[Array, "s k"]:
+    """Return the modes where the way ends; not finite where that is no steady state of chains.
+
+    A law may have a state of rest that no flow reaches: of FENE-P, springs of no strength.
+    """
+    stress = way.stress
+    now, jacobian = _with_jacobian(change, stress)
+    left = jnp.max(jnp.abs(now), axis=0)
+    # of a structure variable nothing says how large it should be
+    most = (1.0 + weissenberg_number) * (1.0 + jnp.max(jnp.abs(stress[:4]), axis=0))
+    # a stress that is small beside N1 may be far from steady where all is still by that measure
+    moved = jnp.abs(_solved(-jacobian, now)) <= _STILL * (_SMALL + jnp.abs(stress))
+    still = (left <= _STILL * most) & (jnp.all(moved, axis=0) | (left <= _NOTHING * most))
+    return jnp.where(still & _is_of_chains(stress), stress, jnp.nan)
+
+
+def _is_of_chains(stress):
+    return jnp.sum(stress[:3], axis=0) > -3.0
+
+
+def pseudo_time_step(
+    number: Float[Array, " k"], weissenberg_number: Float[Array, " k"]
+) -> Float[Array, " k"]:
+    """Return the width of a step of each mode, in its relaxation times.
+
+    `number`: of the step of each mode, from 0 on. `weissenberg_number`: rate of the flow times the
+    relaxation time of each mode.
+    """
+    first = _FIRST / (1.0 + weissenberg_number)
+    return first * (_LAST / first) ** (number / (_WIDTHS - 1))
+
+
+def linearly_implicit_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    stress: Float[Array, "s k"],
+    width: Float[Array, " k"],
+) -> Float[Array, "s k"]:
+    """Return modes after one linearly implicit Euler step; an infinite one is Newton's.
+
+    `change`: rate of change of all modes, each of which changes by itself. `stress`: where the step
+    begins. `width`: of the step, in the unit of time of each mode.
+    """
+    now, jacobian = _with_jacobian(change, stress)
+    matrix = jnp.eye(len(stress)) / width[:, None, None] - jacobian
+    return stress + _solved(matrix, now)
+
+
+def newton_step(
+    change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]], stress: Float[Array, "s k"]
+) -> Float[Array, "s k"]:
+    """Return modes after a step of Newton's method from where they are steady.
+
+    It moves them by nothing, and by what the change depends on as the implicit function does.
+    """
+    now, jacobian = _with_jacobian(change, stress)
+    return stress + _solved(jax.lax.stop_gradient(-jacobian), now)
+
+
+def _with_jacobian(change, stress):
+    """Return the change, and of each mode its derivative, shape (k, s, s)."""
+    now, tangent = jax.linearize(change, stress)
+    # each mode changes by itself: as many directions as it has numbers give every tangent
+    unit = jnp.eye(len(stress))[:, :, None] * jnp.ones(stress.shape)
+    return now, jnp.transpose(jax.vmap(tangent)(unit), (2, 1, 0))
+
+
+def _solved(matrix: Float[Array, "k s s"], change: Float[Array, "s k"]) -> Float[Array, "s k"]:
+    return jnp.linalg.solve(matrix, change.T[:, :, None])[:, :, 0].T
 
 
 class _Way(NamedTuple):
@@ -39,14 +311,8 @@ def steady_states(
     several steady states it is the one that a start-up leads to; where it has none, or the flow
     runs away, the values are not finite or far off.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; of elements in series only slip acts.
-    rates
-        Of the tool, in 1/s, shape (n,); zero is rest.
-    flow
-        Which flow has these rates; None is simple shear.
+    `dynamics`: the fluid; of elements in series only slip acts. `rates`: of the tool, in 1/s, shape
+    (n,); zero is rest. `flow`: which flow has these rates; None is simple shear.
     """
 
     def one(rate):
@@ -65,14 +331,8 @@ def steady_state(
     Not finite where none is reached. Derivatives are those of the implicit function: none passes
     through the steps.
 
-    Parameters
-    ----------
-    dynamics
-        The fluid; no state changes with it, and nothing gives way in series.
-    fixed
-        The same, through which no derivative passes.
-    rate, flow
-        As in `steady_states`.
+    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
+    same, through which no derivative passes.
     """
     reached, _, _ = jax.lax.stop_gradient(_approach(fixed, rate, flow))
     return newton_step(lambda stress: dynamics.change(stress, rate, 1.0, flow), reached)

@@ -26,7 +26,7 @@ from discover.inference.engine.fits import Fit
 from discover.inference.engine.possible_tests import PossibleTest, possible_tests
 from discover.inference.engine.posterior import Posterior
 from discover.protocols.kinematics import RecordedQuantity
-from discover.statistics.projection import rms, squared_distance
+from discover.statistics.noise.noise_model import rms, squared_distance
 
 DECISIVE = 5.0
 """Log odds from which on a test decides: one against 150."""

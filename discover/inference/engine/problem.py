@@ -11,7 +11,7 @@ from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel
 from discover.forward.batches import data_scales
-from discover.forward.by_mode import LARGEST
+from discover.forward.declared import LARGEST
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
 from discover.statistics import root_of

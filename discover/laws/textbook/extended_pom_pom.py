@@ -4,8 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
 from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, square
 from tensor_library.isotropic_function import IsotropicFunction, scalars

@@ -3,8 +3,7 @@
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
 from tensor_library.algebra import Symmetric, anticommutator
 from tensor_library.isotropic_function import IsotropicFunction, scalars
 from tensor_library.law_terms import LawTerm

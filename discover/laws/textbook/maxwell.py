@@ -3,8 +3,7 @@
 import equinox as eqx
 import jax.numpy as jnp
 
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw
 from tensor_library.algebra import Symmetric
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.law_terms import LawTerm

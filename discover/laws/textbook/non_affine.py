@@ -5,8 +5,7 @@ from collections.abc import Callable
 import equinox as eqx
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
 from discover.laws.textbook.giesekus import NAMED as GIESEKUS
 from discover.laws.textbook.johnson_segalman import NAMED as JOHNSON_SEGALMAN
 from discover.laws.textbook.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER

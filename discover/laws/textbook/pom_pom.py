@@ -6,8 +6,14 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, State, as_parameter, as_state, stress_in
-from discover.laws.named import NamedLaw
+from discover.laws.base import (
+    AbstractConstitutiveLaw,
+    NamedLaw,
+    State,
+    as_parameter,
+    as_state,
+    stress_in,
+)
 from discover.laws.textbook.extended_pom_pom import NAMED as EXTENDED
 from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, trace

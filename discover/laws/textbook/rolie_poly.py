@@ -4,8 +4,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
 from tensor_library.isotropic_function import IsotropicFunction, scalars
 
@@ -115,10 +114,7 @@ def _written() -> IsotropicFunction:
     import sympy
 
     ratio, beta, stretch, r = scalars("stretch_time_ratio", "beta", "Lambda", "r")
-    where = {
-        "Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3),
-        "r": 2 / ratio * (1 - 1 / stretch),
-    }
+    where = {"Lambda": sympy.sqrt(1 + scalars("tr(sigma)") / 3), "r": 2 / ratio * (1 - 1 / stretch)}
     return IsotropicFunction({"I": r, "sigma": r * (1 + beta / stretch)}, where, _LETTERS)
 
 

@@ -5,8 +5,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, State, as_parameter
-from discover.laws.named import NamedLaw
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, State, as_parameter
 from discover.laws.textbook.rolie_poly import NAMED as MONODISPERSE
 from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like

@@ -14,20 +14,23 @@ the first, and none repeats its search.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
+from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
-from discover.learners.tbnn_ude.least_squares import law_misfit
-from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
-from discover.learners.tbnn_ude.recipe_default import train_along, train_constants
+from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit
+from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
+from discover.learners.tbnn_ude.recipes import train_along, train_constants
 from discover.learners.tbnn_ude.session import Progress
+from discover.protocols.protocol import FlowProtocol
+from discover.simulate.solve import SimulationError, observe
+from tensor_library.algebra import TENSOR_NAMES
 
 FITS = 1.25
 """A member whose misfit is so many times the least is no explanation of the data.
@@ -107,16 +110,9 @@ def choose_member(
     The likeliest of those that fit; without noise, the fewest varying tensors among those of nearly
     the least misfit. A median of laws would be no law.
 
-    Parameters
-    ----------
-    members
-        All of them; where constants suffice the first alone has seen all runs and is taken.
-    misfits
-        Relative misfit of each on all runs.
-    resolved
-        Relative misfit that a rheometer does not resolve.
-    surprise
-        From `evidence.surprises`, where noise hides more than that.
+    `members`: all of them; where constants suffice the first alone has seen all runs and is taken.
+    `misfits`: relative misfit of each on all runs. `resolved`: relative misfit that a rheometer
+    does not resolve. `surprise`: from `evidence.surprises`, where noise hides more than that.
     """
     least = float(np.min(misfits))
     fits = misfits <= max(FITS * least, resolved)
@@ -135,3 +131,50 @@ def member_misfits(
     """Return the relative misfit of every law; infinite where it runs away."""
     misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in laws])
     return np.where(np.isfinite(misfits), misfits, np.inf)
+
+
+@dataclass(frozen=True)
+class MemberPredictions:
+    """What every member of an ensemble predicts in one flow.
+
+    `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that runs away.
+    """
+
+    times: Float[np.ndarray, " n"]  # in s, shape (n,)
+    sigma12: Float[np.ndarray, "members n"]
+    N1: Float[np.ndarray, "members n"]
+    N2: Float[np.ndarray, "members n"]
+
+    def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+        """Return the lowest and the highest prediction at each time; nan where all ran away.
+
+        `quantity`: ``"sigma12"``, ``"N1"`` or ``"N2"``.
+        """
+        values = getattr(self, quantity)
+        kept = values[~np.any(np.isnan(values), axis=1)]
+        if not len(kept):
+            return np.full(self.times.shape, np.nan), np.full(self.times.shape, np.nan)
+        return np.min(kept, axis=0), np.max(kept, axis=0)
+
+
+def member_predictions(
+    fluids: Sequence[Fluid], protocol: FlowProtocol, times: Float[np.ndarray, " n"]
+) -> MemberPredictions:
+    """Return what is recorded of every member in a flow, and its normal stress differences.
+
+    `fluids`: the members, as `TBNNUDE.ensemble_fluids_` holds them.
+    """
+    rows = np.full((3, len(fluids), len(times)), np.nan)
+    for i, fluid in enumerate(fluids):
+        try:
+            rows[:, i] = observe(fluid, protocol, times).T
+        except SimulationError:
+            continue  # that it ran away is the answer
+    return MemberPredictions(np.asarray(times, dtype=float), *rows)
+
+
+def coefficient_spread(members: Sequence[TensorBasisNetwork], cloud: Cloud) -> dict[str, float]:
+    """Return, by tensor, the standard deviation of gₙ over members, rms over states of training."""
+    values = np.stack([np.asarray(cloud.coefficients(member)) for member in members])
+    rms = np.sqrt(np.mean(np.var(values, axis=0), axis=0))
+    return dict(zip(TENSOR_NAMES, map(float, rms), strict=True))

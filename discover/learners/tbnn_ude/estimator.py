@@ -15,36 +15,39 @@ from sklearn.utils.validation import check_is_fitted
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.forward.enough_steps import in_enough_steps
-from discover.forward.fluids import observed_in_batch
+from discover.forward.fluids import in_enough_steps, observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files.provenance import Provenance
+from discover.learners.files import Provenance
 from discover.learners.known_part import KnownPart
-from discover.learners.rough_grid import rough_limits
 from discover.learners.run_prediction import RunPrediction
+from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
 from discover.learners.settings import PerMode, default_library
-from discover.learners.shorter_holds import shortened_rightly, shorter_where_it_pays
-from discover.learners.tbnn_ude.ensemble import choose_member, member_misfits, train_others
-from discover.learners.tbnn_ude.evidence import surprises
-from discover.learners.tbnn_ude.least_squares import law_misfit
-from discover.learners.tbnn_ude.prior import Cloud, sample_states
-from discover.learners.tbnn_ude.problem import STRAIN_STEP, TrainingProblem, make_problem
-from discover.learners.tbnn_ude.projection import Projection, project
-from discover.learners.tbnn_ude.recipe import DefaultRecipe, Trained
-from discover.learners.tbnn_ude.recipe_default import train_default, work
-from discover.learners.tbnn_ude.recipe_paper import PaperRecipe, train_paper
-from discover.learners.tbnn_ude.spread import (
+from discover.learners.tbnn_ude.ensemble import (
     MemberPredictions,
+    choose_member,
     coefficient_spread,
+    member_misfits,
     member_predictions,
+    train_others,
 )
+from discover.learners.tbnn_ude.evidence import surprises
+from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
+from discover.learners.tbnn_ude.problem import (
+    STRAIN_STEP,
+    DefaultRecipe,
+    Trained,
+    TrainingProblem,
+    make_problem,
+)
+from discover.learners.tbnn_ude.projection import Projection, project
+from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
-from tensor_library.integrity_basis import TENSOR_NAMES
+from tensor_library.algebra import TENSOR_NAMES
 from tensor_library.library import TermLibrary
 
 RECIPES = ("default", "thorough", "paper")

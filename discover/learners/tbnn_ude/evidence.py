@@ -18,11 +18,15 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import law_misfit, relative_misses
-from discover.learners.tbnn_ude.prior import cloud_of
+from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import Along, side_by_side, trajectories
-from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
+from discover.learners.tbnn_ude.variational import (
+    Along,
+    Rebuild,
+    rebuilt,
+    side_by_side,
+    trajectories,
+)
 
 
 def surprises(
@@ -61,24 +65,15 @@ def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
 
 
 def posterior_draws(
-    law: TensorBasisNetwork,
-    problem: TrainingProblem,
-    keys: Key[Array, " draws"],
-    fits: float,
+    law: TensorBasisNetwork, problem: TrainingProblem, keys: Key[Array, " draws"], fits: float
 ) -> list[TensorBasisNetwork]:
     """Return laws around a trained one that fit the data about as well.
 
     They are drawn from the Gaussian of Laplace's approximation. Where the law is bent, or the noise
     correlated, it reaches beyond the laws that fit: a draw is halved until it does.
 
-    Parameters
-    ----------
-    law
-        Trained on the problem, with coefficients that vary.
-    keys
-        One for each draw.
-    fits
-        Largest relative misfit over that of the law.
+    `law`: trained on the problem, with coefficients that vary. `keys`: one for each draw. `fits`:
+    largest relative misfit over that of the law.
     """
     along = trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))

@@ -9,7 +9,7 @@ from jaxtyping import Float
 from scipy.optimize import minimize_scalar
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.learners.tbnn_ude.prior import Cloud
+from discover.learners.tbnn_ude.least_squares import Cloud
 from discover.programs import compiled, on_device
 from tensor_library.library import TermLibrary
 
@@ -24,20 +24,13 @@ SIMILAR = 1.05
 class Projection:
     """A sparse expansion of a network's extra term.
 
-    Attributes
-    ----------
-    coefficients
-        Their least-squares coefficients, shape (n,).
-    inner
-        Inner parameters of the chosen terms' closed forms.
-    misfit
-        Norm of what is left over that of the extra term, all four components, over the states
+    `misfit`: norm of what is left over that of the extra term, all four components, over the states
         that training visited, each with the weight that the record gives its mode.
     """
 
     library: TermLibrary | None
-    coefficients: Float[np.ndarray, " n"]
-    inner: Float[np.ndarray, " m"]
+    coefficients: Float[np.ndarray, " n"]  # their least-squares coefficients, shape (n,)
+    inner: Float[np.ndarray, " m"]  # inner parameters of the chosen terms' closed forms
     misfit: float
 
 

@@ -1,24 +1,109 @@
 """What the rounds of one training share, and the rounds that every law goes through."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
+from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.initial_law import constant_scale, without_empty_terms
-from discover.learners.tbnn_ude.least_squares import Objective, minimise, relative_misses
-from discover.learners.tbnn_ude.prior import (
+from discover.learners.tbnn_ude.least_squares import (
     Cloud,
+    Objective,
     PriorWeights,
     cloud_of,
+    least_variation,
+    minimise,
+    parts,
+    relative_misses,
     reweighted,
 )
-from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.recipe import DefaultRecipe
-from discover.learners.tbnn_ude.variational import Along, trajectories
-from discover.learners.tbnn_ude.weights import Rebuild, rebuilt
+from discover.learners.tbnn_ude.problem import DefaultRecipe, TrainingProblem
+from discover.learners.tbnn_ude.variational import Along, Rebuild, rebuilt, trajectories
+from discover.programs import compiled, on_device
+from tensor_library.algebra import scalar_invariants
+
+
+@eqx.filter_jit
+def initial_law(
+    key: PRNGKeyArray,
+    width: int,
+    linear_relaxation: bool,
+    invariant_scale: Float[Array, "8"],
+    base_law: AbstractConstitutiveLaw | None = None,
+) -> TensorBasisNetwork:
+    """Return a law with h = 0: the last layer starts at zero, the hidden ones at random."""
+    law = TensorBasisNetwork.initialise(key, width, 2, linear_relaxation)
+    law = eqx.tree_at(lambda tree: tree.base, law, base_law, is_leaf=lambda leaf: leaf is None)
+    last = law.network.layers[-1]
+    law = eqx.tree_at(
+        lambda tree: (tree.network.layers[-1].weight, tree.network.layers[-1].bias),
+        law,
+        (jnp.zeros_like(last.weight), jnp.zeros_like(last.bias)),
+    )
+    return eqx.tree_at(
+        lambda tree: tree.invariant_scale, law, invariant_scale, is_leaf=lambda leaf: leaf is None
+    )
+
+
+def without_network(
+    linear_relaxation: bool, base_law: AbstractConstitutiveLaw | None = None
+) -> TensorBasisNetwork:
+    """Return a law with h = 0 whose coefficients are constants."""
+    zero = on_device(np.zeros(N_COEFFICIENTS))
+    return TensorBasisNetwork(
+        network=None,
+        constants=zero,
+        network_mask=zero,
+        linear_relaxation=linear_relaxation,
+        base=base_law,
+    )
+
+
+@compiled
+def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
+    """Return the root mean square of every invariant, or one where it vanishes."""
+    invariants = jax.vmap(scalar_invariants)(cloud.stress, cloud.rate)
+    shares = (cloud.weight**2 / jnp.mean(cloud.weight**2))[:, None]
+    size = jnp.sqrt(jnp.mean(shares * invariants**2, axis=0))
+    return jnp.where(size > 1e-12, size, 1.0)
+
+
+@compiled
+def constant_scale(cloud: Cloud) -> Float[Array, "8"]:
+    """Return the unit of each constant: one over the root mean square of its tensor."""
+    size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
+    return 1.0 / jnp.maximum(size, 1e-6)
+
+
+def with_tensors(law: TensorBasisNetwork, tensors: np.ndarray) -> TensorBasisNetwork:
+    """Return the law in which the coefficients of these tensors may vary."""
+    mask = jnp.asarray(tensors, dtype=law.network_mask.dtype)
+    return eqx.tree_at(lambda tree: tree.network_mask, law, mask)
+
+
+def without_empty_terms(
+    law: TensorBasisNetwork, cloud: Cloud, removed_below: float
+) -> TensorBasisNetwork:
+    """Return the law without the terms, and the variations, that the prior has emptied."""
+    amount, variation = (
+        np.sqrt(np.mean(np.asarray(rows) ** 2, axis=0)) for rows in parts(law, cloud)
+    )
+    limit = removed_below * max(float(np.max(amount)), 1e-12)
+    present = amount > limit
+    varying = present & (variation > limit) & (np.asarray(law.network_mask) > 0)
+    # A coefficient that stops varying keeps its mean
+    mean = np.mean(np.asarray(cloud.coefficients(law)), axis=0)
+    constants = np.where(varying, np.asarray(law.constants), np.where(present, mean, 0.0))
+    return eqx.tree_at(
+        lambda tree: (tree.constants, tree.network_mask),
+        law,
+        (jnp.asarray(constants), jnp.asarray(varying, dtype=law.network_mask.dtype)),
+    )
+
 
 Progress = Callable[[int, int, float], None]
 
@@ -146,3 +231,118 @@ _MOST_POLISHES = 3
 
 PRIOR_SHARE = 1e-6
 """Strength of the prior while functions are learned. It only settles what the data leave open."""
+
+
+_POLISHED = 2
+_CLOSE = 1.5  # what lies further behind the best of a race is not polished
+_MORE_ROUNDS = 4  # with the least penalty, while they pay: near laws that run away steps are short
+_STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds more than noise
+
+
+def race_of_functions(
+    session: Session, start: TensorBasisNetwork
+) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+    """Return the best law of few tensors with varying coefficients, before and after polish."""
+    chosen = np.zeros(N_COEFFICIENTS, bool)
+    law, misfit = start, np.inf
+    penalised = law
+    for _ in range(session.recipe.max_tensors):
+        # first the best constant on each tensor: from h = 0 a whole network's first step
+        # overshoots; then a race of functions, in which those far behind are given up
+        starts = []
+        for tensor in np.flatnonzero(~chosen):
+            tensors = chosen.copy()
+            tensors[tensor] = True
+            start = session.round(with_tensors(law, tensors), 0.0, tensors, False, START_STEPS)
+            starts.append((session.misfit(start), int(tensor), start, tensors))
+        trials, pace = [], None
+        for _, tensor, start, tensors in sorted(starts, key=lambda s: s[:2]):
+            before = len(session.misfits)
+            trial = session.round(start, PRIOR_SHARE, tensors, True, session.recipe.steps, pace)
+            trials.append((session.misfit(trial), tensor, trial))
+            if min(trials, key=lambda trial: trial[:2])[1] == tensor:
+                pace = session.misfits[before:]
+        trials.sort(key=lambda trial: trial[:2])
+        if not trials[0][0] < misfit:
+            break
+        tensor, penalised, law = _polished(session, trials, chosen)
+        if not session.taken:
+            session.passed_over = [t for _, t, _ in trials if t != tensor]
+        session.taken.append(tensor)
+        chosen[tensor] = True
+        misfit = session.misfit(law)
+        if misfit < session.recipe.resolved or session.settled(law):
+            break
+    return penalised, law
+
+
+def _polished(
+    session: Session, trials: Sequence[tuple[float, int, TensorBasisNetwork]], chosen: np.ndarray
+) -> tuple[int, TensorBasisNetwork, TensorBasisNetwork]:
+    """Return the tensor that does best in the end, and its law before and after polish.
+
+    The race says little of what a few more steps make of the next ones: before a second tensor
+    is asked for, the first has to be the right one.
+    """
+    ends = []
+    for reached, tensor, trial in trials[:_POLISHED]:
+        if reached > _CLOSE * trials[0][0]:
+            break
+        tensors = chosen.copy()
+        tensors[tensor] = True
+        law = trial if session.settled(trial) else session.polish(trial, reached, tensors)
+        ends.append((session.misfit(law), tensor, trial, law))
+        if ends[-1][0] < session.recipe.resolved or session.settled(law):
+            return tensor, trial, law
+    _, tensor, trial, law = min(ends, key=lambda end: end[:2])
+    return tensor, trial, law
+
+
+def nearly_constant_functions(
+    session: Session, start: TensorBasisNetwork, constants: Float[Array, "8"]
+) -> list[TensorBasisNetwork]:
+    """Return laws whose coefficients vary as little as the residual allows, the last the best.
+
+    Those before it are held to less variation still.
+    """
+    everything = np.ones(N_COEFFICIENTS, bool)
+    law = with_tensors(start, everything)
+    law = eqx.tree_at(lambda tree: tree.constants, law, constants)
+    found = []
+    before = np.inf
+    variations = session.recipe.variations
+    for number, strength in enumerate([*variations, *_MORE_ROUNDS * variations[-1:]]):
+        prior = least_variation(jnp.asarray(strength))
+        law = session.round(law, strength, everything, True, session.recipe.steps, prior=prior)
+        misfit = session.misfit(law)
+        if misfit < before:  # the same law twice is no second opinion
+            found.append(law)
+        settled, gains = session.settled(law), misfit <= _STILL_GAINS * before
+        through = number + 1 >= len(variations)
+        if (settled and not gains) or (through and (settled or not gains)):
+            break
+        before = misfit
+    return found
+
+
+def functions_along(
+    session: Session, start: TensorBasisNetwork, groups: Sequence[Sequence[int]]
+) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+    """Return a law that takes tensors group by group, without a race, as far as that pays."""
+    chosen = np.zeros(N_COEFFICIENTS, bool)
+    law, misfit = start, np.inf
+    penalised = law
+    for group in groups:
+        tensors = chosen.copy()
+        tensors[list(group)] = True
+        trial = session.round(with_tensors(law, tensors), 0.0, tensors, False, START_STEPS)
+        trial = session.round(trial, PRIOR_SHARE, tensors, True, session.recipe.steps)
+        polished, reached = trial, session.misfit(trial)
+        if not session.settled(trial):
+            polished = session.polish(trial, reached, tensors)
+        if session.misfit(polished) < misfit:
+            chosen, law, penalised, misfit = tensors, polished, trial, session.misfit(polished)
+            session.taken = [int(t) for t in np.flatnonzero(chosen)]
+        if misfit < session.recipe.resolved or session.settled(law):
+            break
+    return penalised, law

@@ -6,44 +6,195 @@ through a tiny network give it together with ∂f/∂θ, where one forward pass 
 hundreds.
 """
 
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jax.custom_derivatives import SymbolicZero
+from jax.flatten_util import ravel_pytree
+from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from discover.forward.cheap_tangents import with_cheap_tangents
 from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
-from discover.forward.integrators.at_given_rate import follow
+from discover.forward.integrators.stepping import follow
 from discover.forward.starts.steady_states import steady_state
 from discover.laws.each_mode import over_modes
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.weights import Rebuild
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
-from tensor_library.contraction import contracted
+from tensor_library.algebra import contracted
+from tensor_library.kinematics import VelocityGradient
+
+
+def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
+    """Return the trainable part of a law (network and constants) and the rest."""
+    spec = jax.tree.map(lambda _: False, law)
+    spec = eqx.tree_at(
+        lambda tree: (tree.network, tree.constants),
+        spec,
+        (jax.tree.map(eqx.is_inexact_array, law.network), True),
+        is_leaf=lambda leaf: leaf is None,  # a law of constants has no network
+    )
+    return eqx.partition(law, spec)
+
+
+def weights_of(law: TensorBasisNetwork) -> Float[Array, " p"]:
+    """Return all trainable numbers of a law: those of the network, then the eight constants."""
+    return ravel_pytree(split_law(law)[0])[0]
+
+
+def _count_of(law: TensorBasisNetwork) -> int:
+    return sum(leaf.size for leaf in jax.tree.leaves(split_law(law)[0]))
+
+
+def places_of(law: TensorBasisNetwork) -> TensorBasisNetwork:
+    """Return the law with every trainable number replaced by its place in `weights_of`."""
+    leaves, structure = jax.tree.flatten(split_law(law)[0])
+    ends = np.cumsum([leaf.size for leaf in leaves])
+    # on the host, so that it is known while a program is traced
+    return structure.unflatten(
+        np.arange(end - leaf.size, end).reshape(leaf.shape)
+        for end, leaf in zip(ends, leaves, strict=True)
+    )
+
+
+class Rebuild(eqx.Module):
+    """Makes a law from a vector that holds some of its numbers.
+
+    The variational equation carries a column for every entry of the vector, so numbers that never
+    move in a round are left out of it; those that merely happen not to are held by a mask, which
+    needs no other program.
+    """
+
+    template: TensorBasisNetwork  # a law; what is not in the vector comes from it
+    positions: Int[Array, " q"]  # place of each entry among all trainable numbers, shape (q,)
+    moves: Bool[Array, " q"]  # false where an entry keeps the template's value, shape (q,)
+    scale: Float[Array, " q"]  # size of each entry's unit, shape (q,)
+
+    @classmethod
+    def everything(cls, law: TensorBasisNetwork) -> "Rebuild":
+        """Return the vector of all trainable numbers."""
+        n = _count_of(law)
+        return cls(law, jnp.arange(n), jnp.ones(n, bool), jnp.ones(n))
+
+    @classmethod
+    def of_constants(
+        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
+    ) -> "Rebuild":
+        """Return the vector of the eight constants.
+
+        `law`: the template. `moving`: which of them move. `scale`: unit of each: a constant is as
+        large as the stress that it contributes.
+        """
+        n = _count_of(law)
+        positions = on_device(np.arange(n - N_COEFFICIENTS, n))
+        return cls(law, positions, on_device(np.asarray(moving)), on_device(np.asarray(scale)))
+
+    @classmethod
+    def with_network(
+        cls, law: TensorBasisNetwork, moving: Bool[ArrayLike, "8"], scale: Float[ArrayLike, "8"]
+    ) -> "Rebuild":
+        """Return the vector of the network's weights, then the eight constants.
+
+        Output weights of tensors that do not move act on nothing and are left out, so the length
+        depends on how many move, not on which.
+
+        Parameters as in `of_constants`; `moving` must be known when a program is compiled.
+        """
+        moving = np.asarray(moving)
+        network: Any = places_of(law).network
+        last = network.layers[-1]  # its bias is there: it was made with one
+        idle = np.append(last.weight[~moving], last.bias[~moving])
+        positions = np.setdiff1d(np.arange(_count_of(law)), idle)
+        of_network = np.ones(positions.size - N_COEFFICIENTS)
+        return cls(
+            law,
+            jnp.asarray(positions),
+            jnp.concatenate([jnp.asarray(of_network, bool), jnp.asarray(moving)]),
+            jnp.concatenate([jnp.asarray(of_network), jnp.asarray(scale)]),
+        )
+
+    @property
+    def start(self) -> Float[Array, " q"]:
+        """The vector that makes the template."""
+        return _start(self)
+
+    def __call__(self, weights: Float[Array, " q"]) -> TensorBasisNetwork:
+        """Return the law with these numbers."""
+        dynamic, static = split_law(self.template)
+        held, unravel = ravel_pytree(dynamic)
+        moved = jnp.where(self.moves, self.scale * weights, held[self.positions])
+        return eqx.combine(unravel(held.at[self.positions].set(moved)), static)
+
+
+@compiled
+def _start(rebuild):
+    return weights_of(rebuild.template)[rebuild.positions] / rebuild.scale
+
+
+@compiled
+def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork:
+    """Return the law with these numbers, by one compiled program."""
+    return rebuild(weights)
+
+
+def with_cheap_tangents(
+    stress_rate: Callable[[Any, Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
+    given: Any,
+) -> Callable[[Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]]:
+    """Return the rate of a law whose tangents cost little, however many there are.
+
+    Four pullbacks give the derivative by stress, rate and every number of the law at once; each
+    tangent is then a product with a small matrix, where one through the law evaluates all of it.
+
+    `stress_rate`: of what is given, of a tree of numbers by which is differentiated, of σ and of
+    λL. `given`: a tree through which no derivative passes.
+    """
+    # what is traced has to be handed in: a rule for derivatives must not close over it
+    arrays, rest = eqx.partition(given, eqx.is_array)
+
+    def of_all(arrays, numbers, stress, gradient):
+        return stress_rate(eqx.combine(arrays, rest), numbers, stress, gradient)
+
+    rate = jax.custom_jvp(of_all)
+
+    def tangent(primals, tangents):
+        arrays, *moving = primals
+        still = [isinstance(leaf, SymbolicZero) for leaf in jax.tree.leaves(tangents[1])]
+        if all(still):
+            # few tangents, of the state or of the rate, are carried through the law
+            flow = [
+                jnp.zeros_like(value) if isinstance(moved, SymbolicZero) else moved
+                for value, moved in zip(moving[1:], tangents[2:], strict=True)
+            ]
+            return jax.jvp(partial(of_all, arrays, moving[0]), tuple(moving[1:]), tuple(flow))
+        value, pull = jax.vjp(partial(of_all, arrays), *moving)
+        rows = jax.vmap(pull)(jnp.eye(value.shape[0]))
+        total = jnp.zeros_like(value)
+        pairs = zip(*map(jax.tree.leaves, (rows, tuple(tangents[1:]))), strict=True)
+        for row, moved in pairs:
+            if not isinstance(moved, SymbolicZero):
+                total = total + jnp.tensordot(row, moved, axes=moved.ndim)
+        return value, total
+
+    rate.defjvp(tangent, symbolic_zeros=True)
+    return partial(rate, arrays)
 
 
 class Along(NamedTuple):
     """What a law makes of the runs, at their samples.
 
-    Attributes
-    ----------
-    recorded
-        What is recorded, in Pa, of creep the strain, shape (runs, n).
-    states
-        Dimensionless stress of every mode, shape (runs, n, k, 4).
-    rate
-        In 1/s, shape (runs, n).
+    `recorded`: what is recorded, in Pa, of creep the strain, shape (runs, n).
     """
 
     recorded: Float[Array, "runs n"]
-    states: Float[Array, "runs n k 4"]
-    rate: Float[Array, "runs n"]
+    states: Float[Array, "runs n k 4"]  # dimensionless stress of every mode, shape (runs, n, k, 4)
+    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
 
 
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:

@@ -16,11 +16,10 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
-from discover.learners.files.provenance import Provenance
+from discover.learners.files import Provenance
 from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import PerMode, check_library, default_library
-from discover.learners.tensor_sindy.library_problem import library_problem
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.report import (
     by_evidence,
@@ -32,10 +31,11 @@ from discover.learners.tensor_sindy.report import (
     recovered_terms,
     rival_table,
 )
-from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.tensor_sindy.selection import (
+from discover.learners.tensor_sindy.search import (
+    SupportSearch,
     choose_by_held_out,
     choose_by_one_standard_error,
+    library_problem,
 )
 from discover.progress import Progress, by_lines
 from tensor_library.library import TermLibrary

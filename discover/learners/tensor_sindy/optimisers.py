@@ -24,15 +24,11 @@ _RIDGE = 1e-8  # columns have unit norm: enough to make collinear ones solvable,
 class SparseSolution:
     """One solution of a sparse linear problem.
 
-    Attributes
-    ----------
-    support
-        Positions of the non-zero coefficients, increasing.
-    coefficients
-        All coefficients as the optimiser left them: thresholded or penalised, not refitted.
+    `coefficients`: all coefficients as the optimiser left them: thresholded or penalised, not
+        refitted.
     """
 
-    support: tuple[int, ...]
+    support: tuple[int, ...]  # positions of the non-zero coefficients, increasing
     coefficients: Float[np.ndarray, " n"]
 
 
@@ -61,18 +57,11 @@ def solve_sparse(
     Columns are brought to unit norm and the target too, so that one threshold means the same in
     every problem: the share of the signal that a term must carry.
 
-    Parameters
-    ----------
-    optimizer
-        A name of `OPTIMISERS`, or a pysindy optimiser, which is used as it is set.
-    design, target
-        The linear problem design @ c ≈ target.
-    max_terms
-        Largest support of interest to a forward method.
+    `optimizer`: a name of `OPTIMISERS`, or a pysindy optimiser, which is used as it is set.
+    `design`, `target`: the linear problem design @ c ≈ target. `max_terms`: largest support of
+    interest to a forward method.
 
-    Returns
-    -------
-    Solutions with different, non-empty supports.
+    Returns solutions with different, non-empty supports.
     """
     check_optimiser(optimizer)
     norms = np.linalg.norm(design, axis=0)

@@ -7,16 +7,16 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.inference.engine.fits import Fit
-from discover.learners.results.recovered_term import RecoveredTerm
+from discover.learners.results import RecoveredTerm
 from discover.learners.settings import ARITHMETIC
 from discover.learners.tensor_sindy.optimisers import default_support, solve_sparse
-from discover.learners.tensor_sindy.search import SupportSearch
-from discover.learners.tensor_sindy.selection import (
+from discover.learners.tensor_sindy.search import (
+    SupportSearch,
     choose_by_held_out,
     choose_by_one_standard_error,
 )
 from discover.statistics import HALF_BAND
-from discover.statistics.projection import rms
+from discover.statistics.noise.noise_model import rms
 
 _CLOSE = 5.0
 """Log odds beyond which evidence against a law is very strong   [Kass & Raftery 1995]."""
@@ -118,9 +118,7 @@ def _described(search: SupportSearch, fit: Fit) -> dict[str, Any]:
 
 
 def path_table(
-    search: SupportSearch,
-    path: Sequence[Fit],
-    held_out: Float[np.ndarray, "path runs"] | None,
+    search: SupportSearch, path: Sequence[Fit], held_out: Float[np.ndarray, "path runs"] | None
 ) -> list[dict[str, Any]]:
     """Return one row for each member of the path: support, size, misfits, log evidence.
 

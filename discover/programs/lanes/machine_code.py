@@ -10,9 +10,14 @@ from typing import Any
 import llvmlite.binding as llvm
 import llvmlite.ir as ir
 
-from discover.programs.fingerprint import NotDescribable, fingerprint
 from discover.programs.lanes.arithmetic import DOUBLE, DOUBLES, INTEGER
-from discover.programs.store import load_program, program_folder, save_program
+from discover.programs.store import (
+    NotDescribable,
+    fingerprint,
+    load_program,
+    program_folder,
+    save_program,
+)
 
 _LOGGER = logging.getLogger(__name__)
 

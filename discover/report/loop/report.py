@@ -4,21 +4,27 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from discover.loop.loop_result import LoopResult
-from discover.plain_json import json_text
+from discover.plain_numbers import json_text
 from discover.protocols.kinematics import in_words
-from discover.report.answer_screen import answer_screen
 from discover.report.loop import tables
-from discover.report.loop.verdict import loop_verdict
+from discover.report.loop.tables import loop_verdict
 from discover.report.overlay import Overlay
-from discover.report.page import made_by, render, safe_name
+from discover.report.page import answer_screen, made_by, render, safe_name
 from discover.report.plots.by_mode import by_mode_picture
-from discover.report.plots.loop.errors import ranking_picture, run_error_picture, waterfall_picture
-from discover.report.plots.loop.free_form import free_form_picture
-from discover.report.plots.loop.lissajous import lissajous_picture
-from discover.report.plots.loop.next_test import next_test_picture
-from discover.report.plots.loop.residual import reading_picture, residual_picture
-from discover.report.plots.loop.rivals import rivals_picture
-from discover.report.plots.loop.runs import runs_picture
+from discover.report.plots.loop.residual import (
+    ranking_picture,
+    reading_picture,
+    residual_picture,
+    run_error_picture,
+    waterfall_picture,
+)
+from discover.report.plots.loop.runs import (
+    free_form_picture,
+    lissajous_picture,
+    next_test_picture,
+    rivals_picture,
+    runs_picture,
+)
 from discover.report.plots.residual_map import loop_residual_map
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
 from discover.report.wording import SMALL_FAULTS
@@ -37,22 +43,12 @@ def write_loop(
 ) -> Path:
     """Write ``report.html``, ``loop.json``, ``equations.tex``, ``predictions.csv`` and the figures.
 
-    Parameters
-    ----------
-    name, summary
-        Title, and the data and declared model in words.
-    study_text
-        The study file, shown at the end.
-    run
-        What the page says of the run that made it, where that was no command.
-    conditions
-        Material and temperature, for the title.
-    overlays
-        Curves that the study asks for beside the models.
+    `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
+    file, shown at the end. `run`: what the page says of the run that made it, where that was no
+    command. `conditions`: material and temperature, for the title. `overlays`: curves that the
+    study asks for beside the models.
 
-    Returns
-    -------
-    The page.
+    Returns the page.
     """
     pictures = [
         waterfall_picture(result),

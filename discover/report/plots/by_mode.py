@@ -16,8 +16,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
-from discover.report.wording import effect_title, interval, readable, significant
-from discover.words import listed
+from discover.words import effect_title, interval, listed, readable, significant
 
 _DEGREES = (
     "one constant for all modes",
@@ -29,25 +28,16 @@ _TRIED = ("linear", "quadratic", "free")
 
 
 def by_mode_picture(
-    constants: Mapping[str, ConstantByMode], is_unexplained: bool, left_out: str = ""
+    constants: Mapping[str, ConstantByMode], is_unexplained: bool
 ) -> Picture | None:
     """Return each constant by mode with its band; None where there is none.
 
-    Parameters
-    ----------
-    constants
-        By name of the parameter, the effect or the term.
-    is_unexplained
-        Whether a law with these constants leaves more than noise.
-    left_out
-        What was not fitted, to save time, in words.
+    `constants`: by name of the parameter, the effect or the term. `is_unexplained`: whether a law
+    with these constants leaves more than noise.
     """
     if not constants:
         return None
-    with figure(1, len(constants), width=9.0, height=2.8) as (
-        drawing,
-        axes,
-    ):
+    with figure(1, len(constants), width=9.0, height=2.8) as (drawing, axes):
         for panel, (name, constant) in zip(axes[0], constants.items(), strict=True):
             told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
             if told:
@@ -77,7 +67,7 @@ def by_mode_picture(
             "by_mode",
             f"{said}{doubt} Intervals take it that the law is the fluid's. They hold one degree "
             "more than was chosen, where one was tried, and modes that are free where more of them "
-            f"are told than a parabola has constants. {left_out}".rstrip(),
+            "are told than a parabola has constants.",
         )
 
 

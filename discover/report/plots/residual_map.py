@@ -34,16 +34,11 @@ _TOO_HIGH, _TOO_LOW = SPARSE, NETWORK
 class ResidualRow:
     """The residual of one run.
 
-    Attributes
-    ----------
-    along
-        Time or strain, increasing, shape (n,).
-    values
-        Prediction minus data over the run's root-mean-square stress, shape (n,).
+    `values`: prediction minus data over the run's root-mean-square stress, shape (n,).
     """
 
     name: str
-    along: Float[np.ndarray, " n"]
+    along: Float[np.ndarray, " n"]  # time or strain, increasing, shape (n,)
     values: Float[np.ndarray, " n"]
 
 

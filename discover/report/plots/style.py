@@ -11,16 +11,50 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.cbook import is_math_text
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from discover.learners.registry import LEARNERS
-from discover.report.palette import style_sheet
+
+COLOURS = {
+    "paper": ("#ffffff", "#16181b"),
+    "ink": ("#1c1d1f", "#e8e9eb"),
+    "soft": ("#5a5d63", "#a5a9b0"),
+    "line": ("#d8dadd", "#3a3e44"),
+    "card": ("#f5f6f7", "#1f2226"),
+    "accent": ("#0072b2", "#56b4e9"),
+    "truth": ("#1c1d1f", "#f2f3f5"),
+    "before": ("#75787e", "#949aa2"),
+    "sparse": ("#d55e00", "#ff8b3d"),
+    "network": ("#0072b2", "#56b4e9"),
+    "measured": ("#6b6e74", "#9da2aa"),
+    "green": ("#009e73", "#2fc79c"),
+    "purple": ("#b5558d", "#e39cc5"),
+    "yellow": ("#b87f00", "#f0b840"),
+    "grid": ("#e2e4e7", "#33373d"),
+    "shade": ("#eef0f2", "#2c3138"),
+}
+"""Name of the CSS variable, without dashes → its value in light and in dark."""
+
+
+def style_sheet() -> str:
+    """Return the CSS that sets every colour, and changes it where a reader prefers the dark."""
+    light, dark = (
+        " ".join(f"--{name}:{pair[i]};" for name, pair in COLOURS.items()) for i in range(2)
+    )
+    # what is printed is printed on white, whatever the screen
+    return (
+        f":root {{ {light} }}\n"
+        f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {dark} }} }}"
+    )
+
 
 # Stand-ins, each a value of its own: CSS variables of the palette take their place where a picture
 # follows light and dark.
@@ -122,25 +156,16 @@ def learner_colour(name: str) -> str:
 class Picture:
     """A figure as SVG.
 
-    Attributes
-    ----------
-    name
-        File name without extension.
-    caption
-        What it shows and how to read it.
-    svg
-        A stand-alone SVG document.
-    axes
-        Of each panel its box in the SVG's own units and the ends of its axes, for a page that reads
-        values off: ``box`` (left, top, width, height), ``x`` and ``y`` (low, high, logarithmic).
-        An axis of names has no ends.
-    switched
-        Names of curves that a page can hide; the elements of the i-th have ids ``run{i}-...``.
+    `axes`: of each panel its box in the SVG's own units and the ends of its axes, for a page that
+        reads values off: ``box`` (left, top, width, height), ``x`` and ``y`` (low, high,
+        logarithmic). An axis of names has no ends.
+    `switched`: names of curves that a page can hide; the elements of the i-th have ids
+        ``run{i}-...``.
     """
 
-    name: str
-    caption: str
-    svg: str
+    name: str  # file name without extension
+    caption: str  # what it shows and how to read it
+    svg: str  # a stand-alone SVG document
     axes: tuple[dict, ...] = ()
     switched: tuple[str, ...] = ()
 
@@ -202,12 +227,8 @@ def figure(rows: int, columns: int, width: float = 9.0, height: float = 2.6) -> 
 
     The figure is not pyplot's: a notebook that writes a report keeps its own pictures and backend.
 
-    Parameters
-    ----------
-    rows, columns
-        Number of panels.
-    width, height
-        Of the whole figure and of one row, in inches.
+    `rows`, `columns`: number of panels. `width`, `height`: of the whole figure and of one row, in
+    inches.
     """
     with only_settings(_SETTINGS):
         drawing = Figure(figsize=(width, height * rows), layout="constrained")
@@ -220,12 +241,7 @@ def panels_of(
 ) -> Iterator[tuple]:
     """Yield a figure, its axes, and as many panels as are asked for; those left over are hidden.
 
-    Parameters
-    ----------
-    count, columns
-        Number of panels, and how many stand side by side at most.
-    width, height
-        As of `figure`.
+    `count`, `columns`: number of panels, and how many stand side by side at most.
     """
     columns = min(columns, count)
     with figure(-(-count // columns), columns, width, height) as (drawing, axes):
@@ -311,10 +327,7 @@ def runs_through_decades(
     A rate that was measured rises before it is constant; samples that crowd at early times say the
     same.
 
-    Parameters
-    ----------
-    times, shear_rate
-        Of one run, in s and 1/s.
+    `times`, `shear_rate`: of one run, in s and 1/s.
     """
     positive = times[times > 0]
     if not positive.size or positive[-1] <= _DECADES * positive[0]:
@@ -347,3 +360,47 @@ def make_percentage(axis) -> None:
 
     axis.set_major_formatter(FuncFormatter(lambda value, position: f"{value:g}"))
     axis.set_minor_formatter(FuncFormatter(between))
+
+
+def in_last_cycle(times: Float[np.ndarray, " n"], frequency: float) -> Bool[np.ndarray, " n"]:
+    """Return which samples lie in the last cycle, a little more so that it closes.
+
+    `times` in s, increasing, shape (n,). `frequency`: angular, in 1/s.
+    """
+    return times >= times[-1] - 2.0 * np.pi / frequency * 1.02
+
+
+def about_middle(
+    strain: Float[np.ndarray, " n"], cycle: Bool[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """Return the strain about the middle of the range that it has in a cycle."""
+    return strain - 0.5 * (strain[cycle].max() + strain[cycle].min())
+
+
+def shade_between(
+    panel,
+    along: Float[np.ndarray, " n"],
+    low: Float[np.ndarray, " n"],
+    high: Float[np.ndarray, " n"],
+    **style,
+) -> None:
+    """Shade what lies between two curves, also where `along` goes back and forth.
+
+    There a fill between the curves as a whole would shade the inside of a loop and a bar where it
+    begins and ends, and not what the band sweeps.
+
+    `panel`: axes of matplotlib. `along`, `low`, `high`: where the curves stand, and the curves,
+    shape (n,). `style`: of the shade, as for `matplotlib.axes.Axes.fill_between`.
+    """
+    if np.all(np.diff(along) >= 0.0):
+        panel.fill_between(along, low, high, **style)
+        return
+    before, after = np.stack([along, low], axis=-1), np.stack([along, high], axis=-1)
+    forth = np.stack([before[:-1], before[1:], after[1:], after[:-1], before[:-1]], axis=1)
+    forth = forth[np.all(np.isfinite(forth), axis=(1, 2))]
+    # all in one sense, for pieces of opposite senses that overlap would take each other out
+    back = forth[:, 1, 0] < forth[:, 0, 0]
+    forth[back] = forth[back, ::-1]
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    path = Path(forth.reshape(-1, 2), codes * len(forth))
+    panel.add_patch(PathPatch(path, **style))

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 from scipy.linalg import matmul_toeplitz, solve_toeplitz
 from scipy.signal import lfilter, lfiltic
 from scipy.stats import chi2
@@ -22,14 +23,13 @@ class NoiseModel:
 
     `coefficients`: φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
     `correlation`: of samples k apart, from k = 0, shape (longest sequence,).
-    `variance`: of each sequence, shape (sequences,).
     `effective_samples`: number of independent samples whose mean would be as uncertain as that of
         all sequences.
     """
 
     coefficients: Float[np.ndarray, " order"]
     correlation: Float[np.ndarray, " n"]
-    variance: Float[np.ndarray, " sequences"]
+    variance: Float[np.ndarray, " sequences"]  # of each sequence, shape (sequences,)
     effective_samples: float
 
     def covariance_times(self, sequence: int, columns: Float[np.ndarray, "n q"]) -> np.ndarray:
@@ -127,3 +127,127 @@ def _coefficients(covariance: np.ndarray, total: int) -> np.ndarray:
 def _sum_of_correlations(correlation: np.ndarray, n: int) -> float:
     lags = np.arange(1, n)
     return float(n + 2.0 * np.sum((n - lags) * correlation[1:n]))
+
+
+HALF_BAND = 1.96
+"""Standard deviations of half of a 95 % band."""
+
+_UNSEEN = 1e-14
+"""Of the largest eigenvalue of SᵀS, its columns made of length one: below it is only rounding."""
+
+_OPEN = 100.0
+"""Standard deviation of what no sample sees, in units in which every column has length one: so far
+off, either of two parameters that cancel changes the residual a hundredfold of its unit."""
+
+
+def root_of(covariance: Float[np.ndarray, "p p"]) -> Float[np.ndarray, "p p"]:
+    """Return R with RRᵀ a covariance: its columns are independent, each a standard deviation."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(np.clip(values, 0.0, None))
+
+
+def least_squares_covariance(
+    columns: Float[np.ndarray, "rows p"],
+    residual: Float[np.ndarray, " rows"],
+    sequences: Sequence[Int[np.ndarray, " _"]],
+    shared: Float[np.ndarray, "rows k"] | None = None,
+    sizes: Sequence[float] | None = None,
+) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
+    """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
+
+    Where a sensitivity is not finite, both are infinite. What no sample sees has no inverse: there
+    (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C is far larger than any finding.
+
+    `columns`: sensitivities S. `sequences`: rows of each sequence of observations, in the order of
+    time. `shared`: Z of errors Z u that all rows share, u of unit variance, beside the noise; None
+    for none. `sizes`: of the noise of each sequence, if it is taken to be the same in all, as
+    `noise_model` takes them.
+    """
+    if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
+        # of a law that runs away beside its fit: nothing is known of its constants
+        told = [np.nan_to_num(residual[rows], posinf=0.0, neginf=0.0) for rows in sequences]
+        nothing = np.full((columns.shape[1],) * 2, np.inf)
+        return nothing, nothing, noise_model(told, columns.shape[1], sizes)
+    noise = noise_model([residual[rows] for rows in sequences], columns.shape[1], sizes)
+    # columns of like size, or the pseudo-inverse would drop what is merely small
+    norms = np.linalg.norm(columns, axis=0)
+    norms = np.where(norms > 0, norms, 1.0)
+    scaled = columns / norms
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    seen = values > _UNSEEN * np.max(values, initial=0.0)
+    inverse = vectors[:, seen] / values[seen] @ vectors[:, seen].T
+    unseen = _OPEN**2 * vectors[:, ~seen] @ vectors[:, ~seen].T
+    middle = sum(
+        scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
+    )
+    if shared is not None:
+        common = scaled.T @ shared
+        middle = middle + common @ common.T
+    squares = np.outer(norms, norms)
+    return (inverse @ middle @ inverse + unseen) / squares, inverse / squares, noise
+
+
+def independent_samples(values: Float[np.ndarray, " n"]) -> float:
+    """Return the number of independent samples that a correlated sequence is worth.
+
+    n/(1 + 2 Σ ρ_k), summed up to the first lag at which nothing is correlated any more   [Geyer
+    1992, Stat. Sci. 7, 473, for sums that end where the correlation is lost]. Of a smooth sequence
+    this counts its swings and not its samples, so it does not depend on how densely it was
+    sampled; with the correlation of neighbours alone, the count would fall the more one measures.
+    """
+    n = len(values)
+    power = float(np.sum(values**2))
+    if power == 0.0 or n < 3:
+        return max(1.0, float(n))
+    spectrum = np.abs(np.fft.rfft(values, 2 * n)) ** 2
+    correlation = np.fft.irfft(spectrum)[:n] / power
+    lost = np.flatnonzero(correlation <= 0.0)
+    together = float(np.sum(correlation[1 : lost[0] if len(lost) else n]))
+    return max(1.0, n / (1.0 + 2.0 * together))
+
+
+_FEWEST = 10  # values, from which on their repeats are a rule
+_ALIKE = 0.8  # share of them that is read equally often
+
+
+def read_times(record: Float[np.ndarray, " n"]) -> int:
+    """Return how often each value of a record is read; 1 where values are new, or repeat by chance.
+
+    A coarse converter repeats values too, but not all of them equally often.
+    """
+    lengths = np.diff(np.flatnonzero(np.diff(record)))
+    if len(lengths) < _FEWEST:
+        return 1
+    often = int(np.median(lengths))
+    return often if np.mean(lengths == often) > _ALIKE else 1
+
+
+_ROUNDING = 1e-9  # of the largest singular value, columns made of length one
+
+
+def rms(values: ArrayLike) -> float:
+    """Return the root of the mean of the squares."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
+    """Return what the columns cannot describe of values, shape (m,) or (m, k)."""
+    norms = np.linalg.norm(columns, axis=0)
+    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
+    if not kept.shape[1]:
+        return values
+    return values - kept @ np.linalg.lstsq(kept, values, rcond=_ROUNDING)[0]
+
+
+def squared_distance(
+    difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
+) -> float:
+    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
+
+    By singular values: draws that nearly run away spread so far that the k × k matrix of Woodbury's
+    identity is singular to rounding.
+    """
+    _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
+    along = rows @ difference
+    beside = difference - along @ rows
+    return float(beside @ beside + np.sum((along / np.hypot(1.0, sizes)) ** 2))

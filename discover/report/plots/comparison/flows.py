@@ -8,7 +8,6 @@ from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
 from discover.report.overlay import Overlay
-from discover.report.plots.cycles import about_middle, in_last_cycle, shade_between
 from discover.report.plots.style import (
     BEFORE_STYLE,
     INK,
@@ -18,7 +17,9 @@ from discover.report.plots.style import (
     SPARSE,
     TRUTH_STYLE,
     Picture,
+    about_middle,
     figure,
+    in_last_cycle,
     label_rows,
     learner_style,
     legend_above,
@@ -27,9 +28,9 @@ from discover.report.plots.style import (
     panels_of,
     picture,
     runs_through_decades,
+    shade_between,
 )
-from discover.report.wording import FIGURE_SYMBOLS
-from discover.words import listed
+from discover.words import FIGURE_SYMBOLS, listed
 
 START_UP_SHOWN = 10.0
 

@@ -5,35 +5,36 @@ from typing import Any
 
 import numpy as np
 
+from discover.comparison.comparison import Comparison
+from discover.comparison.flows import QUANTITIES
+from discover.learners.registry import learner_title
+from discover.report.plots.comparison.flows import curves, units
 from discover.report.plots.style import (
     BEFORE,
     GREEN,
+    INK,
     NETWORK,
     PURPLE,
     SPARSE,
     TRUTH,
     Picture,
     figure,
+    learner_style,
     legend_above,
     make_percentage,
     picture,
 )
-from discover.report.wording import readable
+from discover.report.wording import percent
+from discover.words import FIGURE_SYMBOLS, readable
 
 _MOST_BARS = 8
-_RULE_STYLES = {
-    "evidence": (SPARSE, "o", "evidence"),
-    "held_out": (NETWORK, "s", "held-out runs"),
-}
+_RULE_STYLES = {"evidence": (SPARSE, "o", "evidence"), "held_out": (NETWORK, "s", "held-out runs")}
 
 
 def selection_picture(details: Mapping[str, Any]) -> Picture | None:
     """Return the selection path: misfits, evidence, and how probable each term is.
 
-    Parameters
-    ----------
-    details
-        Of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
+    `details`: of the sparse learner's result: ``path``, ``selectors``, ``inclusion``.
     """
     path = details.get("path") or []
     if len(path) < 2:
@@ -101,3 +102,202 @@ def selection_picture(details: Mapping[str, Any]) -> Picture | None:
 def _percentage(share: float | None) -> float:
     """Return a share in per cent for a logarithmic axis; NaN, a gap, where there is none."""
     return np.nan if share is None else 100.0 * max(share, 1e-9)
+
+
+def loss_picture(comparison: Comparison) -> Picture:
+    """Return the loss of each learner against its iterations."""
+    outcomes = {n: o for n, o in comparison.outcomes.items() if o.loss_history[0].size}
+    with figure(1, max(len(outcomes), 1), height=2.6) as (drawing, axes):
+        for panel, (name, outcome) in zip(axes[0], outcomes.items(), strict=False):
+            iterations, losses = outcome.loss_history
+            positive = np.where(np.isfinite(losses), np.maximum(losses, 1e-30), np.nan)
+            panel.semilogy(iterations, positive, color=learner_style(name)["color"])
+            panel.set_title(learner_title(name))
+            panel.set_xlabel(
+                "support refitted" if name == "tensor_sindy" else "optimiser iteration"
+            )
+            panel.set_ylabel(
+                "best squared relative misfit" if name == "tensor_sindy" else "training loss"
+            )
+        return picture(
+            drawing,
+            "loss",
+            "Loss while learning. The sparse learner's is the best misfit so far over the supports "
+            "it refitted; the two scales are not comparable.",
+        )
+
+
+def third_harmonic(stress: np.ndarray) -> float:
+    """Return I₃/I₁ of one cycle, sampled evenly with the end equal to the beginning.
+
+    Zero for an ellipse.
+    """
+    spectrum = np.abs(np.fft.rfft(stress[:-1]))
+    return float(spectrum[3] / spectrum[1]) if spectrum[1] > 0 else 0.0
+
+
+def high_deborah_picture(comparison: Comparison) -> Picture | None:
+    """Return Lissajous curves that become elliptical as De grows."""
+    flows = comparison.flows_of("high_deborah")
+    if not flows:
+        return None
+    stress_unit, _, rate_label = units(comparison)
+    with figure(1, len(flows), height=2.8) as (drawing, axes):
+        for panel, flow in zip(axes[0], flows, strict=True):
+            for label, style, stresses in curves(comparison, flow):
+                if "sigma12" in stresses:
+                    # the first sample is rest at t = 0, the others one late cycle
+                    panel.plot(flow.rate[1:], stresses["sigma12"][1:], label=label, **style)
+            harmonic = third_harmonic(flow.reference["sigma12"][1:])
+            deborah = float(np.max(np.asarray(flow.protocol.frequencies)))
+            panel.set_title(f"De = {deborah:g}, I₃/I₁ = {100 * harmonic:.2g} %")
+            panel.set_xlabel(f"shear rate {rate_label}")
+        axes[0, 0].set_ylabel("σ₁₂" + stress_unit)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "high_deborah",
+            "γ̇ = 3 cos(De t), one cycle after the transient. As De grows the stress has no time to "
+            "change the structure within a cycle, and the strain, 3/De, falls: the curve becomes "
+            "an ellipse (quasi-linear LAOS) although the rate is large. A law that names the rate, "
+            "such as Johnson–Segalman's, would bend it at any De if the strain were above one. "
+            "I₃/I₁ is the third harmonic of the truth over the first.",
+        )
+
+
+def sweep_picture(comparison: Comparison) -> Picture | None:
+    """Return stress in the test flow, and errors, over the swept parameter."""
+    points = comparison.sweep
+    if not points:
+        return None
+    from discover.laws.registry import LAWS
+    from discover.report.plots.style import TRUTH_STYLE
+
+    laws = list(dict.fromkeys(p.law for p in points))
+    values = list(dict.fromkeys(p.value for p in points))
+    stress_unit, _, rate_label = units(comparison)
+    with figure(len(laws), len(values) + 1, width=11.0, height=2.4) as (drawing, axes):
+        for row, law in zip(axes, laws, strict=True):
+            mine = [p for p in points if p.law == law]
+            for panel, point in zip(row, mine, strict=False):
+                late = point.flow.times > 0.75 * point.flow.times[-1]
+                rate = point.flow.rate[late]
+                truth = point.flow.reference["sigma12"][late]
+                panel.plot(rate, truth, label="truth", **TRUTH_STYLE)
+                for name, outcome in point.outcomes.items():
+                    prediction = outcome.predictions[point.flow.key]
+                    if prediction is not None:
+                        panel.plot(
+                            rate,
+                            prediction["sigma12"][late],
+                            label=learner_title(name),
+                            **learner_style(name),
+                        )
+                panel.set_title(f"{readable(point.parameter)} = {point.value:g}")
+                panel.set_xlabel(rate_label)
+            row[0].set_ylabel(f"{LAWS[law].title}\nσ₁₂{stress_unit}")
+            for name in mine[0].outcomes:
+                for quantity, marker in (("sigma12", "o"), ("N1", "^")):
+                    errors = [p.errors()[name][quantity] for p in mine]
+                    row[-1].semilogy(
+                        [p.value for p in mine],
+                        [np.nan if e is None else 100.0 * max(e, 1e-8) for e in errors],
+                        marker=marker,
+                        markersize=4,
+                        color=learner_style(name)["color"],
+                        label=f"error, {'σ₁₂' if quantity == 'sigma12' else 'N₁'}, "
+                        f"{learner_title(name)}",
+                    )
+            row[-1].set_title("error in this flow (%)")
+            row[-1].set_xlabel(readable(points[0].parameter))
+        legend_above(drawing, axes, columns=4)
+        return picture(
+            drawing,
+            "sweep",
+            f"The comparison again over {readable(points[0].parameter)}, "
+            f"in {points[0].flow.title}: late Lissajous curves of σ₁₂, and on the right the "
+            "relative errors of σ₁₂ and N₁.",
+        )
+
+
+_STRONGEST = 0.55  # more would drown the number in the cell
+_TOLD = 10.0  # a larger relative error is no more than that in a cell
+_LOWEST, _HIGHEST = 1e-4, 1.0
+"""Relative errors at which the colour of a cell begins and ends."""
+
+Cells = Mapping[tuple[float, float], float | None]
+
+
+def error_map_picture(comparison: Comparison) -> Picture | None:
+    """Return the error of the known part and of each learner over Wi and De."""
+    if not comparison.flows_of("pipkin"):
+        return None
+    rows = {"before": "before", **{n: learner_title(n) for n in comparison.outcomes}}
+    with figure(len(rows), 3, width=10.0, height=2.5) as (drawing, axes):
+        for row, (who, title) in zip(axes, rows.items(), strict=True):
+            table = comparison.error_map(who)
+            for panel, quantity in zip(row, QUANTITIES, strict=True):
+                cells = {place: errors[quantity] for place, errors in table.items()}
+                _draw_cells(panel, cells, NETWORK)
+                panel.set_title(f"{FIGURE_SYMBOLS[quantity]}, {title}")
+                _mark_training(panel, comparison, cells)
+        _label(axes)
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "pipkin_error",
+            "Pipkin map of error: relative L2 error in one late cycle of γ̇ = Wi cos(De t), N₂'s "
+            "relative to N₁; a dash where the law diverges. Open circles: flows whose σ₁₂ the "
+            "learners saw. Away from them a law is an extrapolation.",
+        )
+
+
+def _draw_cells(panel, cells: Cells, colour: str) -> None:
+    """Draw one number a cell, the deeper the larger on a logarithmic scale."""
+    weissenberg, deborah = _axes_of(cells)
+    for (wi, de), value in cells.items():
+        x, y = deborah.index(de), weissenberg.index(wi)
+        strength = 0.0 if value is None else _strength(value)
+        panel.bar(x, 1.0, 1.0, y - 0.5, color=colour, alpha=strength * _STRONGEST, linewidth=0)
+        text = "∞" if value == np.inf else percent(value).replace(" %", "")
+        if value is not None and _TOLD < value < np.inf:
+            text = f"> {100 * _TOLD:.0f}"  # a rival on its way to running away
+        panel.text(x, y - 0.12, text, ha="center", va="center", fontsize=8, color=INK)
+    panel.set_xticks(range(len(deborah)), [f"{v:g}" for v in deborah])
+    panel.set_yticks(range(len(weissenberg)), [f"{v:g}" for v in weissenberg])
+    panel.set_xlim(-0.5, len(deborah) - 0.5)
+    panel.set_ylim(-0.5, len(weissenberg) - 0.5)
+    panel.grid(False)
+
+
+def _strength(value: float) -> float:
+    span = np.log(_HIGHEST / _LOWEST)
+    return float(np.clip(np.log(max(value, 1e-300) / _LOWEST) / span, 0.0, 1.0))
+
+
+def _axes_of(cells: Cells) -> tuple[list[float], list[float]]:
+    return sorted({wi for wi, _ in cells}), sorted({de for _, de in cells})
+
+
+def _mark_training(panel, comparison: Comparison, cells: Cells) -> None:
+    """Mark the flows of training above the numbers, between cells where they lie on none."""
+    weissenberg, deborah = (np.asarray(v) for v in _axes_of(cells))
+    for flow in comparison.flows_of("training"):
+        if flow.oscillatory and flow.frequency:
+            x = np.interp(np.log(flow.frequency), np.log(deborah), np.arange(deborah.size))
+            y = np.interp(np.log(flow.amplitude), np.log(weissenberg), np.arange(weissenberg.size))
+            panel.plot(
+                x, y + 0.28, "o", ms=4.5, mfc="none", mew=1.0, color=TRUTH,
+                label="trained on (σ₁₂)",
+            )  # fmt: skip
+
+
+def _label(axes) -> None:
+    for panel in axes[-1]:
+        panel.set_xlabel("De = λω")
+    for panel in axes[:, 0]:
+        panel.set_ylabel("Wi = λγ̇₀")
+    for panel in axes.ravel():
+        panel.annotate(
+            "%", (1.0, 1.02), xycoords="axes fraction", ha="right", fontsize=8, color=INK
+        )

@@ -10,11 +10,13 @@ from discover.report.plots.loop.runs import (
     along_in_common,
     axis_label,
     models_of,
+    shortened,
     symbol_of,
     through_decades,
 )
 from discover.report.plots.style import (
     BEFORE,
+    GREEN,
     INK,
     Picture,
     figure,
@@ -22,8 +24,11 @@ from discover.report.plots.style import (
     literal,
     make_logarithmic,
     make_percentage,
+    panels_of,
     picture,
 )
+from discover.report.wording import percent
+from discover.words import effect_title
 
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
@@ -143,3 +148,106 @@ def _draw_waves(panel, readings) -> None:
             panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)
     panel.set_xticks(range(len(parts)), parts, rotation=30)
     panel.set_ylabel("residual (% of fundamental)")
+
+
+MOST_RANKED = 12
+"""Candidates of a stage that are shown, the best."""
+
+
+def waterfall_picture(result: LoopResult) -> Picture:
+    """Return the errors after each stage."""
+    labels = ["declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    pairs = [result.error_before, *(stage.error for stage in result.stages)]
+    with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
+        panel = axes[0, 0]
+        positions = np.arange(len(labels))
+        held_out = [p.held_out for p in pairs if p.held_out is not None]
+        judged = len(held_out) == len(pairs)
+        series = [("fitted runs", FIT_COLOUR, [p.fit for p in pairs], -0.19 if judged else 0.0)]
+        if judged:
+            series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
+        for label, colour, values, shift in series:
+            heights = 100.0 * np.array(values, dtype=float)
+            bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
+            panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
+            _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
+        panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
+        make_percentage(panel.yaxis)
+        heights = [100.0 * value for _, _, values, _ in series for value in values]
+        panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
+        panel.set_xticks(positions, labels)
+        panel.set_xlim(-0.6, max(len(labels), 2) - 0.4)  # a bar alone would fill the picture
+        if len(labels) > 4:  # long names side by side would run into one another
+            panel.tick_params(axis="x", labelsize=8, labelrotation=15)
+        panel.set_ylabel("relative error (%)")
+        legend_above(drawing, axes)
+        return picture(
+            drawing,
+            "waterfall",
+            "Error after each effect added: root mean square of prediction minus measurement over "
+            "the root-mean-square stress, mean over runs."
+            + " Lines: from the best run to the worst."
+            * (len(result.records) > 1),
+        )
+
+
+def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> None:
+    """Draw the range over the runs behind each mean."""
+    errors = [r.errors for r in result.records if r.held_out is held_out]
+    if len(errors) < 2:
+        return
+    table = 100.0 * np.stack(errors)
+    places = np.arange(table.shape[1]) + shift - 0.16  # beside the label of the bar
+    panel.vlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
+
+
+def ranking_picture(result: LoopResult) -> Picture | None:
+    """Return what each candidate would remove of the residual, stage by stage."""
+    rankings = [ranking for ranking in result.rankings if ranking]
+    if not rankings:
+        return None
+    with panels_of(len(rankings), 3, width=10.0, height=3.0) as (drawing, _, panels):
+        for number, (panel, ranking) in enumerate(zip(panels, rankings, strict=True)):
+            best = ranking[:MOST_RANKED][::-1]
+            chosen = result.stages[number].effect if number < len(result.stages) else None
+            panel.barh(
+                [effect_title(c.effect) for c in best],
+                [100.0 * max(c.score, 0.0) for c in best],
+                color=[GREEN if c.effect == chosen else BEFORE for c in best],
+            )
+            panel.set_xlim(0, 100)
+            kept = any(c.effect == chosen for c in best)
+            said = "" if kept else ": taken later" if chosen else ": none added"
+            panel.set_title(f"stage {number + 1}{said}")
+            panel.set_xlabel("squared residual explained (%)")
+            panel.tick_params(axis="y", labelsize=7.5)
+        return picture(
+            drawing,
+            "ranking",
+            "What each candidate would explain of the squared residual of the fitted runs, to "
+            "first order, given what is fitted already; in green the one that was added. "
+            "Evidence chooses among sets of effects, so it need not be the longest bar.",
+        )
+
+
+def run_error_picture(result: LoopResult) -> Picture:
+    """Return the error of every run before and after, or of the declared model alone."""
+    records = result.records
+    model = "augmented" if any(len(r.errors) > 1 for r in records) else "declared"
+    with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
+        panel = axes[0, 0]
+        for position, record in enumerate(records[::-1]):
+            before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
+            colour = HELD_COLOUR if record.held_out else FIT_COLOUR
+            panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
+            if model == "augmented":
+                panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
+            label = f"{model}, {'held out' if record.held_out else 'fitted'}"
+            panel.plot(after, position, "o", color=colour, label=label)
+        panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
+        panel.set_ylim(-0.6, len(records) - 0.4)
+        make_percentage(panel.xaxis)
+        panel.set_xlabel("relative error (%)")
+        legend_above(drawing, axes)
+        told = "before and after" if model == "augmented" else "of the declared model"
+        return picture(drawing, "run_errors", f"Residual by run: error {told}.")

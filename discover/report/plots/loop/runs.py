@@ -5,17 +5,26 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.ticker import EngFormatter
 
-from discover.loop import LoopResult, RunRecord
+from discover.loop import RunRecord
+from discover.loop.loop_result import LoopResult
+from discover.loop.waves import oscillation
 from discover.protocols.kinematics import MODULI
 from discover.report.overlay import Overlay
-from discover.report.plots.cycles import shade_between
 from discover.report.plots.style import (
     BEFORE,
+    CHOSEN_STYLE,
+    INK,
+    MEASURED,
     NETWORK,
     OVERLAY_STYLES,
+    RIVAL_STYLES,
+    SHADE,
     SPARSE,
     TRUTH,
     Picture,
+    about_middle,
+    figure,
+    in_last_cycle,
     label_rows,
     legend_above,
     literal,
@@ -23,8 +32,11 @@ from discover.report.plots.style import (
     panels_of,
     picture,
     runs_through_decades,
+    shade_between,
 )
-from discover.report.wording import FIGURE_SYMBOLS, percent, recorded_symbol
+from discover.report.wording import free_form_sentence, percent, recorded_symbol
+from discover.statistics.noise.noise_model import rms
+from discover.words import FIGURE_SYMBOLS, effect_title, effects_title
 
 Samples = slice | np.ndarray
 """Which samples of a run, as an index."""
@@ -121,14 +133,8 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
 def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
     """Draw the measured stress, the declared and the augmented model of one run.
 
-    Parameters
-    ----------
-    panel
-        Axes of matplotlib.
-    along
-        What the stress is drawn against, shape (n,).
-    marked, shown
-        Which samples are marked as measured, and between which the models are drawn.
+    `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
+    `shown`: which samples are marked as measured, and between which the models are drawn.
     """
     if record.band is not None:
         low, high = record.band[:, shown]
@@ -188,3 +194,170 @@ def shortened(name: str) -> str:
         return name
     end = _LONGEST_NAME // 2
     return f"{name[: _LONGEST_NAME - end - 1]}…{name[-end:]}"
+
+
+_MOST_DRAWN = 4
+
+
+def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture | None:
+    """Return σ12 against strain and against rate in the last cycle, or None without oscillation.
+
+    The widest runs are shown, those held out before those fitted.
+    """
+    found = [(r, w) for r in result.records if (w := oscillation(r)) is not None]
+    found.sort(key=lambda pair: (not pair[0].held_out, -float(np.ptp(pair[0].strain))))
+    shown = found[:_MOST_DRAWN]
+    if not shown:
+        return None
+    with figure(2, len(shown), width=10.0, height=2.3) as (drawing, axes):
+        for column, (record, frequency) in enumerate(shown):
+            last = in_last_cycle(record.time, frequency)
+            strain = about_middle(record.strain, last)
+            for panel, along in ((axes[0, column], strain), (axes[1, column], record.rate)):
+                if not np.all(last):
+                    panel.plot(
+                        along, record.measured, ".", ms=1.2, alpha=0.5, color=MEASURED,
+                        label="measured, all cycles", zorder=1,
+                    )  # fmt: skip
+                draw_run(panel, record, along, last, last)
+                draw_overlays(panel, record, overlays, along, last)
+                _frame(panel, record.measured)
+            axes[0, column].set_title(short_title(record), fontsize=8)
+            axes[0, column].set_xlabel("strain γ")
+            axes[1, column].set_xlabel("γ̇ (1/s)")
+        axes[0, 0].set_ylabel("elastic: σ₁₂ (Pa)")
+        axes[1, 0].set_ylabel("viscous: σ₁₂ (Pa)")
+        legend_above(drawing, axes)
+        left = (
+            f" The {_MOST_DRAWN} widest of {len(found)} runs." if len(found) > _MOST_DRAWN else ""
+        )
+        return picture(
+            drawing,
+            "lissajous",
+            "Elastic (above) and viscous (below) Lissajous curves: models in the last cycle, "
+            f"measurements in all of them, faint. Over each the errors of the run.{left}",
+        )
+
+
+def _frame(panel, stress: np.ndarray) -> None:
+    low, high = float(stress.min()), float(stress.max())
+    margin = 0.6 * (high - low) or 1.0
+    panel.set_ylim(low - margin, high + margin)
+
+
+_AXES = {
+    "recorded_stress": ("true stress (Pa)", "recorded less true stress (Pa)"),
+    "drift": ("time on the instrument's clock (s)", "recorded less true stress (Pa)"),
+    "rate": ("shear rate (1/s)", "recorded less true stress (Pa)"),
+    "network": ("strain", "relative change of the stress"),
+    "position": ("strain, as the tool stands", "recorded less true stress (Pa)"),
+    "gap": ("strain, as the tool stands", "relative change of the stress"),
+    "phase": ("phase of the cycle, from the largest rate (rad)", "recorded less true stress (Pa)"),
+    "relaxation": ("{variable}, dimensionless", "relative change of the rate of relaxation"),
+    "breakdown": ("shear rate (1/s)", "rate at which structure breaks (1/s)"),
+    "slip": ("stress (Pa)", "rate taken by slip (1/s)"),
+}
+
+
+def free_form_picture(result: LoopResult) -> Picture | None:
+    """Return each free function with its band; None where there is none."""
+    forms = result.free_form
+    if not forms:
+        return None
+    with figure(1, len(forms), width=9.0, height=2.8) as (drawing, axes):
+        for panel, one in zip(axes[0], forms, strict=True):
+            panel.fill_between(one.grid, one.low95, one.high95, color=SHADE, label="95 % band")
+            panel.plot(one.grid, one.value, color=NETWORK, lw=1.5, label="free function")
+            panel.axhline(0.0, color="0.6", lw=0.6)
+            along, up = _AXES[one.slot]
+            panel.set_xlabel(along.format(variable=one.variable))
+            panel.set_ylabel(up)
+        legend_above(drawing, axes)
+        said = "; ".join(map(free_form_sentence, forms))
+        return picture(
+            drawing,
+            "free_form",
+            f"What nobody wrote down: {said}. The bands take it that it is of this variable alone.",
+        )
+
+
+def next_test_picture(result: LoopResult) -> Picture | None:
+    """Return the predictions of all explanations in the best test; None where none decides."""
+    following = result.next_tests
+    best = following.best
+    if best is None:
+        return None
+    with figure(1, 1, width=7.0, height=3.2) as (drawing, axes):
+        panel = axes[0, 0]
+        lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
+        for i, (effects, probability, curve) in enumerate(lines):
+            panel.plot(
+                best.samples,
+                curve,
+                **(RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE),
+                lw=2.0 if i == 0 else 1.4,
+                label=f"{effects_title(effects)} ({percent(probability)})",
+            )
+        unit = "" if best.quantity == "strain" else " (Pa)"
+        panel.set_ylabel(FIGURE_SYMBOLS[best.quantity] + unit)
+        panel.set_xlabel("shear rate (1/s)" if best.is_flow_curve else "time (s)")
+        if best.is_flow_curve or best.quantity in MODULI:
+            panel.set_xscale("log")
+            panel.set_yscale("log")
+        legend_above(drawing, axes, columns=1)
+        return picture(
+            drawing,
+            "next_test",
+            f"What to measure next: {best.title}. Each explanation as it predicts it, all of which "
+            f"fit these data; noise is {percent(following.noise)}.",
+        )
+
+
+_MOST_RIVALS, _COLUMNS = 6, 3
+
+
+def rivals_picture(result: LoopResult) -> Picture | None:
+    """Return the residual against time of each explanation; None where there is one alone.
+
+    The likeliest are shown, on one scale.
+    """
+    told = result.explanations.likeliest_first
+    records = [r for r in result.records if r.is_transient and r.by_explanation is not None]
+    if len(told) < 2 or not records:
+        return None
+    shown = told[:_MOST_RIVALS]
+    chosen = result.explanations.holding([stage.effect for stage in result.stages])
+    with panels_of(len(shown), _COLUMNS, width=10.0, height=2.1) as (drawing, axes, panels):
+        limit = 0.0
+        for place, (panel, one) in enumerate(zip(panels, shown, strict=True)):
+            for record in records:
+                assert record.by_explanation is not None
+                size = rms(record.measured) or 1.0
+                relative = 100.0 * (record.by_explanation[place] - record.measured) / size
+                panel.plot(
+                    record.time, relative, lw=0.9, alpha=0.8,
+                    color=HELD_COLOUR if record.held_out else FIT_COLOUR,
+                    label="held out" if record.held_out else "fitted",
+                )  # fmt: skip
+                limit = max(limit, float(np.percentile(np.abs(relative), 98)))
+            names = "\n+ ".join(map(effect_title, one.effects)) or "the declared model alone"
+            found = ", found by the search" if one is chosen else ""
+            panel.set_title(f"{names}\n({percent(one.probability)}{found})", fontsize=8)
+            panel.axhline(0.0, color=INK, lw=0.6)
+            if all(runs_through_decades(r.time, r.rate) for r in records):
+                make_logarithmic(panel.xaxis)
+        for panel in panels:
+            panel.set_ylim(-1.1 * limit - 1e-9, 1.1 * limit + 1e-9)
+        for panel in panels[-axes.shape[1] :]:  # below which there is none
+            panel.set_xlabel("time (s)")
+        for panel in axes[:, 0]:
+            panel.set_ylabel("residual (% of rms)")
+        legend_above(drawing, axes)
+        left = f" The {_MOST_RIVALS} likeliest of {len(told)}." if len(told) > _MOST_RIVALS else ""
+        return picture(
+            drawing,
+            "rivals",
+            "Prediction minus measurement of every run by each explanation, over the run's "
+            "root-mean-square, on one scale; over each panel its effects and their probability."
+            + left,
+        )

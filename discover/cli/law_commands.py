@@ -1,0 +1,318 @@
+"""Commands on laws: fit, export, distil, and the names that studies know."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from discover.cli.console import (
+    JsonOption,
+    OverwriteOption,
+    QuietOption,
+    guarded,
+    progress_bar,
+    say,
+)
+from discover.errors import InputError
+
+
+@guarded
+def fit(
+    law: Annotated[str, typer.Argument(help="Name of the law; see: discover laws.")],
+    data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
+    held_out: Annotated[
+        list[str] | None, typer.Option("--held-out", help="Run that only tests the fit.")
+    ] = None,
+    bounds: Annotated[
+        list[str] | None, typer.Option("--bounds", help="Range of a constant: alpha=0:0.5.")
+    ] = None,
+    start: Annotated[
+        list[str] | None, typer.Option("--start", help="Start of a constant: alpha=0.2.")
+    ] = None,
+    fixed: Annotated[
+        list[str] | None, typer.Option("--fix", help="Constant that is not fitted: alpha=0.2.")
+    ] = None,
+    solvent: Annotated[
+        bool, typer.Option("--solvent", help="Also fit a solvent viscosity.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for page, JSON and equation.")
+    ] = None,
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Fit one named law: constants, intervals, correlation, and how well it describes the runs."""
+    from discover.compilation_cache import enable_compilation_cache
+    from discover.dataset import load_dataset
+    from discover.first_use import enable_x64
+    from discover.fitting import fit as fit_law
+
+    enable_x64()
+    enable_compilation_cache()
+    ranges = {name: _bounds(name, text) for name, text in _pairs("bounds", bounds)}
+    numbers = [
+        {name: _number(option, name, text) for name, text in _pairs(option, given)}
+        for option, given in (("start", start), ("fix", fixed))
+    ]
+    dataset = load_dataset(data)
+    found = fit_law(
+        law,
+        dataset,
+        bounds=ranges,
+        start=numbers[0],
+        fixed=numbers[1],
+        effects={"solvent_viscosity": "fit"} if solvent else None,
+        held_out=held_out or (),
+    )
+    if out is not None:
+        _write(found, out, overwrite)
+    if as_json:
+        typer.echo(json.dumps(found.to_json(), indent=2))
+    elif not quiet:
+        say(found.text)
+        if found.constants:
+            say(found.summary().to_string(float_format="{:.4g}".format))
+        if len(found.constants) > 1:
+            say("Correlation:")
+            say(found.correlation.to_string(float_format="{:.2f}".format))
+        if out is not None:
+            say(f"Report: {(out / 'report.html').resolve()}")
+
+
+def _write(found, out: Path, overwrite: bool) -> None:
+    """Write the page and what stands beside it into a folder that holds nothing else."""
+    from discover.report.in_memory import fit_files, fit_page
+    from discover.study.run_folder import RunFolder
+
+    folder = RunFolder(out, json.dumps(found.to_json(), sort_keys=True), overwrite)
+    for name, text in fit_files(found).items():
+        folder.write(name, text)
+    folder.write("report.html", fit_page(found))
+    folder.finish()
+
+
+def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
+    for text in given or []:
+        if "=" not in text:
+            raise InputError(f"--{option} takes NAME=VALUE; got {text!r}.")
+    return [(name.strip(), value) for name, _, value in (t.partition("=") for t in given or [])]
+
+
+def _number(option: str, name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--{option} {name} must be a number; got {text!r}.") from None
+
+
+def _bounds(name: str, text: str) -> tuple[float, float]:
+    low, colon, high = text.partition(":")
+    if not colon:
+        raise InputError(f"--bounds {name} must be two numbers, low:high; got {text!r}.")
+    return _number("bounds", name, low), _number("bounds", name, high)
+
+
+@guarded
+def export(
+    results: Annotated[
+        Path,
+        typer.Argument(
+            help="Result folder of a finished compare or close-loop.", show_default=False
+        ),
+    ],
+    form: Annotated[
+        str, typer.Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
+    ] = "python",
+    law: Annotated[
+        str | None,
+        typer.Option("--law", help="Learner whose law to write; default: the sparse one."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="File to write; default: standard output.")
+    ] = None,
+    density: Annotated[
+        float | None,
+        typer.Option("--density", min=0.0, help="Density in kg/m3, for rheotool; default: 1000."),
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance",
+            min=0.0,
+            max=0.5,
+            help="For rheotool: accepted deviation from a law it knows; default: 0.01.",
+        ),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
+) -> None:
+    """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
+    from discover.equations.files import choose_law, read_result_laws, write_equation
+    from discover.errors import InputError
+    from discover.first_use import enable_x64
+    from discover.study.atomic import make_folder, replaceable, write_text
+
+    if density is not None and not 0.0 < density < math.inf:
+        raise InputError(f"--density must be a positive number of kg/m3; got {density}. Try 1000.")
+    if tolerance is not None and math.isnan(tolerance):
+        raise InputError("--tolerance must be a number from 0 to 0.5; got nan. Try 0.01.")
+    enable_x64()
+    equation = choose_law(read_result_laws(results), law)
+    text = write_equation(equation, form, density, tolerance)
+    if out is None:
+        # half a character in a title, which no terminal can show
+        typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)
+        return
+    if replaceable(out) is not None and not overwrite:
+        raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
+    make_folder(out.parent)
+    write_text(out, text)
+    say(f"{out} written.")
+
+
+PAPER_PAIRS = (
+    ("giesekus:alpha=0.2", "ucm"),
+    ("ptt_exponential:epsilon=0.2", "ucm"),
+    ("giesekus:alpha=0.2", "ptt_linear"),
+    ("giesekus:alpha=0.2", "fene_p"),
+    ("ptt_linear:epsilon=0.2", "giesekus"),
+    ("ptt_linear:epsilon=0.2", "fene_p"),
+    ("fene_p:L2=20", "giesekus"),
+    ("fene_p:L2=20", "ptt_linear"),
+)
+"""The two pairs of the paper and those it proposes."""
+
+
+@guarded
+def distil(
+    teacher: Annotated[
+        str | None,
+        typer.Option(
+            "--teacher", help="Law to imitate, with parameters, such as giesekus:alpha=0.2."
+        ),
+    ] = None,
+    student: Annotated[
+        str | None,
+        typer.Option("--student", help="Law to fit, such as ucm, or any other with a constant."),
+    ] = None,
+    penalty: Annotated[float, typer.Option("--penalty", help="Weight of the paper's penalty.")] = (
+        0.01
+    ),
+    quiet: QuietOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Fit one law to the shear stress of another; without options, for the paper's pairs."""
+    if (teacher is None) != (student is None):
+        raise InputError("Give --teacher and --student together, or neither for the paper's pairs.")
+    from discover.compilation_cache import enable_compilation_cache
+    from discover.first_use import enable_x64
+
+    enable_x64()
+    enable_compilation_cache()
+    from discover.laws.registry import make_law
+    from discover.learners.distillation import distil as teach
+
+    pairs = PAPER_PAIRS if teacher is None or student is None else ((teacher, student),)
+    rows = []
+    with progress_bar(quiet) as report:
+        for i, (source, pupil) in enumerate(pairs):
+            report(f"{source} teaches {pupil}", i / len(pairs))
+            law = make_law(*_parse_law(source))
+            rows.append({"teacher": source, **teach(law, pupil, penalty=penalty).as_dict()})
+    if as_json:
+        typer.echo(json.dumps(rows, indent=2))
+        return
+    typer.echo(
+        f"{'teacher':<30}{'student':<18}{'with penalty':<28}{'without':<28}{'σ12 misfit':>10}"
+    )
+    for row in rows:
+        typer.echo(
+            f"{row['teacher']:<30}{row['student']:<18}{_values(row['penalised']):<28}"
+            f"{_values(row['debiased']):<28}{100 * row['misfit']:>8.2f} %"
+        )
+    if teacher is None:
+        return
+    typer.echo("\nWhat is lost, as a share of each (of N2, as a share of N1):")
+    for flow, errors in rows[0]["errors"].items():
+        shown = "one of the two diverges" if errors is None else _values(errors, percent=True)
+        typer.echo(f"{flow:<14}{shown}")
+
+
+def _parse_law(text: str) -> tuple[str, dict[str, float]]:
+    from discover.dataset.importing.text_rows import is_number
+
+    name, _, rest = text.partition(":")
+    parameters = {}
+    for part in filter(None, rest.split(",")):
+        key, equals, value = part.partition("=")
+        # float() also reads 1_2, nan and digits of other scripts
+        if not equals or not is_number(value.strip()):
+            raise InputError(
+                f"Cannot read {part!r} in {text!r}; write parameters as name=number, such as "
+                "giesekus:alpha=0.2."
+            )
+        parameters[key.strip()] = float(value)
+    return name.strip(), parameters
+
+
+def _values(parameters: dict[str, float], percent: bool = False) -> str:
+    if percent:
+        return ", ".join(f"{key} {100 * value:.3g} %" for key, value in parameters.items())
+    return ", ".join(f"{key}={value:.4f}" for key, value in parameters.items())
+
+
+if TYPE_CHECKING:  # --help needs no tables
+    import pandas as pd
+
+
+@guarded
+def laws(as_json: JsonOption = False) -> None:
+    """List the laws that a study can name, including your own, with their parameters."""
+    from discover.laws import laws_table
+
+    _show(laws_table(), ("title",), as_json)
+
+
+@guarded
+def effects(as_json: JsonOption = False) -> None:
+    """List the effects that a loop can add, including your own, with their parameters."""
+    from discover.effects import effects_table
+
+    _show(effects_table(), ("kind",), as_json)
+
+
+def _show(table: "pd.DataFrame", said: tuple[str, ...], as_json: bool) -> None:
+    """Print a table of named things, which has a line for each of their parameters."""
+    entries: dict[str, dict[str, Any]] = {}
+    for line in table.reset_index(names="name").to_dict("records"):
+        words = {key: line[key] for key in ("name", *said, "source")}
+        entry = entries.setdefault(line["name"], {**words, "parameters": {}})
+        if line["parameter"]:
+            entry["parameters"][line["parameter"]] = {
+                "unit": line["unit"],
+                "low": _finite(line["low"]),
+                "high": _finite(line["high"]),
+                "range_scale": line.get("range_scale", "one"),
+            }
+    if as_json:
+        typer.echo(json.dumps(list(entries.values()), indent=2, ensure_ascii=False))
+        return
+    for entry in entries.values():
+        ranges = ", ".join(_range(*pair) for pair in entry["parameters"].items())
+        words = ", ".join(entry[key] for key in said)
+        say(f"{entry['name']:<32}{words:<26}{ranges or 'no parameter'}")
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _range(name: str, parameter: dict[str, Any]) -> str:
+    low, high = (
+        "open" if parameter[end] is None else f"{parameter[end]:g}" for end in ("low", "high")
+    )
+    scale = parameter["range_scale"].replace("_", " ")
+    unit = "" if parameter["unit"] in ("", "1") else f" {parameter['unit']}"
+    return f"{name} ({low} to {high}{unit if scale == 'one' else f' × {scale}'})"

@@ -1,0 +1,334 @@
+"""What is needed to follow runs of each control, padded, side by side."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax.typing import ArrayLike
+from jaxtyping import Array, Float, Int
+
+from discover.dataset import Run
+from discover.forward.grids.grid import make_grid, steps_of_half_cycle, stress_grid
+from discover.programs import on_device
+from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
+from discover.protocols.protocol import shear_rates
+
+_NEVER = -1.0
+
+
+class RateSteps(eqx.Module):
+    """Steps of the rate between two samples, with a leading axis of runs.
+
+    `start`, `end`: times of the samples in s; padding lies before any record.
+    `share`: of the interval at whose end the rate steps, where that is not fitted.
+    `place`: which of the fitted shares is its own; −1 where it is not fitted.
+    """
+
+    start: Float[Array, "*runs steps"]
+    end: Float[Array, "*runs steps"]
+    change: Float[Array, "*runs steps"]  # of the rate in 1/s
+    share: Float[Array, "*runs steps"]
+    place: Int[Array, "*runs steps"]
+
+    def in_rate(
+        self, rate: Float[Array, " m"], times: Float[Array, " m"], fitted: Float[Array, " fitted"]
+    ) -> Float[Array, " m"]:
+        """Return the rate of one run with its steps where they happen.
+
+        Between the two samples Simpson's rule gives the strain of each step of the integration, and
+        rates change smoothly with the instant on a grid that stays as it is.
+
+        `rate`, `times`: rate in 1/s at ends and middles of steps in turn, with a straight line
+        where it steps; and times in s. `fitted`: the fitted shares.
+        """
+        share = self.share
+        if fitted.shape[0]:
+            share = jnp.where(self.place < 0, share, fitted[self.place])
+        instant = self.start + share * (self.end - self.start)
+        ends = times[::2]
+        first, last = ends[:-1], ends[1:]
+        # of the two steps that meet at an end; beyond those of the record there is none
+        reach = jnp.concatenate([jnp.ones(1), ends[2:] - ends[:-2], jnp.ones(1)])
+
+        def added(start, end, change, instant):
+            at_ends = jnp.clip(0.5 + (ends - instant) / reach, 0.0, 1.0)
+            at_ends = jnp.where(ends <= start, 0.0, jnp.where(ends >= end, 1.0, at_ends))
+            strain = jnp.clip((last - instant) / (last - first), 0.0, 1.0)
+            in_middle = 1.5 * strain - 0.25 * (at_ends[:-1] + at_ends[1:])
+            stepped = jnp.zeros_like(times).at[::2].set(at_ends).at[1::2].set(in_middle)
+            straight = jnp.clip((times - start) / (end - start), 0.0, 1.0)
+            between = (times > start) & (times < end)
+            return change * jnp.where(between, stepped - straight, 0.0)
+
+        return rate + jnp.sum(jax.vmap(added)(self.start, self.end, self.change, instant), axis=0)
+
+    def padded(self, count: int) -> "RateSteps":
+        """Return as many steps of each run as asked for; those beyond its own never happen."""
+        beyond = ((0, 0), (0, count - self.start.shape[1]))
+        columns = (self.start, self.end, self.change, self.share, self.place)
+        fills = (_NEVER - 1.0, _NEVER, 0.0, 0.5, -1)
+        return RateSteps(
+            *(
+                on_device(np.pad(np.asarray(column), beyond, constant_values=fill))
+                for column, fill in zip(columns, fills, strict=True)
+            )
+        )
+
+
+def rate_steps(runs: Sequence[Run]) -> RateSteps | None:
+    """Return the steps of runs whose instants are fitted or were; None where there is none."""
+    most = max(len(run.rate_steps) for run in runs)
+    if not most:
+        return None
+    rows = np.full((len(runs), most, 4), [_NEVER - 1.0, _NEVER, 0.0, 0.5])
+    place = np.full((len(runs), most), -1)
+    for i, run in enumerate(runs):
+        for k, step in enumerate(run.rate_steps):
+            rows[i, k] = step.start, step.end, step.change, step.share
+            place[i, k] = -1 if step.place is None else step.place
+    start, end, change, share = (on_device(column) for column in np.moveaxis(rows, -1, 0))
+    return RateSteps(start, end, change, share, on_device(place))
+
+
+# An instrument effect acts within the first samples, so the first gap is divided this often
+_EARLY_STEPS = 0.5 ** np.arange(6)
+
+# Runs of more steps than this go on in steps that grow while the rate is constant: most of so long
+# a run is steady. Shorter ones keep the accuracy of small steps throughout
+_LONG, _GROWTH = 2000, 0.05
+
+# Least sizes of arrays that data sets share; of runs where they have no more steps than that
+_MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
+
+
+class TransientFlows(eqx.Module):
+    """Flows at a given rate in time on padded grids, with a leading axis of runs.
+
+    `times`: half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
+        what came before the record.
+    `strain_before`: total strain of the sample before each run, shape (runs,).
+    `last_step`: position of the last sample of each run among step ends; what follows is padding.
+    `steps`: steps of the rate whose instants are fitted, or were; None where there is none.
+    `cycle`: positions among step ends of the last cycle before the first sample, shape (runs, 2);
+        −1 where the run has no periodic start.
+    """
+
+    times: Float[Array, "runs m"]
+    commanded_rate: Float[Array, "runs m"]  # rate there, in 1/s
+    sample_index: Array  # position of the samples among step ends, shape (runs, n)
+    clock_factor: Float[Array, " runs"]  # shape (runs,)
+    strain_before: Float[Array, " runs"]
+    cycle: Int[Array, "runs 2"]
+    last_step: Int[Array, " runs"]
+    kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
+    steps: RateSteps | None = None
+    cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        ends = np.take_along_axis(
+            np.asarray(self.times)[:, ::2], np.asarray(self.sample_index), axis=1
+        )
+        return float(np.max(ends))
+
+    def in_shared_shape(self) -> "TransientFlows":
+        """Return these runs padded to one of few shapes, so that data sets share programs.
+
+        A run more is the last once more, and what is beyond a run's end is at rest.
+        """
+        times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
+        samples = _rounded(self.sample_index.shape[1], _SAMPLES)
+        step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)
+        half_steps = 2 * step_ends - 1
+        # of long runs a few more are not for nothing
+        runs = _rounded(len(times), _MANY_RUNS if step_ends == _STEPS else 1)
+        spacing = 0.5 * (times[:, -1:] - times[:, -3:-2])
+        later = times[:, -1:] + spacing * np.arange(1, half_steps - times.shape[1] + 1)
+        # a straight line for one step more: the slope of the rate at the last sample stays as it is
+        one_more = (2.0 * rate[:, -1:] - rate[:, [-2, -3]])[:, : later.shape[1]]
+        longer = replace(
+            self,
+            times=on_device(np.concatenate([times, later], axis=1)),
+            commanded_rate=_longer(np.concatenate([rate, one_more], axis=1), half_steps),
+            sample_index=_longer(self.sample_index, samples, "edge"),
+            steps=self.steps and self.steps.padded(_rounded(self.steps.start.shape[1], 1)),
+        )
+        return jax.tree.map(lambda values: _more_runs(values, runs), longer)
+
+
+def _rounded(size: int, least: int) -> int:
+    """Return the next of least × 1, 1.5, 2, 3, 4, 6, ... in whole numbers."""
+    while size > least:
+        if size <= 3 * least // 2:
+            return 3 * least // 2
+        least *= 2
+    return least
+
+
+def _longer(values: ArrayLike, size: int, mode: Literal["constant", "edge"] = "constant") -> Array:
+    beyond = size - np.shape(values)[1]
+    return on_device(np.pad(np.asarray(values), ((0, 0), (0, beyond)), mode))
+
+
+def _more_runs(values: ArrayLike, runs: int) -> Array:
+    values = np.asarray(values)
+    more = [(0, runs - len(values)), *[(0, 0)] * (values.ndim - 1)]
+    return on_device(np.pad(values, more, "edge"))
+
+
+def transients(runs: Sequence[Run], strain_step: float = 0.25) -> TransientFlows:
+    """Return the flows of runs at a given rate."""
+    grids = []
+    for run in runs:
+        # a window may have cut the first samples off, but not what the instrument did by then
+        gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
+        early = gap * _EARLY_STEPS
+        anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
+        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
+        if len(grid) > max(_LONG, 2 * len(anchors)):
+            grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
+        grids.append((grid, np.searchsorted(grid, run.time)))
+    n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
+    n_samples = max(len(run) for run in runs)
+    cycles = [
+        np.searchsorted(grid, run.protocol.cycle) if np.ptp(run.protocol.cycle) else (-1, -1)
+        for run, (grid, _) in zip(runs, grids, strict=True)
+    ]
+    cycle_steps = int(max(end - start for start, end in cycles))
+    if cycle_steps:
+        n_steps = max(n_steps, *(int(start) + cycle_steps + 1 for start, _ in cycles))
+    rows = []
+    for run, cycle, (grid, index) in zip(runs, cycles, grids, strict=True):
+        spacing = grid[-1] - grid[-2] if len(grid) > 1 else 1.0
+        padded = np.concatenate([grid, grid[-1] + spacing * np.arange(1, n_steps - len(grid) + 1)])
+        half = np.empty(2 * n_steps - 1)
+        half[::2] = padded
+        half[1::2] = 0.5 * (padded[1:] + padded[:-1])
+        rate = shear_rates(run.protocol, half).copy()
+        # beyond its last sample a run is padding: no flow, nothing to blow up; but for one step, so
+        # that the slope of the rate at the last sample is the flow's own
+        rate[half > grid[-1] + 1.01 * spacing] = 0.0
+        rows.append(
+            (
+                half,
+                rate,
+                np.pad(index, (0, n_samples - len(run)), mode="edge"),
+                run.clock_factor,
+                run.strain_before,
+                np.asarray(cycle),
+                np.asarray(len(grid) - 1),
+            )
+        )
+    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
+    return TransientFlows(
+        *columns,
+        kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
+        steps=rate_steps(runs),
+        cycle_steps=cycle_steps,
+    )
+
+
+class StressFlows(eqx.Module):
+    """Runs at a given stress on padded grids, with a leading axis of runs.
+
+    `sample_index`, `clock_factor`, `kinematics`: as in `TransientFlows`.
+    """
+
+    times: Float[Array, "runs s"]  # step ends, shape (runs, s), in s
+    imposed: Float[Array, "runs s"]  # recorded stress there, in Pa
+    sample_index: Array
+    clock_factor: Float[Array, " runs"]
+    kinematics: Kinematics | None = None
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        ends = np.take_along_axis(np.asarray(self.times), np.asarray(self.sample_index), axis=1)
+        return float(np.max(ends))
+
+
+def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressFlows:
+    """Return the flows of runs at a given stress."""
+    grids = [stress_grid(run.protocol, run.time, strain_step) for run in runs]
+    n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
+    rows = []
+    for run, grid in zip(runs, grids, strict=True):
+        index = np.searchsorted(grid, run.time)
+        last = grid[-1] - grid[-2]
+        padded = np.concatenate([grid, grid[-1] + last * np.arange(1, n_steps - len(grid) + 1)])
+        imposed = shear_rates(run.protocol, padded)
+        index = np.pad(index, (0, n_samples - len(run)), mode="edge")
+        rows.append((padded, imposed, index, run.clock_factor))
+    columns = [on_device(np.stack(column)) for column in zip(*rows, strict=True)]
+    return StressFlows(
+        *columns, kinematics=stack_kinematics([run.protocol.kinematics for run in runs])
+    )
+
+
+class SteadyFlows(eqx.Module):
+    """Flow curves, padded, with a leading axis of runs: a sample is a steady state at its rate."""
+
+    rate: Float[Array, "runs n"]  # in 1/s, shape (runs, n)
+    kinematics: Kinematics | None = None  # as in `TransientFlows`
+
+    @property
+    def longest(self) -> float:
+        """Zero: a steady state knows no time."""
+        return 0.0
+
+
+def steady_states(runs: Sequence[Run]) -> SteadyFlows:
+    """Return the flows of flow curves."""
+    n = max(len(run) for run in runs)
+    # a padded sample is one more of the last
+    rates = [np.pad(run.rate, (0, n - len(run)), mode="edge") for run in runs]
+    kinematics = stack_kinematics([run.protocol.kinematics for run in runs])
+    return SteadyFlows(on_device(np.stack(rates)), kinematics)
+
+
+# Half a cycle in the loop: as many steps as one of so much strain at least, whatever the strain
+_FEWEST = 8.0
+
+Places = tuple[int, tuple[int, ...]]
+"""Of a run that is a modulus whether it is G′ (0) or G″ (1), and which states its samples are."""
+
+
+class PeriodicFlows(eqx.Module):
+    """Periodic states, each of which is solved for by itself; both moduli of each are computed.
+
+    `strain`, `frequency`: amplitude and rad/s.
+    """
+
+    strain: Float[Array, " states"]
+    frequency: Float[Array, " states"]
+    steps: Int[Array, " states"]  # of half a cycle: more at large strain
+
+    @property
+    def longest(self) -> float:
+        """Zero: a periodic state knows no time since it began."""
+        return 0.0
+
+
+def oscillations(
+    runs: Sequence[Run], strain_step: float
+) -> tuple[PeriodicFlows, tuple[Places, ...]]:
+    """Return the states of sweeps, and of each run which of them are its own."""
+    # G′ and G″ of one sweep are computed together
+    of_runs = [
+        np.stack([np.asarray(run.strain), np.asarray(run.angular_frequency)], axis=1)
+        for run in runs
+    ]
+    states, number = np.unique(np.concatenate(of_runs), axis=0, return_inverse=True)
+    ends = np.cumsum([len(own) for own in of_runs])[:-1]
+    places = tuple(
+        (MODULI.index(run.quantity), tuple(own.tolist()))
+        for run, own in zip(runs, np.split(number.ravel(), ends), strict=True)
+    )
+    strain, frequency = states.T
+    steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), strain_step) for one in strain]
+    return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places

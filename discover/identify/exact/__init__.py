@@ -1,1 +1,0 @@
-"""What two laws share in shear, in exact arithmetic."""

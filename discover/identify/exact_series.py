@@ -1,0 +1,387 @@
+"""Taylor series of the stress after rest, in exact arithmetic: when two laws are the same in shear.
+
+Histories γ̇(t) that are polynomials in time come as close as one likes to every history, and for
+each of them the stress of a polynomial law is a power series in time whose coefficients are
+polynomials in those of γ̇(t) and of the law. Two laws with the same σ12(t) in every shear history
+therefore have the same coefficients for random histories, order by order, without any rounding;
+and two that differ show it at a low order   [Fliess 1981, Bull. SMF 109, 3: the same for the
+generating series of a control system].
+
+Coefficients are fractions where their values matter, and residues modulo a large prime where only
+agreement does: whole numbers of one machine word, many times faster, and a false agreement has a
+chance of about 1e-17.
+"""
+
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import count, islice
+from typing import Any, no_type_check
+
+import numpy as np
+
+from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
+from tensor_library.terms import CandidateTerm, parse_term
+
+PRIME = 2**61 - 1
+"""Modulus of exact arithmetic in residues: a Mersenne prime of one machine word."""
+
+
+def residue(value: Fraction | int) -> int:
+    """Return a fraction modulo the prime."""
+    exact = Fraction(value)
+    return exact.numerator * pow(exact.denominator, -1, PRIME) % PRIME
+
+
+Components = tuple[Any, Any, Any, Any]
+"""11, 22, 33, 12 of a symmetric tensor in simple shear, over any commutative ring."""
+
+
+@no_type_check
+def _product(first: Sequence[Any], second: Sequence[Any]) -> tuple[Any, ...]:
+    """Return a·b of block matrices stored as (11, 22, 33, 12, 21)."""
+    a11, a22, a33, a12, a21 = first
+    b11, b22, b33, b12, b21 = second
+    return (
+        a11 * b11 + a12 * b21,
+        a21 * b12 + a22 * b22,
+        a33 * b33,
+        a11 * b12 + a12 * b22,
+        a21 * b11 + a22 * b21,
+    )
+
+
+@no_type_check
+def _word(word: str, tensors: Mapping[str, Sequence[Any]]) -> tuple[Any, ...]:
+    letters = word.split(".")
+    value = tuple(tensors[letters[0]])
+    for letter in letters[1:]:
+        value = _product(value, tensors[letter])
+    return value
+
+
+def exact_terms(
+    terms: Sequence[CandidateTerm],
+    stress: Components,
+    rate: Any,
+    one: Any = 1,
+    zero: Any = 0,
+    form_values: Mapping[str, Any] | None = None,
+) -> list[Components]:
+    """Return the components of every term at one state.
+
+    `stress`: σ11, σ22, σ33, σ12: integers, fractions, or anything else that adds and multiplies.
+    `rate`: γ̇ of the same kind. `one`, `zero`: unit and zero of the ring. `form_values`: value of
+    each closed form, by key. A transcendental function of tr σ is algebraically independent of the
+    polynomials, so any number stands for it in a search for relations.
+    """
+    s11, s22, s33, s12 = stress
+    tensors = {
+        "I": (one, one, one, zero, zero),
+        "sigma": (s11, s22, s33, s12, s12),
+        "gammadot": (zero, zero, zero, rate, rate),
+    }
+
+    # only what the terms need: a product of series is dear
+    used = {
+        name
+        for term in terms
+        for name, power in zip(INVARIANT_NAMES, term.powers, strict=True)
+        if power
+    }
+    invariants = {
+        name: sum(_word(name.removeprefix("tr(").removesuffix(")"), tensors)[:3], zero)
+        for name in used
+    }
+    bases = {
+        name: _sum([_word(word, tensors) for word in name.split("+")])
+        for name in dict.fromkeys(TENSOR_NAMES[term.tensor] for term in terms)
+    }
+    values: list[Components] = []
+    for term in terms:
+        scalar = one
+        for name, power in zip(INVARIANT_NAMES, term.powers, strict=True):
+            for _ in range(power):
+                scalar = scalar * invariants[name]
+        if term.closed_form is not None:
+            if form_values is None:
+                raise ValueError(f"The term {term.name} is not a polynomial; give form_values.")
+            scalar = scalar * form_values[term.closed_form]
+        b11, b22, b33, b12, _ = bases[TENSOR_NAMES[term.tensor]]
+        values.append((scalar * b11, scalar * b22, scalar * b33, scalar * b12))
+    return values
+
+
+@no_type_check
+def _sum(words: list[tuple[Any, ...]]) -> tuple[Any, ...]:
+    total = words[0]
+    for word in words[1:]:
+        total = tuple(a + b for a, b in zip(total, word, strict=True))
+    return total
+
+
+DEFAULT_ORDER = 9
+_HISTORIES = 2
+
+
+@no_type_check  # over any ring, and called too often for a check that could not fail
+@dataclass(frozen=True)
+class _Series:
+    """A power series in time up to an order that products keep; over residues if `modular`."""
+
+    values: tuple[Any, ...]
+    modular: bool = False
+
+    def __add__(self, other: "_Series") -> "_Series":
+        total = tuple(a + b for a, b in zip(self.values, other.values, strict=True))
+        return _Series(total, self.modular)
+
+    def __mul__(self, other: "_Series") -> "_Series":
+        n = len(self.values)
+        product: list[Any] = [0] * n
+        for i, a in enumerate(self.values):
+            if a:
+                for j in range(n - i):
+                    product[i + j] += a * other.values[j]
+        if self.modular:
+            product = [value % PRIME for value in product]
+        return _Series(tuple(product), self.modular)
+
+
+def stress_series(
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    order: int,
+    linear_relaxation: bool = True,
+    modular: bool = False,
+) -> list[tuple[Any, Any, Any, Any]]:
+    """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
+
+    `coefficients`: the law dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, dimensionless: term → c. Closed
+    forms are not polynomials and raise `ValueError`. `rate`: coefficients of γ̇(t) = Σ rate[k] tᵏ.
+    `order`: last order. `linear_relaxation`: whether −σ is part of the law. `modular`: whether to
+    return residues modulo `PRIME` and not fractions.
+    """
+    return list(islice(_growing(coefficients, rate, linear_relaxation, modular), order + 1))
+
+
+def _growing(
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool,
+    modular: bool,
+) -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Yield the Taylor coefficients of `stress_series` one by one, each dearer than the last."""
+    number = residue if modular else Fraction
+    terms = [parse_term(name) for name in coefficients]
+    values = [number(value) for value in coefficients.values()]
+    shear_rate: list[Any] = []
+    stress: list[tuple[Any, Any, Any, Any]] = [(number(0), number(0), number(0), number(0))]
+    for k in count():
+        yield stress[k]
+        shear_rate.append(number(rate[k] if k < len(rate) else 0))
+        zero = _Series((number(0),) * (k + 1), modular)
+        one = _Series((number(1), *zero.values[1:]), modular)
+        s11, s22, s33, s12 = (_Series(tuple(s[i] for s in stress), modular) for i in range(4))
+        g = _Series(tuple(shear_rate), modular)
+        slope = [2 * (g * s12).values[k], number(0), number(0), shear_rate[k] + (g * s22).values[k]]
+        if linear_relaxation:
+            slope = [value - old for value, old in zip(slope, stress[k], strict=True)]
+        evaluated = exact_terms(terms, (s11, s22, s33, s12), g, one, zero)
+        for c, components in zip(values, evaluated, strict=True):
+            slope = [v - c * part.values[k] for v, part in zip(slope, components, strict=True)]
+        inverse = number(Fraction(1, k + 1))
+        s11, s22, s33, s12 = (
+            value * inverse % PRIME if modular else value * inverse for value in slope
+        )
+        stress.append((s11, s22, s33, s12))
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """To which order two laws agree in every shear history.
+
+    `sigma12`, `N1`, `N2`: first order at which the quantity differs, or None where it agrees to
+        `order`.
+    """
+
+    order: int  # order to which the series were computed
+    sigma12: int | None
+    N1: int | None
+    N2: int | None
+
+
+def compare_series(
+    first: Mapping[str, Fraction | int],
+    second: Mapping[str, Fraction | int],
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> Agreement:
+    """Return where the Taylor series of two laws part, over random histories.
+
+    `first`, `second`: the laws, as in `stress_series`.
+    """
+    generator = random.Random(2)
+    parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
+    for _ in range(_HISTORIES):
+        rate = [Fraction(generator.randint(-9, 9), generator.randint(1, 9)) for _ in range(order)]
+        a = stress_series(first, rate, order, linear_relaxation, modular=True)
+        b = stress_series(second, rate, order, linear_relaxation, modular=True)
+        for k, (s, t) in enumerate(zip(a, b, strict=True)):
+            for name, same in (
+                ("sigma12", s[3] == t[3]),
+                ("N1", (s[0] - s[1] - t[0] + t[1]) % PRIME == 0),
+                ("N2", (s[1] - s[2] - t[1] + t[2]) % PRIME == 0),
+            ):
+                known = parts[name]
+                if not same and (known is None or k < known):
+                    parts[name] = k
+    return Agreement(order, parts["sigma12"], parts["N1"], parts["N2"])
+
+
+def solve_for_coefficient(
+    target: Mapping[str, Fraction | int],
+    term: str,
+    kept: Mapping[str, Fraction | int] | None = None,
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> list[tuple[float, bool]]:
+    """Return every c for which a law with c·term has the σ12 of another in every history.
+
+    At the first order at which c enters the series of σ12 it does so as a polynomial of low degree,
+    whose real roots are the candidates. A rational root is exact, and then all later orders have to
+    agree exactly; of the others only a simulation can tell.
+
+    `target`: the law to reproduce. `term`: the term sought. `kept`: other terms of the law sought,
+    with their coefficients. Returns candidates with whether they are proved.
+    """
+    generator = random.Random(3)
+    rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
+    rest = dict(kept or {})
+
+    # residues are enough to see at which order the term enters, and whether it enters too late;
+    # fractions are needed at that order only, and no later one at all
+    laws = (target, rest, {**rest, term: 1}, {**rest, term: 2})
+    series = (_growing(law, rate, linear_relaxation, modular=True) for law in laws)
+    for k, states in zip(range(order + 1), zip(*series, strict=True), strict=False):
+        wanted, *trial = (state[3] for state in states)
+        if trial[0] == trial[1] == trial[2]:
+            if trial[0] != wanted:
+                return []
+            continue
+        aim = shear_at(k, target, rate, linear_relaxation)
+        samples = [
+            shear_at(k, {**rest, term: value}, rate, linear_relaxation) - aim
+            for value in range(_DEGREE + 1)
+        ]
+        polynomial = _interpolate(samples)
+        candidates = []
+        for root in _real_roots(polynomial):
+            fraction = Fraction(root).limit_denominator(10**6)
+            if sum(a * fraction**power for power, a in enumerate(polynomial)) != 0:
+                candidates.append((root, False))
+                continue
+            law = {**rest, term: fraction}
+            if compare_series(target, law, order, linear_relaxation).sigma12 is None:
+                candidates.append((float(fraction), True))
+        return candidates
+    return []
+
+
+_DEGREE = 3
+"""Degree in its coefficient with which a term first enters σ12, at most."""
+
+
+def shear_at(
+    order: int,
+    coefficients: Mapping[str, Fraction | int],
+    rate: Sequence[Fraction | int],
+    linear_relaxation: bool,
+) -> Fraction:
+    """Return one Taylor coefficient of σ12."""
+    return stress_series(coefficients, rate, order, linear_relaxation)[order][3]
+
+
+def _interpolate(samples: Sequence[Fraction]) -> list[Fraction]:
+    """Return the polynomial with these values at 0, 1, 2, ..., constant first."""
+    n = len(samples)
+    rows = [[Fraction(x) ** power for power in range(n)] for x in range(n)]
+    polynomial = _solve_exactly(rows, samples)
+    assert polynomial is not None  # a Vandermonde matrix is regular
+    while polynomial and polynomial[-1] == 0:
+        polynomial.pop()
+    return polynomial
+
+
+def _real_roots(polynomial: Sequence[Fraction]) -> list[float]:
+    """Return the real roots of a polynomial, smallest first."""
+    if len(polynomial) < 2:
+        return []
+    if len(polynomial) == 2:
+        return [float(-polynomial[0] / polynomial[1])]
+    roots = np.roots([float(value) for value in reversed(polynomial)])
+    real = [float(r.real) for r in roots if abs(r.imag) <= 1e-9 * (1.0 + abs(r.real))]
+    return sorted(real, key=abs)
+
+
+def hidden_change(
+    first: Mapping[str, Fraction | int],
+    second: Mapping[str, Fraction | int],
+    order: int = DEFAULT_ORDER,
+    linear_relaxation: bool = True,
+) -> dict[str, str]:
+    """Return the second law's normal stresses as linear functions of the first law's, in words.
+
+    Solved exactly from the Taylor series over two random histories; empty where no linear change
+    relates the two. Where the first law confines its stresses (in Johnson–Segalman σ33 = 0 and σ22
+    is a multiple of σ11), the change with the fewest terms is one of several.
+    """
+    generator = random.Random(4)
+    states: list[tuple[Fraction, ...]] = []
+    images: list[tuple[Fraction, ...]] = []
+    for _ in range(_HISTORIES):
+        rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
+        states += stress_series(first, rate, order, linear_relaxation)
+        images += stress_series(second, rate, order, linear_relaxation)
+    change = {}
+    for row, name in enumerate(_NORMAL):
+        solved = _solve_exactly([s[:3] for s in states], [image[row] for image in images])
+        if solved is None:
+            return {}
+        parts = [
+            f"{value} {source}" for value, source in zip(solved, _NORMAL, strict=True) if value
+        ]
+        change[name] = " + ".join(parts) or "0"
+    return change
+
+
+_NORMAL = ("sigma11", "sigma22", "sigma33")
+
+
+def _solve_exactly(
+    matrix: Sequence[Sequence[Fraction]], right: Sequence[Fraction]
+) -> list[Fraction] | None:
+    """Return x with matrix x = right, free unknowns zero, or None."""
+    n = len(matrix[0])
+    rows = [[*row, value] for row, value in zip(matrix, right, strict=True)]
+    solution, used = [Fraction(0)] * n, 0
+    pivots = []
+    for column in range(n):
+        pivot = next((i for i in range(used, len(rows)) if rows[i][column]), None)
+        if pivot is None:
+            continue
+        rows[used], rows[pivot] = rows[pivot], rows[used]
+        lead = rows[used][column]
+        rows[used] = [value / lead for value in rows[used]]
+        for i, row in enumerate(rows):
+            if i != used and row[column]:
+                factor = row[column]
+                rows[i] = [a - factor * b for a, b in zip(row, rows[used], strict=True)]
+        pivots.append(column)
+        used += 1
+    if any(row[n] for row in rows[used:]):
+        return None
+    for i, column in enumerate(pivots):
+        solution[column] = rows[i][n]
+    return solution

@@ -1,0 +1,328 @@
+"""Is a law physically sound? Checks that hold for any law, with where it fails.
+
+None of them uses data. A law that fails one may still fit; it should not be carried into a
+simulation of other flows without a second thought.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from discover.forward.fluids import in_enough_steps
+from discover.forward.grids.flow_batch import FlowBatch
+from discover.identify.physics_flows import (
+    Cycles,
+    Trajectories,
+    cycles,
+    is_stable,
+    is_steady,
+    steady_shear,
+    steady_uniaxial_extension,
+    time_scale,
+    trajectories,
+)
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.expansion import in_shared_form
+from discover.laws.multimode import Fluid
+from discover.programs import compiled
+from discover.summary_view import SentenceAndTable, table_of
+from discover.words import percent_of, plainly
+
+_ROUNDING = 1e-6
+"""Size below zero that integration error alone may give."""
+
+_LINEAR_TOLERANCE = 1e-3
+"""Relative difference of moduli from Maxwell's that counts as the same."""
+
+SMALL_STRAIN = "small-strain limit"
+"""Name of the check that a law keeps the declared modes."""
+
+SHEAR_RATES = np.geomspace(1e-2, 1e2, 241)
+"""Weissenberg numbers of the flow curve."""
+
+EXTENSION_RATES = np.geomspace(0.02, 20.0, 241)
+"""Extension rates times relaxation time."""
+
+_REFINED = 61
+_BOX_FACTORS = (1.0, 1.5, 2.0, 3.0, 5.0)
+_DEBORAH_FACTORS = (0.5, 1.0, 2.0)
+_PER_RATE = len(_DEBORAH_FACTORS)
+
+
+@dataclass(frozen=True)
+class PhysicsCheck:
+    """One check of a law."""
+
+    name: str
+    passed: bool | None  # whether the law passes; None where the check could not be made
+    value: float | None  # the number that decides
+    where: str  # where it is taken, or where the law fails, in words
+    text: str  # one sentence for a reader
+
+    def line(self) -> dict[str, Any]:
+        """Return the check as one line of a table."""
+        return {"check": self.name, "passed": self.passed, "value": self.value, "text": self.text}
+
+
+@dataclass(frozen=True)
+class PhysicsReport(SentenceAndTable):
+    """All checks of a law."""
+
+    checks: tuple[PhysicsCheck, ...]  # in a fixed order
+
+    def __getitem__(self, name: str) -> PhysicsCheck:
+        return next(check for check in self.checks if check.name == name)
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        failed = [check.name for check in self.checks if check.passed is False]
+        if not failed:
+            return "The law passes every check of physical soundness that could be made."
+        return "The law fails: " + ", ".join(failed) + "."
+
+    def table(self) -> pd.DataFrame:
+        """Return the checks, one line each."""
+        return table_of(self.checks)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the report as ``comparison.json`` holds it."""
+        return {"text": self.text, "checks": [asdict(check) for check in self.checks]}
+
+
+def check_physics(
+    fluid: Fluid, flows: FlowBatch, names: Sequence[str], weissenberg: float, deborah: float
+) -> PhysicsReport:
+    """Return the checks of a fluid.
+
+    `flows`: flows along which stresses are looked at. `weissenberg`, `deborah`: largest shear rate
+    and frequency of training, times the mean relaxation time: the corner of the box beyond which
+    the law extrapolates.
+    """
+    fluid = replace(fluid, law=in_shared_form(fluid.law))
+    along = trajectories(fluid, in_enough_steps(fluid, flows))
+    beyond = cycles(
+        fluid,
+        [weissenberg * factor for factor in _BOX_FACTORS],
+        [deborah * factor for factor in _DEBORAH_FACTORS],
+    )
+    return PhysicsReport(
+        (
+            _conformation(along, names),
+            _free_energy(along, names),
+            _work(beyond),
+            _flow_curve(fluid, weissenberg),
+            _extension(fluid),
+            _small_strain(fluid),
+            _reach(beyond, weissenberg, deborah),
+        )
+    )
+
+
+def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+    name = "conformation tensor positive definite"
+    run, value = along.lowest(along.smallest_conformation)
+    if run is None:
+        return PhysicsCheck(name, None, None, "", "The law diverges in every flow looked at.")
+    passed = value > -_ROUNDING
+    where = names[run]
+    verb = "stays positive definite" if passed else "loses positive definiteness"
+    return PhysicsCheck(
+        name,
+        passed,
+        value,
+        where,
+        f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {plainly(value)}, in "
+        f"{where}.",
+    )
+
+
+def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+    name = "dissipation non-negative"
+    run, value = along.lowest(along.dissipation)
+    if run is None:
+        return PhysicsCheck(
+            name, None, None, "", "No flow in which the stored energy is defined throughout."
+        )
+    passed = value > -_ROUNDING
+    where = names[run]
+    verb = "is nowhere negative" if passed else "becomes negative"
+    return PhysicsCheck(
+        name,
+        passed,
+        value,
+        where,
+        f"With the stored energy of Hookean dumbbells, (G/2)(tr A − ln det A − 3) with A = I + "
+        f"σ/G, the dissipation {verb}: at least {plainly(value)} G/λ, in {where}.",
+    )
+
+
+def _work(beyond: Cycles) -> PhysicsCheck:
+    name = "work over a cycle non-negative"
+    # at the Weissenberg number of training, which is the first
+    usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
+    if not usable:
+        return PhysicsCheck(name, None, None, "", "The law diverges in the oscillations tried.")
+    run, value = min(usable, key=lambda pair: pair[1])
+    where = beyond.names[run]
+    return PhysicsCheck(
+        name,
+        bool(value >= -_ROUNDING),
+        float(value),
+        where,
+        f"The work σ:d over the last cycle is at least {plainly(value)} of the product of the "
+        f"largest stress and strain rate, in {where}.",
+    )
+
+
+def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
+    name = "flow curve monotonic"
+    slowest = time_scale(fluid)
+    rates = SHEAR_RATES / slowest
+    stress = np.asarray(fluid.solvent_viscosity) * rates
+    steady = np.ones(rates.size, dtype=bool)
+    modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
+    for number, (modulus, time) in enumerate(modes):
+        law = law_of_mode(fluid.law, number)
+        found, _, residual = steady_shear(law, jnp.asarray(time * rates))
+        stress = stress + modulus * np.asarray(found)[:, 3]
+        steady &= is_steady(np.asarray(residual))
+    last = rates.size if steady.all() else int(np.argmin(steady))
+    falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
+    if falling.size:
+        low, high = float(rates[falling[0]]), float(rates[falling[-1] + 1])
+        beyond = low * slowest > weissenberg
+        where = f"shear rates from {plainly(low)} to {plainly(high)} 1/s"
+        note = "beyond the rates of training" if beyond else "within the rates of training"
+        return PhysicsCheck(
+            name,
+            False,
+            low,
+            where,
+            f"The steady shear stress falls with the rate at {where}: homogeneous flow is unstable "
+            f"there and would band (it starts {note}).",
+        )
+    if last < 2:
+        return PhysicsCheck(name, None, None, "", "No steady shear flow was found.")
+    where = f"shear rates from {plainly(rates[0])} to {plainly(rates[last - 1])} 1/s"
+    text = f"The steady shear stress rises with the rate throughout {where}."
+    if last < rates.size:
+        text += " Beyond, no steady state follows on."
+    return PhysicsCheck(
+        name, True if last == rates.size else None, float(rates[last - 1]), where, text
+    )
+
+
+def _extension(fluid: Fluid) -> PhysicsCheck:
+    name = "steady extension bounded"
+    longest = float(np.max(np.asarray(fluid.relaxation_time)))
+    reached = _last_stable(fluid, EXTENSION_RATES)
+    if reached == EXTENSION_RATES.size:
+        where = f"extension rates up to {plainly(EXTENSION_RATES[-1] / longest)} 1/s"
+        return PhysicsCheck(
+            name,
+            True,
+            float(EXTENSION_RATES[-1] / longest),
+            where,
+            f"The stress in uniaxial extension settles at all {where}.",
+        )
+    low = EXTENSION_RATES[max(reached - 1, 0)]
+    high = EXTENSION_RATES[reached]
+    # from rest again, but finely across the last step
+    fine = np.concatenate(
+        [EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)]
+    )
+    fine = np.concatenate([fine, np.full(EXTENSION_RATES.size + _REFINED - fine.size, high)])
+    limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
+    return PhysicsCheck(
+        name,
+        False,
+        limit,
+        f"extension rates beyond {limit:.4g} 1/s",
+        f"In uniaxial extension at rates beyond {limit:.4g} 1/s ({limit * longest:.3g} over the "
+        "longest relaxation time) no steady state is stable: the stress grows without bound.",
+    )
+
+
+def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
+    times = np.asarray(fluid.relaxation_time)
+    slowest = int(np.argmax(times))
+    # of one law for all modes the slowest gives way first
+    numbers = range(len(times)) if differs_by_mode(fluid.law) else [slowest]
+    # as many rates at first as later on a finer grid, for which one program serves
+    same = np.pad(rates, (0, EXTENSION_RATES.size + _REFINED - rates.size), mode="edge")
+    good = np.ones(rates.size, dtype=bool)
+    for number in numbers:
+        law = law_of_mode(fluid.law, number)
+        scaled = jnp.asarray(same * (times[number] / times[slowest]))
+        _, jacobian, residual = steady_uniaxial_extension(law, scaled)
+        found = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+        good &= found[: rates.size]
+    return rates.size if good.all() else int(np.argmin(good))
+
+
+@compiled
+def _linearised_at_rest(law: AbstractConstitutiveLaw):
+    """Return dσ/dt at rest, and its derivatives with respect to stress and to shear rate."""
+    rest, still = law.rest(), jnp.asarray(0.0)
+    by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
+    return law.stress_rate(rest, still), by_stress, by_rate
+
+
+def _off_at_rest(law: AbstractConstitutiveLaw) -> tuple[float, float]:
+    """Return dσ/dt at rest, and by how much G′ + iG″ is off that of a Maxwell mode."""
+    drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(law))
+    frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(source))
+    response = np.array(
+        [
+            1j * w * np.linalg.solve(1j * w * one - relaxation, source.astype(complex))[3]
+            for w in frequency
+        ]
+    )
+    maxwell = 1j * frequency / (1.0 + 1j * frequency)
+    off = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
+    return float(np.max(np.abs(drift))), off
+
+
+def _small_strain(fluid: Fluid) -> PhysicsCheck:
+    name = SMALL_STRAIN
+    numbers = range(fluid.n_modes) if differs_by_mode(fluid.law) else [0]
+    of_modes = [_off_at_rest(law_of_mode(fluid.law, number)) for number in numbers]
+    offset, value = (max(column) for column in zip(*of_modes, strict=True))
+    text = (
+        f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
+        f"{percent_of(max(value, 1e-5))} (the law linearised at rest, frequencies times "
+        "relaxation time from 0.01 to 100)"
+    )
+    if offset > _LINEAR_TOLERANCE:
+        text += f", and the law does not rest: dσ/dt = {offset:.2g} G/λ without flow or stress"
+    worst = max(value, offset)
+    return PhysicsCheck(name, worst <= _LINEAR_TOLERANCE, worst, "at rest", text + ".")
+
+
+def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
+    name = "integrates beyond training"
+    finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
+    whole = np.all(finite, axis=1)
+    reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
+    least, most = (plainly(factor * deborah) for factor in _DEBORAH_FACTORS[:: _PER_RATE - 1])
+    box = f"De from {least} to {most}"
+    if reached == len(_BOX_FACTORS):
+        limit = weissenberg * _BOX_FACTORS[-1]
+        where = f"Wi up to {plainly(limit)}, {box}"
+        text = f"Oscillations stay finite in the whole grid tried, {where}."
+        return PhysicsCheck(name, True, limit, where, text)
+    failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
+    limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
+    text = (
+        f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress diverges "
+        f"first in {failed[0]} (training reached Wi = {plainly(weissenberg)}, "
+        f"De = {plainly(deborah)})."
+    )
+    return PhysicsCheck(name, False, limit, failed[0], text)

@@ -1,0 +1,320 @@
+"""Combinations of library terms that a shear experiment cannot see, found in exact arithmetic."""
+
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from fractions import Fraction
+from functools import lru_cache
+from math import gcd, lcm
+from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from discover.identify.exact_series import PRIME, exact_terms
+from discover.words import percent_of
+from tensor_library.law_terms import spell
+from tensor_library.library import TermLibrary
+
+_LARGEST_INTEGER = 10**6
+_FRESH_STATES = 5
+_IDLE_ROWS = 24
+_COMPONENTS_SEEN = {"nothing": (0, 1, 2, 3), "33": (0, 1, 3)}
+
+Reach = Literal["nothing", "33"]
+
+
+@dataclass(frozen=True)
+class TermRelation:
+    """A combination of terms that vanishes in simple shear, or lives on σ33 only.
+
+    `touches`: ``"nothing"``: the combination is zero in every simple shear, so terms can be
+        exchanged freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets
+        σ33 act back, N2 does.
+    """
+
+    coefficients: Mapping[str, int]  # term → whole number
+    touches: Reach
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        sum_of_terms = spell(self.coefficients)
+        if self.touches == "nothing":
+            return f"In simple shear {sum_of_terms} = 0 at every state, whatever the law."
+        return (
+            f"In simple shear {sum_of_terms} has a single entry, the 33: N2 sees it, σ12 and N1 do "
+            "not unless the law lets σ33 act back on them."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the relation as JSON-able values."""
+        return {**asdict(self), "text": self.text}
+
+
+MOST_SPELLED = 4
+"""Terms that a sentence bears; more are a table."""
+
+
+def spell_briefly(coefficients: Mapping[str, float | int]) -> str:
+    """Return a sum of terms as `spell` does, of many terms only how many and the two largest."""
+    if len(coefficients) <= MOST_SPELLED:
+        return spell(coefficients)
+    largest = sorted(coefficients, key=lambda name: -abs(coefficients[name]))[:2]
+    first = spell({name: coefficients[name] for name in largest})
+    return f"{first} with {len(coefficients) - 2} smaller terms"
+
+
+@lru_cache(maxsize=8)
+def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
+    """Return every linear relation among the terms of a library in simple shear.
+
+    The terms are evaluated at random integer states; the null space is found modulo a large
+    prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
+    count as independent of every polynomial.
+
+    Returns relations that touch nothing first, then those that touch σ33 only and are not of the
+    first kind. Each is a basis vector of its null space, with as few terms as elimination gives.
+    """
+    generator = random.Random(0)
+    n = len(library)
+    states = [_random_state(generator, library) for _ in range(n + _FRESH_STATES)]
+    values = [exact_terms(library.terms, s, g, form_values=forms) for s, g, forms in states]
+    found: list[TermRelation] = []
+    known: list[list[int]] = []
+    for touches, components in _COMPONENTS_SEEN.items():
+        rows = [[value[i] for value in at_state] for at_state in values for i in components]
+        for vector in _null_space(rows, n):
+            if not _is_new(vector, known):
+                continue
+            known.append(vector)
+            found.append(
+                TermRelation(
+                    {library.names[i]: c for i, c in enumerate(vector) if c},
+                    touches,  # pyright: ignore[reportArgumentType]
+                )
+            )
+    return tuple(found)
+
+
+def _random_state(generator: random.Random, library: TermLibrary):
+    def number() -> int:
+        return generator.randint(-_LARGEST_INTEGER, _LARGEST_INTEGER)
+
+    return (
+        (number(), number(), number(), number()),
+        number(),
+        {form.name: number() for form in library.forms},
+    )
+
+
+def _reduced(rows: Sequence[Sequence[int]], n: int) -> tuple[list[list[int]], list[int]]:
+    """Return the reduced row echelon form modulo the prime, and its pivot columns."""
+    echelon: list[list[int]] = []
+    pivots: list[int] = []
+    idle = 0
+    for given in rows:
+        row = [value % PRIME for value in given]
+        for pivot, old in zip(pivots, echelon, strict=True):
+            if row[pivot]:
+                factor = row[pivot]
+                row = [(a - factor * b) % PRIME for a, b in zip(row, old, strict=True)]
+        lead = next((i for i, value in enumerate(row) if value), None)
+        if lead is None:
+            idle += 1
+            if idle > _IDLE_ROWS:
+                break  # rows come from random states: the rank is reached
+            continue
+        idle = 0
+        inverse = pow(row[lead], -1, PRIME)
+        row = [value * inverse % PRIME for value in row]
+        for k, old in enumerate(echelon):
+            if old[lead]:
+                factor = old[lead]
+                echelon[k] = [(a - factor * b) % PRIME for a, b in zip(old, row, strict=True)]
+        echelon.append(row)
+        pivots.append(lead)
+        if len(pivots) == n:
+            break
+    return echelon, pivots
+
+
+def _null_space(rows: Sequence[Sequence[int]], n: int) -> list[list[int]]:
+    # columns in reverse, so that a relation is solved for the later, more complex, terms
+    flipped = [list(reversed(row)) for row in rows]
+    echelon, pivots = _reduced(flipped, n)
+    vectors = []
+    for free in sorted(set(range(n)) - set(pivots)):
+        residues = [0] * n
+        residues[free] = 1
+        for pivot, row in zip(pivots, echelon, strict=True):
+            residues[pivot] = -row[free] % PRIME
+        fractions = [_rational(value) for value in reversed(residues)]
+        if any(value is None for value in fractions):
+            continue
+        exact = [value for value in fractions if value is not None]
+        scale = lcm(*(value.denominator for value in exact))
+        whole = [int(value * scale) for value in exact]
+        shared = gcd(*whole)
+        last = next(value for value in reversed(whole) if value)
+        whole = [value // shared * (1 if last > 0 else -1) for value in whole]
+        if all(sum(c * v for c, v in zip(whole, row, strict=True) if c) == 0 for row in rows):
+            vectors.append(whole)
+    return vectors
+
+
+def _rational(residue: int) -> Fraction | None:
+    """Return the small fraction with this residue   [Wang 1981, SYMSAC, 212]."""
+    limit = 2**29
+    old, new, old_t, new_t = PRIME, residue, 0, 1
+    while new > limit:
+        quotient = old // new
+        old, new = new, old - quotient * new
+        old_t, new_t = new_t, old_t - quotient * new_t
+    if new_t == 0 or abs(new_t) > limit:
+        return None
+    return Fraction(new, new_t)
+
+
+def _is_new(vector: Sequence[int], known: Sequence[Sequence[int]]) -> bool:
+    n = len(vector)
+    return len(_reduced([*known, vector], n)[1]) > len(known)
+
+
+def feels_33(library: TermLibrary) -> bool:
+    """Return whether σ33 acts on σ11, σ22 or σ12 through some term of a library.
+
+    If none does, what happens to σ33 is invisible to σ12 and to N1 in every simple shear. Exact,
+    as in `term_relations`; of several terms whose actions cancel, each still counts.
+    """
+    generator = random.Random(1)
+    for _ in range(_FRESH_STATES):
+        (s11, s22, s33, s12), rate, forms = _random_state(generator, library)
+        # a closed form is a function of tr σ, so it changes with σ33
+        other = {name: value + 1 for name, value in forms.items()}
+        here = exact_terms(library.terms, (s11, s22, s33, s12), rate, form_values=forms)
+        there = exact_terms(library.terms, (s11, s22, s33 + 1, s12), rate, form_values=other)
+        for a, b in zip(here, there, strict=True):
+            if (a[0], a[1], a[3]) != (b[0], b[1], b[3]):
+                return True
+    return False
+
+
+EXACT = 1e-13
+"""Singular value, relative to the largest of unit columns, that counts as zero.
+
+Linear identities commute with Runge–Kutta steps, so exact directions come out at rounding error,
+1e-16, and the weakest others well above."""
+
+_ENTRY = 1e-7
+
+_WEAKEST = 5
+"""Directions that are not exact, of which no more are told."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A change of the law's coefficients, its largest entry one.
+
+    `noise_for_tenth`: relative noise of the data at which the standard error along the direction is
+        0.1, zero for an exact one: with less noise the data determine it better.
+    `changes`: relative change of σ12, N1 and N2 per unit of the direction; N2's relative to N1.
+    `at_any_size`: whether a finite step along the direction leaves σ12 as it is too; None where not
+        decided. Where it does not, the invisible changes of the law lie on a curve (as the twins of
+        Johnson–Segalman do) that has this direction as its tangent.
+    """
+
+    coefficients: Mapping[str, float]  # term → entry
+    exact: bool  # whether the observed stresses do not change at all, to first order
+    noise_for_tenth: float
+    changes: Mapping[str, float]
+    at_any_size: bool | None = None
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        what = spell_briefly(self.coefficients)
+        seen = [
+            f"{name} ({self.changes[name]:.2g})"
+            for name in ("N1", "N2")
+            if self.changes[name] > 1e-6
+        ]
+        touched = f"it changes {' and '.join(seen)}" if seen else "it changes neither N1 nor N2"
+        if self.exact:
+            return f"The data see nothing of {what}; {touched}."
+        return (
+            f"{what} is known to 0.1 only with noise below "
+            f"{percent_of(self.noise_for_tenth)}; {touched}."
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the direction as JSON-able values."""
+        return {**asdict(self), "text": self.text}
+
+
+def weak_directions(
+    names: Sequence[str],
+    observed: Float[np.ndarray, "rows n"],
+    quantities: Mapping[str, Float[np.ndarray, "_ n"]],
+    n_observations: int,
+) -> tuple[list[Direction], list[Direction]]:
+    """Return the exact null directions and the weakest of the others.
+
+    `names`: of the coefficients. `observed`: sensitivities of what is observed, weighted so that
+    the norm of a column is the relative root-mean-square change per unit of the coefficient.
+    `quantities`: sensitivities of each quantity, weighted alike. `n_observations`: number of values
+    observed, each with independent noise.
+    """
+    norms = np.linalg.norm(observed, axis=0)
+    scale = np.where(norms > EXACT * np.max(norms, initial=1.0), norms, 1.0)
+    _, values, right = np.linalg.svd(observed / scale, full_matrices=True)
+    values = np.concatenate([values, np.zeros(right.shape[0] - values.size)])
+    null = values <= EXACT * max(values[0], 1e-300)
+    exact = [
+        _direction(names, vector, observed, quantities, n_observations, True)
+        for vector in _sparse_basis(right[null] / scale)
+        if np.any(vector)  # of fewer samples than terms, elimination may use a direction up
+    ]
+    near = [
+        _direction(names, vector / scale, observed, quantities, n_observations, False)
+        for vector in right[~null][::-1][:_WEAKEST]
+    ]
+    return exact, near
+
+
+def _direction(names, vector, observed, quantities, n_observations, exact) -> Direction:
+    vector = vector / vector[np.argmax(np.abs(vector))]
+    signal = float(np.linalg.norm(observed @ vector))
+    return Direction(
+        {
+            names[i]: float(np.round(vector[i], 12))
+            for i in np.flatnonzero(np.abs(vector) > (_ENTRY if exact else 0.02))
+        },
+        exact,
+        # the standard error of a unit step is noise / (√n · signal)
+        0.0 if exact else 0.1 * float(np.sqrt(n_observations)) * signal,
+        {key: float(np.linalg.norm(block @ vector)) for key, block in quantities.items()},
+    )
+
+
+def _sparse_basis(rows: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k n"]:
+    """Return a basis of the same space by elimination, later terms first, with many zeros.
+
+    A library lists simple terms first, so each vector expresses one complex term by simpler ones.
+    """
+    rows = rows / np.max(np.abs(rows), axis=1, keepdims=True, initial=1e-300)
+    done: list[int] = []
+    for column in range(rows.shape[1] - 1, -1, -1):
+        left = [i for i in range(rows.shape[0]) if i not in done]
+        if not left:
+            break
+        pivot = max(left, key=lambda i: abs(rows[i, column]))
+        if abs(rows[pivot, column]) < _ENTRY:
+            continue
+        rows[pivot] = rows[pivot] / rows[pivot, column]
+        for i in range(rows.shape[0]):
+            if i != pivot:
+                rows[i] = rows[i] - rows[i, column] * rows[pivot]
+        done.append(pivot)
+    rows[np.abs(rows) < _ENTRY] = 0.0
+    return rows

@@ -1,1 +1,0 @@
-"""Many laws of one library in many flows: one compiled program for all."""

@@ -1,0 +1,372 @@
+"""What an experiment can determine of a library, before any fit: no data are used, only protocols.
+
+At a nominal law the sensitivities of σ12 to every coefficient of the library are computed exactly.
+Their null space holds the changes of the law that the
+experiment cannot see; its image in N1 and N2 says whether those follow from σ12. Everything is to
+first order around the law; whether a direction stays invisible at finite size is decided in exact
+arithmetic where the law is a polynomial.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from fractions import Fraction
+from functools import partial
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+from jaxtyping import Array, Bool, Float
+
+from discover.dataset.run import Run
+from discover.forward.fluids import in_enough_steps, observed_on_grid
+from discover.forward.grids.flow_batch import FlowBatch, lay_out
+from discover.identify.exact_series import compare_series
+from discover.identify.relations import (
+    Direction,
+    TermRelation,
+    spell_briefly,
+    term_relations,
+    weak_directions,
+)
+from discover.identify.side_by_side import joint_library
+from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.expansion import LibraryExpansion
+from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.learners.runs import as_runs
+from discover.programs import compiled
+from discover.summary_view import NotebookView, SentenceAndTable, table_of
+from discover.words import percent_of
+from tensor_library.law_terms import LawTerms
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+
+@compiled
+def with_sensitivities(
+    law: LibraryExpansion, known: Fluid, flows: FlowBatch
+) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
+    """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients.
+
+    `law`: what it makes is not finite where it runs away. `known`: a fluid with its modes and
+    solvent. `flows`: the runs and their grids.
+    """
+
+    def observed(coefficients):
+        moved = replace(law, coefficients=coefficients)
+        found = flows.over(partial(observed_on_grid, replace(known, law=moved)))
+        return found, found
+
+    columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
+    return value, columns
+
+
+Verdict = Literal["measured", "determined", "assumed", "undetermined"]
+
+_CHANGED = 1e-6
+"""Relative change of a quantity per unit of a direction that counts as a change."""
+
+_ROWS = 400
+"""Samples of each quantity that enter a null space; more say nothing new of it."""
+
+_STRAIN_STEP = 0.2
+"""Largest strain of a step."""
+
+_FINITE_STEP = Fraction(1, 10)
+_FINITE_ORDER = 8
+_NORMAL_STRESSES = ("N1", "N2")
+
+NOMINAL: Mapping[str, LawTerms] = {
+    "with slip": LawTerms({"sigma.gammadot+gammadot.sigma": 0.2}),
+    "with quadratic relaxation": LawTerms({"sigma.sigma": 0.2}),
+    "with relaxation that grows with the trace": LawTerms({"tr(sigma)*sigma": 0.3}),
+}
+"""Nominal laws of ordinary strength: Johnson–Segalman, Giesekus and linear PTT, beyond UCM."""
+
+
+@dataclass(frozen=True)
+class QuantityVerdict:
+    """Whether the observed stresses determine a normal stress difference.
+
+    `verdict`: ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
+        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
+        of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
+        form of the law; ``"determined"`` otherwise, within the library.
+    """
+
+    quantity: str  # ``"N1"`` or ``"N2"``
+    verdict: Verdict
+    text: str  # the verdict for a reader
+
+    @property
+    def open(self) -> bool:
+        """Whether the observed stresses leave the quantity open."""
+        return self.verdict in ("undetermined", "assumed")
+
+    def line(self) -> dict[str, Any]:
+        """Return the verdict as one line of a table."""
+        return {"quantity": self.quantity, "verdict": self.verdict, "why": self.text}
+
+
+@dataclass(frozen=True)
+class LawStructure(NotebookView):
+    """What the experiment can determine around one nominal law.
+
+    `exact`, `weak`: directions of which the experiment sees nothing, and the weakest of the others.
+    `n_exact_with_N1`: number of exact directions that would be left if N1 were measured as well.
+    `one_more`: by quantity, the term beyond the law that leaves it most open.
+    """
+
+    name: str
+    law: LawTerms  # its terms beyond the known part
+    hidden: HiddenStresses  # what σ12 feels of the normal stresses
+    exact: tuple[Direction, ...]
+    weak: tuple[Direction, ...]
+    quantities: tuple[QuantityVerdict, ...]  # verdicts on N1 and N2 from what is observed
+    n_exact_with_N1: int
+    N2_with_N1: Verdict  # verdict on N2 if N1 were measured as well
+    one_more: Mapping[str, OneTermMore] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """The verdicts, one sentence each."""
+        return " ".join(q.text for q in self.quantities)
+
+    def line(self) -> dict[str, Any]:
+        """Return the law as one line of a table: combinations that no datum sees, and verdicts."""
+        verdicts = {q.quantity: q.verdict for q in self.quantities}
+        unseen = {"unseen": len(self.exact), "unseen_with_N1": self.n_exact_with_N1}
+        return {"law": self.name, **unseen, **verdicts, "N2_with_N1": self.N2_with_N1}
+
+    def table(self) -> pd.DataFrame:
+        """Return the verdicts on N1 and N2, one line each."""
+        return table_of(self.quantities)
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"Around {self.name}:"
+        yield self.table()
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the structure as JSON-able values."""
+        return {
+            "law": self.name,
+            "terms": dict(self.law.coefficients),
+            "hidden_stresses": self.hidden.to_json(),
+            "unseen_directions": [d.to_json() for d in self.exact],
+            "weak_directions": [d.to_json() for d in self.weak],
+            "quantities": [asdict(q) for q in self.quantities],
+            "unseen_directions_with_N1": self.n_exact_with_N1,
+            "N2_with_N1": self.N2_with_N1,
+            "one_term_more": {q: one.to_json() for q, one in self.one_more.items()},
+            "text": self.text,
+        }
+
+
+@dataclass(frozen=True)
+class Structure(SentenceAndTable):
+    """What an experiment can determine of a library."""
+
+    laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
+    relations: tuple[TermRelation, ...]  # exact relations among terms in shear, at any law
+    n_terms: int  # size of the library
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        counts = ", ".join(f"{len(law.exact)} at {law.name}" for law in self.laws)
+        return (
+            f"Of the {self.n_terms} coefficients of the library these flows leave unseen, however "
+            f"small the noise, this many combinations: {counts}."
+        )
+
+    def table(self) -> pd.DataFrame:
+        """Return how many combinations stay unseen, and the verdicts, one line for each law."""
+        return table_of(self.laws)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the structure as ``comparison.json`` holds it."""
+        return {
+            "text": self.text,
+            "n_terms": self.n_terms,
+            "relations": [relation.to_json() for relation in self.relations],
+            "laws": [law.to_json() for law in self.laws],
+        }
+
+
+def analyse_structure(
+    runs: Sequence[Run],
+    library: TermLibrary,
+    base: AbstractConstitutiveLaw | None = None,
+    nominal: Mapping[str, LawTerms] | None = None,
+    modulus: Any = 1.0,
+    relaxation_time: Any = 1.0,
+    solvent_viscosity: float = 0.0,
+    use_normal_stresses: bool = False,
+) -> Structure:
+    """Return what shear flows can determine of a library's coefficients.
+
+    `runs`: their protocols and sampling times; the stresses are not looked at, except that with
+    `use_normal_stresses` a run must hold N1 or N2 for it to count as measured. `library`: candidate
+    terms. `base`: known part; by default UCM. `nominal`: laws around which to look besides the
+    known part; by default those of `NOMINAL` whose terms the library holds. `modulus`,
+    `relaxation_time`, `solvent_viscosity`: known linear viscoelasticity, in Pa, s and Pa s; the
+    first two numbers, or one for each mode. `use_normal_stresses`: whether N1 and N2, where runs
+    hold them, are observed too.
+    """
+    base = UpperConvectedMaxwell() if base is None else base
+    if nominal is None:
+        nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
+    library = joint_library(library, list(nominal.values()))
+    modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
+    runs = as_runs(runs, modes[1], base.linear_relaxation)
+    known = Fluid(base, *modes, solvent_viscosity)
+    flows = in_enough_steps(
+        known,
+        lay_out(
+            [run.protocol for run in runs],
+            [run.time for run in runs],
+            strain_step=_STRAIN_STEP,
+            relaxation_time=known.settling_time,
+        ),
+    )
+    normal = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
+    also = [
+        quantity
+        for quantity, column in normal.items()
+        if use_normal_stresses and any(getattr(run, column) is not None for run in runs)
+    ]
+    longest = max(map(len, runs))
+    samples = np.arange(longest) < np.array([[len(run)] for run in runs])
+    found = []
+    for name, law in {"the known part alone": LawTerms({}), **nominal}.items():
+        one = _at(known, flows, samples, library, name, law, ["sigma12", *also])
+        if one is not None:
+            found.append(one)
+    return Structure(tuple(found), term_relations(library), len(library))
+
+
+def _at(
+    known: Fluid,
+    flows: FlowBatch,
+    samples: Bool[np.ndarray, "runs n"],
+    library: TermLibrary,
+    name: str,
+    law: LawTerms,
+    observed: Sequence[str],
+) -> LawStructure | None:
+    """Return the structure at one law, or None where it runs away in these flows."""
+    base = known.law
+    coefficients, inner = law.over(library)
+    whole = LibraryExpansion(
+        coefficients=jnp.asarray(coefficients),
+        inner=jnp.asarray(inner),
+        library=library,
+        linear_relaxation=base.linear_relaxation,
+        base=base,
+    )
+    value, columns = with_sensitivities(whole, known, flows)
+    shape = samples[..., None]
+    stresses = np.where(shape, np.asarray(value)[:, : samples.shape[1]], 0.0)
+    sensitivity = np.where(shape[..., None], np.asarray(columns)[:, : samples.shape[1]], 0.0)
+    if not (np.all(np.isfinite(stresses)) and np.all(np.isfinite(sensitivity))):
+        return None
+    # relative to the root-mean-square of each run; N2 to that of N1
+    scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
+    scale[:, 2] = scale[:, 1]
+    total = samples.sum()
+    blocks: dict[str, Float[np.ndarray, "rows n"]] = {}
+    for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
+        sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
+        block = sensitivity[:, :, kind] / sizes
+        rows = block[samples][:: max(1, total // _ROWS)]
+        blocks[quantity] = rows / np.sqrt(len(rows))
+    exact, weak = _directions(library, blocks, observed, int(total))
+    exact = [_finite(d, law, base) for d in exact]
+    with_n1 = list(dict.fromkeys([*observed, "N1"]))
+    left, _ = _directions(library, blocks, with_n1, int(total))
+    numbers = range(known.n_modes) if differs_by_mode(base) else [0]
+    of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
+    hidden = max(of_modes, key=lambda one: len(one.unfelt))
+    verdicts = tuple(
+        _verdict(q, list(observed), exact, weak, hidden, len(library)) for q in _NORMAL_STRESSES
+    )
+    n2_with_n1: Verdict = "undetermined" if _changing(left, "N2") else "determined"
+    if "N2" in observed:
+        n2_with_n1 = "measured"
+    elif n2_with_n1 == "undetermined" and verdicts[1].verdict == "undetermined":
+        text = verdicts[1].text + " Measuring N1 as well would not change this."
+        verdicts = (verdicts[0], replace(verdicts[1], text=text))
+    support = [library.names.index(term) for term in law.coefficients]
+    moved = each_moved(library.names, support, blocks, list(observed), int(total))
+    return LawStructure(
+        name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
+    )
+
+
+def _directions(library, blocks, observed, total):
+    stacked = np.concatenate([blocks[q] for q in observed])
+    # rows beyond the number of unknowns say nothing more to a null space
+    reduced = np.asarray(np.linalg.qr(stacked, mode="r"))
+    return weak_directions(library.names, reduced, blocks, total * len(observed))
+
+
+def _changing(directions: Sequence[Direction], quantity: str) -> list[Direction]:
+    changing = [d for d in directions if d.changes[quantity] > _CHANGED]
+    return sorted(changing, key=lambda d: (not d.at_any_size, len(d.coefficients)))
+
+
+def _finite(direction: Direction, law: LawTerms, base) -> Direction:
+    """Say whether a finite step along a direction is invisible too, where that can be decided."""
+    names = [*law.coefficients, *direction.coefficients]
+    polynomial = all(parse_term(name).closed_form is None for name in names)
+    if not polynomial or not isinstance(base, UpperConvectedMaxwell):
+        return direction
+    here = {n: Fraction(v).limit_denominator(10**5) for n, v in law.coefficients.items()}
+    there = dict(here)
+    for name, value in direction.coefficients.items():
+        step = _FINITE_STEP * Fraction(value).limit_denominator(1000)
+        there[name] = there.get(name, Fraction(0)) + step
+    agreement = compare_series(here, there, _FINITE_ORDER, base.linear_relaxation)
+    return replace(direction, at_any_size=agreement.sigma12 is None)
+
+
+def _verdict(quantity, observed, exact, weak, hidden, n_terms) -> QuantityVerdict:
+    if quantity in observed:
+        return QuantityVerdict(quantity, "measured", f"{quantity} is measured.")
+    what = " and ".join("σ12" if q == "sigma12" else q for q in observed)
+    examples = _changing(exact, quantity)
+    unfelt = ""
+    if observed == ["sigma12"] and hidden.leaves_no_trace(quantity):
+        unfelt = (
+            f" {hidden.text} So {quantity} follows from the convected derivative and the form of "
+            "the law that were assumed, not from the data."
+        )
+    if examples:
+        size = "" if examples[0].at_any_size else ", to first order"
+        text = (
+            f"{quantity} is not determined by {what}: {len(examples[0].coefficients)} terms more, "
+            f"h = {spell_briefly(examples[0].coefficients)} in any amount, change {quantity} and "
+            f"leave {what} as it is{size}.{unfelt}"
+        )
+        return QuantityVerdict(quantity, "undetermined", text)
+    if unfelt:
+        text = (
+            f"No combination of the {n_terms} terms changes {quantity} and leaves {what} as it "
+            f"is. But{unfelt[:2].lower()}{unfelt[2:]}"
+        )
+        return QuantityVerdict(quantity, "assumed", text)
+    text = (
+        f"If the law is in this library of {n_terms} terms, with the convected derivative that was "
+        f"assumed, {what} determines {quantity}"
+    )
+    feeble = [d for d in weak if d.changes[quantity] > 0.1]
+    if feeble:
+        limit = min(d.noise_for_tenth for d in feeble)
+        text += (
+            f"; a library of which every term were free would need noise below {percent_of(limit)}"
+        )
+    return QuantityVerdict(quantity, "determined", text + ".")

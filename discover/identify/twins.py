@@ -1,0 +1,407 @@
+"""Twins: laws with the same σ12, or σ12 and N1, in every simple-shear history.
+
+Two sources, both exact:
+
+relations
+    Combinations of terms that vanish in shear or live on σ33 (`term_relations`).
+changes of the hidden stresses
+    The normal stresses are never measured, so a law may be rewritten in other hidden variables as
+    long as σ12 stays. Whether the outcome is again a law of the library is decided in exact
+    arithmetic on the Taylor series (`solve_for_coefficient`), and the change itself is read off
+    the two series afterwards.
+
+Every twin is also simulated in random histories before it is reported.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from fractions import Fraction
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from discover.forward.fluids import dynamics_of_fluid
+from discover.forward.integrators.stepping import follow
+from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
+from discover.identify.relations import feels_33, term_relations
+from discover.identify.side_by_side import (
+    SAME,
+    Difference,
+    Separation,
+    differences,
+    histories_for,
+    joint_library,
+    separations,
+)
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws.multimode import Fluid
+from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.programs import compiled
+from discover.statistics import HALF_BAND
+from discover.summary_view import NotebookView
+from discover.words import percent_of
+from tensor_library.law_terms import LawTerms, spell
+from tensor_library.library import TermLibrary
+from tensor_library.terms import parse_term
+
+Proof = Literal["relation", "series", "histories"]
+_Candidate = tuple[LawTerms, Proof, dict[str, str]]
+
+_LARGEST_DENOMINATOR = 10**5
+_SHORT_DENOMINATOR = 100
+INVISIBLE_SIZE = 0.05
+"""Amount of a combination on σ33 that is added to show what it does; any amount would do."""
+
+
+@dataclass(frozen=True)
+class Twin(NotebookView):
+    """A law that no shear stress tells from another.
+
+    `proof`: ``"relation"`` or ``"series"``: exact. ``"histories"``: to integration error in random
+        histories.
+    `order`: order to which the Taylor series agree exactly, where that was the proof. It is given
+        at coefficients rounded to short fractions: that the family of twins exists is exact.
+    `change`: the twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
+    """
+
+    law: LawTerms  # the twin, beyond the known part
+    proof: Proof
+    keeps_N1: bool  # whether N1 is the same too
+    difference: Difference  # largest difference of σ12, N1 and N2 in random histories
+    separated_by: tuple[Separation, ...] = ()  # experiments that would tell the two apart
+    order: int | None = None
+    change: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        same = "the same σ12 and the same N1" if self.keeps_N1 else "the same σ12"
+        how = {
+            "relation": "an identity between tensors in shear",
+            "series": f"Taylor series equal to order {self.order} in exact arithmetic",
+            "histories": "to integration error in random histories",
+        }[self.proof]
+        text = (
+            f"h = {spell(self.law.coefficients)} gives {same} in every simple-shear history ({how})"
+        )
+        apart = []
+        if not self.keeps_N1:
+            apart.append(f"N1 by {percent_of(self.difference.N1)}")
+        if self.difference.N2 > SAME:
+            apart.append(f"N2 by {percent_of(self.difference.N2)} of N1")
+        text += f"; {' and '.join(apart)} apart" if apart else "; N2 is the same too"
+        if self.separated_by:
+            text += "; " + " or ".join(s.text for s in self.separated_by) + " would tell"
+        return text + "."
+
+    def line(self) -> dict[str, Any]:
+        """Return the twin as one line of a table: by how much it differs, what would tell."""
+        return {
+            "law": spell(self.law.coefficients),
+            "proof": self.proof,
+            "sigma12_apart": self.difference.sigma12,
+            "N1_apart": self.difference.N1,
+            "N2_apart": self.difference.N2,
+            "told_by": " or ".join(experiment.text for experiment in self.separated_by),
+        }
+
+    def _shown(self) -> Iterable[Any]:
+        yield self.text
+
+
+def find_twins(
+    library: TermLibrary, law: LawTerms, base: AbstractConstitutiveLaw | None = None
+) -> list[Twin]:
+    """Return the twins of a law, simplest first, checked by simulation.
+
+    Searched are: every other term of the library in place of each term of the law (exact; for a
+    polynomial law on UCM), every exchange along a relation that vanishes in shear, and
+    every combination that lives on σ33 only (where nothing in the law feels σ33).
+
+    `library`: candidate terms. `law`: the law, beyond the known part. `base`: the known part; by
+    default UCM.
+    """
+    base = UpperConvectedMaxwell() if base is None else base
+    library = joint_library(library, [law])
+    found: list[_Candidate] = []
+    if isinstance(base, UpperConvectedMaxwell):
+        found += _by_series(library, law, base.linear_relaxation)
+        found += _by_relations(library, law)
+    distinct = {_key(law): None}
+    unique = []
+    for one in found:
+        if _key(one[0]) not in distinct:
+            distinct[_key(one[0])] = None
+            unique.append(one)
+    if not unique:
+        return []
+    laws = [one[0] for one in unique]
+    apart = differences(library, law, laws, base)
+    kept = [(one, d) for one, d in zip(unique, apart, strict=True) if d.sigma12 <= SAME]
+    if not kept:
+        return []
+    told = separations(library, law, [one[0] for one, _ in kept], base)
+    return [
+        Twin(
+            law=twin,
+            proof=proof,
+            keeps_N1=d.N1 <= 10.0 * SAME,
+            difference=d,
+            separated_by=by,
+            order=DEFAULT_ORDER if proof == "series" else None,
+            change=change,
+        )
+        for ((twin, proof, change), d), by in zip(kept, told, strict=True)
+    ]
+
+
+def _key(law: LawTerms) -> tuple:
+    return tuple(sorted((n, round(v, 6)) for n, v in law.coefficients.items() if v))
+
+
+def _by_series(
+    library: TermLibrary, law: LawTerms, linear_relaxation: bool
+) -> Iterator[_Candidate]:
+    """Return twins with one term of the law exchanged for another.
+
+    The search runs at a neighbouring law with short fractions, where the arithmetic is fast and a
+    rational twin is recognised; what it finds is solved for again at the law itself.
+    """
+    present = {name: value for name, value in law.coefficients.items() if value}
+    if not present or any(parse_term(name).closed_form for name in present):
+        return
+    short = {n: _fraction(v, _SHORT_DENOMINATOR) for n, v in present.items()}
+    exact = {n: _fraction(v, _LARGEST_DENOMINATOR) for n, v in present.items()}
+    settings = {"order": DEFAULT_ORDER, "linear_relaxation": linear_relaxation}
+    for replaced in present:
+        rest = [name for name in present if name != replaced]
+        for term in library.terms:
+            if term.closed_form or term.name in present:
+                continue
+            near = {name: short[name] for name in rest}
+            at_short = solve_for_coefficient(short, term.name, near, **settings)
+            proved = [value for value, is_proved in at_short if is_proved and value]
+            if not any(value for value, _ in at_short):
+                continue
+            change = {}
+            if proved:
+                twin = {**near, term.name: Fraction(proved[0]).limit_denominator(10**6)}
+                change = hidden_change(short, twin, **settings)
+            here = {name: exact[name] for name in rest}
+            for value, _ in solve_for_coefficient(exact, term.name, here, **settings):
+                if value:
+                    found = LawTerms({**{n: present[n] for n in rest}, term.name: value})
+                    yield found, "series" if proved else "histories", change
+
+
+def _fraction(value: float, largest_denominator: int) -> Fraction:
+    """Return a short fraction near a value, but never zero for what is not."""
+    return Fraction(value).limit_denominator(largest_denominator) or Fraction(value)
+
+
+def _by_relations(library: TermLibrary, law: LawTerms) -> Iterator[_Candidate]:
+    present = {name: value for name, value in law.coefficients.items() if value}
+    hidden_33 = None
+    for relation in term_relations(library):
+        shared = [name for name in relation.coefficients if name in present]
+        if relation.touches == "nothing":
+            for name in shared:
+                factor = -present[name] / relation.coefficients[name]
+                yield _added(law, relation.coefficients, factor), "relation", {}
+            continue
+        if hidden_33 is None:
+            names = list(present) or ["sigma"]
+            hidden_33 = not feels_33(TermLibrary(tuple(parse_term(name) for name in names)))
+        if hidden_33:
+            # exchanging a term of the law keeps the law small; adding the whole shows the freedom
+            for name in shared:
+                factor = -present[name] / relation.coefficients[name]
+                yield _added(law, relation.coefficients, factor), "relation", {}
+            added = _added(law, relation.coefficients, INVISIBLE_SIZE)
+            if not feels_33(TermLibrary(tuple(parse_term(n) for n in added.coefficients))):
+                yield added, "relation", {}
+
+
+def _added(law: LawTerms, relation: Mapping[str, int], factor: float) -> LawTerms:
+    total = dict(law.coefficients)
+    for name, value in relation.items():
+        total[name] = total.get(name, 0.0) + factor * value
+    # what cancels, cancels exactly: the factor was made from the same coefficient
+    return LawTerms({n: v for n, v in total.items() if abs(v) > 1e-14}, law.inner)
+
+
+_ZERO = 1e-10
+"""Relative singular value that counts as zero; exact ones come out at rounding error."""
+
+_NORMALS = ("σ11", "σ22", "σ33")
+_DIFFERENCES = {"N1": np.array([1.0, -1.0, 0.0]), "N2": np.array([0.0, 1.0, -1.0])}
+
+
+@dataclass(frozen=True)
+class HiddenStresses:
+    """What σ12 feels of the normal stresses in one law.
+
+    `unfelt`: orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
+    `felt`: for N1 and N2, whether the difference is free of every unfelt combination.
+    """
+
+    unfelt: Float[np.ndarray, "k 3"]
+    felt: dict[str, bool]
+
+    def leaves_no_trace(self, quantity: str) -> bool:
+        """Return whether one of the two stresses that make N1 or N2 never reaches σ12 at all."""
+        return any(
+            np.count_nonzero(np.abs(row) > 1e-8) == 1 and abs(row @ _DIFFERENCES[quantity]) > 1e-8
+            for row in self.unfelt
+        )
+
+    @property
+    def text(self) -> str:
+        """One sentence for a reader."""
+        if not len(self.unfelt):
+            return "σ12 feels all three normal stresses."
+        listed = []
+        for row in self.unfelt:
+            parts = [
+                f"{value:+.2g} {name}"
+                for value, name in zip(row, _NORMALS, strict=True)
+                if abs(value) > 1e-6
+            ]
+            listed.append(
+                parts[0].split(" ")[1] if len(parts) == 1 else "(" + " ".join(parts) + ")"
+            )
+        return f"A change of {' or of '.join(listed)} never reaches σ12."
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the combinations as JSON-able values."""
+        return {"unfelt": self.unfelt.tolist(), "felt": dict(self.felt), "text": self.text}
+
+
+def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
+    """Return which normal stresses σ12 feels in a law, over random shear histories.
+
+    `law`: any dimensionless law. Histories in which it runs away are left out.
+    """
+    flows = histories_for(law)
+    arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
+    usable = np.all(np.isfinite(arrived), axis=(1, 2))
+    rows = arrived[usable].reshape(-1, 3)
+    triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))
+    _, values, right = np.linalg.svd(triangular)
+    unfelt = _readable(right[values <= _ZERO * max(values[0], 1e-300)])
+    felt = {
+        name: bool(np.all(np.abs(unfelt @ difference) < 1e-8))
+        for name, difference in _DIFFERENCES.items()
+    }
+    return HiddenStresses(unfelt, felt)
+
+
+def _readable(rows: np.ndarray) -> np.ndarray:
+    """Return an orthonormal basis of the same space, along the axes where it holds them."""
+    basis: list[np.ndarray] = []
+    projector = rows.T @ rows
+    for axis in np.eye(3):
+        if np.linalg.norm(projector @ axis - axis) < 1e-8:
+            basis.append(axis)
+    for row in rows:
+        for known in basis:
+            row = row - (row @ known) * known
+        if np.linalg.norm(row) > 1e-6 and len(basis) < len(rows):
+            row = row / np.linalg.norm(row)
+            basis.append(row * np.sign(row[np.argmax(np.abs(row))]))
+    return np.array(basis).reshape(-1, 3)
+
+
+@compiled
+def _arrivals(law, protocols, grids):
+    """Return ∂σ12(t)/∂(σ11, σ22, σ33)(0) at the samples, (runs, n, 3)."""
+
+    def one(protocol, grid):
+        alone = dynamics_of_fluid(Fluid.dimensionless(law), protocol)
+
+        def slope(state, rate):
+            stress, changes = state[:, 0], state[:, 1:]
+            value, push = jax.linearize(lambda s: alone.slope(s, rate), stress)
+            along = jax.vmap(push, in_axes=1, out_axes=1)(changes)
+            return jnp.concatenate([value[:, None], along], axis=1)
+
+        beside = alone._replace(slope=slope, columns=3)
+        start = beside.rest()[0].at[:3, 1:, 0].set(jnp.eye(3))
+        return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
+
+    return jax.vmap(one)(protocols, grids)
+
+
+_UNSEEN = 1e-7
+"""Share of a combination that is seen, below which it is an exact direction: those are judged by
+themselves, in exact arithmetic."""
+
+
+@dataclass(frozen=True)
+class OneTermMore:
+    """The term that leaves a quantity most open if it is fitted along.
+
+    `per_noise`: half of the 95 % interval of the quantity, root-mean-square over N1's, over the
+        relative noise of the records, white and of one size.
+    """
+
+    term: str  # its name
+    per_noise: float
+
+    def to_json(self) -> dict[str, Any]:
+        """Return it as JSON-able values."""
+        return asdict(self)
+
+
+def one_term_more(
+    names: Sequence[str],
+    support: Sequence[int],
+    observed: Float[np.ndarray, "rows terms"],
+    quantity: Float[np.ndarray, "others terms"],
+    samples: int,
+) -> OneTermMore | None:
+    """Return the term that leaves a quantity most open; None where none can be seen.
+
+    `names`: of all terms of the library. `support`: positions of those that the law has.
+    `observed`, `quantity`: changes of what is observed and of the quantity per unit of each
+    coefficient, so scaled that the norm of a column is a root-mean-square over that of the records.
+    `samples`: how many samples of what is observed there are.
+    """
+    worst = None
+    for extra, name in enumerate(names):
+        columns = [*support, extra]
+        sizes = np.linalg.norm(observed[:, columns], axis=0)
+        if extra in support or np.any(sizes == 0.0):
+            continue
+        _, seen, turned = np.linalg.svd(observed[:, columns] / sizes, full_matrices=False)
+        if len(seen) < len(columns) or seen[-1] < _UNSEEN * seen[0]:
+            continue
+        # a column of the root is a combination of the constants that varies by one deviation
+        root = (turned.T / seen) / sizes[:, None]
+        width = HALF_BAND * float(np.linalg.norm(quantity[:, columns] @ root)) / np.sqrt(samples)
+        if worst is None or width > worst.per_noise:
+            worst = OneTermMore(name, width)
+    return worst
+
+
+def each_moved(
+    names: Sequence[str],
+    support: Sequence[int],
+    blocks: Mapping[str, Float[np.ndarray, "rows terms"]],
+    observed: Sequence[str],
+    samples: int,
+) -> dict[str, OneTermMore]:
+    """Return the same of every quantity that is not observed, by its name.
+
+    `blocks`: changes of each quantity, observed or not. `observed`: which are.
+    """
+    stacked = np.concatenate([blocks[q] for q in observed])
+    found = {
+        q: one_term_more(names, support, stacked, block, samples)
+        for q, block in blocks.items()
+        if q not in observed
+    }
+    return {q: one for q, one in found.items() if one is not None}

@@ -1,1 +1,0 @@
-"""Estimators in files: plain values, and where they come from."""

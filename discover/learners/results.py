@@ -1,0 +1,318 @@
+"""What a learner returns: the law term by term, tables, and draws with names."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float, Num
+
+from discover.dataset.run import Run
+from discover.equations import Equation, HasEquation, combined, law_parts
+from discover.errors import InputError
+from discover.laws.base import AbstractConstitutiveLaw
+from discover.learners.runs import as_runs
+from discover.plain_numbers import xarray_module
+from discover.statistics import LackOfFit
+from discover.summary_view import Estimate, NotebookView
+from tensor_library.law_terms import Interval, LawTerm, spell
+
+
+@dataclass(frozen=True)
+class RecoveredTerm(LawTerm):
+    """One term of a recovered law: a `LawTerm`, and what the learner knows beyond it.
+
+    Attributes
+    ----------
+    term, inner, ci95
+        As in `LawTerm`.
+    coefficient
+        Refitted without penalty (debiased).
+    coefficient_penalised
+        From the penalised or thresholded problem that selected it, or None where there was none.
+    latex
+        The term as LaTeX, without its coefficient.
+    inner_ci95
+        95 % intervals of the inner parameters.
+    inner_at_one
+        For a closed form whose coefficient may be one, as in the law that it is named after:
+        each inner parameter with its 95 % interval (value, low, high) if the coefficient is one.
+    ci95_given_equal_modes
+        That of one coefficient for all modes, where `ci95` holds coefficients that differ from mode
+        to mode; else None.
+    ci95_given_declared
+        That with the declared modulus and relaxation time, where `ci95` holds the coefficient with
+        those that a linear term amounts to as well; else None.
+    """
+
+    coefficient_penalised: float | None = field(default=None, kw_only=True)
+    latex: str = field(default="", kw_only=True)
+    inner_ci95: Mapping[str, Interval] = field(default_factory=dict, kw_only=True)
+    inner_at_one: Mapping[str, tuple[float, float, float]] = field(
+        default_factory=dict, kw_only=True
+    )
+    ci95_given_equal_modes: Interval | None = field(default=None, kw_only=True)
+    ci95_given_declared: Interval | None = field(default=None, kw_only=True)
+
+    @property
+    def is_told_from_zero(self) -> bool:
+        """Whether its interval says that it is there; not so without one."""
+        return self.ci95 is not None and not self.ci95[0] <= 0.0 <= self.ci95[1]
+
+    @property
+    def in_law(self) -> LawTerm:
+        """The term as an equation holds it."""
+        return LawTerm(self.term, self.coefficient, self.inner, self.ci95)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything as JSON-able values; `from_json` undoes it."""
+        first = dict.fromkeys(("term", "coefficient", "coefficient_penalised", "ci95"))
+        return first | {one.name: getattr(self, one.name) for one in fields(self)}
+
+
+class TermTables(NotebookView):
+    """Tables of a learner's `terms` and `details`, for a fresh result and for one that was kept."""
+
+    learner: str
+    terms: tuple[RecoveredTerm, ...]
+    details: Mapping[str, Any]
+    message: str
+
+    def table(self) -> pd.DataFrame:
+        """Return the terms with their coefficients and 95 % intervals, one line each."""
+        columns = ["term", "coefficient", "low", "high", "penalised", "inner"]
+        lines = []
+        for t in self.terms:
+            low, high = (None, None) if t.ci95 is None else t.ci95
+            inner = ", ".join(f"{name} = {value:.6g}" for name, value in t.inner.items())
+            lines.append((t.term, t.coefficient, low, high, t.coefficient_penalised, inner))
+        return pd.DataFrame(lines, columns=columns)
+
+    def path_table(self) -> pd.DataFrame:
+        """Return the best law of each size, from no term on; empty where the learner has no path.
+
+        Columns: relative misfit on all runs, relative misfit on runs left out of the refit
+        (``held_out``), log evidence, and which rules choose the law.
+        """
+        lines = []
+        for member in self.details.get("path", ()):
+            by = [rule for rule, terms in self._chosen().items() if set(terms) == _support(member)]
+            lines.append(
+                {
+                    "size": member["size"],
+                    "terms": ", ".join(member["support"]) or "no term",
+                    **{name: member[name] for name in ("misfit", "held_out", "log_evidence")},
+                    "chosen_by": ", ".join(by),
+                }
+            )
+        return pd.DataFrame(lines)
+
+    def selectors_table(self) -> pd.DataFrame:
+        """Return the terms that each rule for choosing a law takes; empty where there is no path.
+
+        A column for each term that some rule takes, and whether the rule takes it.
+        """
+        chosen = self._chosen()
+        terms = list(dict.fromkeys(term for support in chosen.values() for term in support))
+        lines = {rule: [term in support for term in terms] for rule, support in chosen.items()}
+        table = pd.DataFrame.from_dict(lines, orient="index", columns=terms, dtype=bool)
+        return table.rename_axis("rule")
+
+    def inclusion_table(self) -> pd.DataFrame:
+        """Return the probability that each term is in the law, the likeliest first.
+
+        Were the law among those that were fitted. Empty where the learner weighs none.
+        """
+        found = dict(self.details.get("inclusion") or {})
+        return pd.DataFrame({"term": list(found), "probability": list(found.values())})
+
+    def rivals_table(self) -> pd.DataFrame:
+        """Return the other laws that the records do not rule out, the closest predictions first.
+
+        Columns: terms, coefficients, relative misfit, relative difference of predictions, log
+        evidence, and whether no record of these runs tells the two apart.
+        """
+        lines = [
+            {
+                "terms": ", ".join(row["support"]) or "no term",
+                "coefficients": ", ".join(f"{value:.4g}" for value in row["coefficients"]),
+                **{name: row[name] for name in ("misfit", "difference", "log_evidence", "exact")},
+            }
+            for row in self.details.get("rivals", ())
+        ]
+        return pd.DataFrame(lines)
+
+    def _chosen(self) -> Mapping[str, Sequence[str]]:
+        return (self.details.get("selectors") or {}).get("chosen") or {}
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.learner}: {self.message}"
+        yield self.table()
+
+
+def estimates_of(
+    terms: Sequence[RecoveredTerm],
+    left: LackOfFit | None,
+    rivals: Iterable[Collection[str]],
+    key: tuple[str, ...] = (),
+) -> list[Estimate]:
+    """Return the coefficients of terms, and whether the data determine each.
+
+    `terms`: of the law. `left`: what the law leaves of the runs; None where that is not known.
+    `rivals`: terms of each law that the runs do not tell from it. `key`: what stands before the
+    term in the index of a summary.
+    """
+    rivals = list(rivals)
+    found = []
+    for term in terms:
+        notes = {"determined": _determined(term, left, rivals)}
+        found.append(Estimate((*key, term.term), term.coefficient, term.ci95, notes=notes))
+        for name, value in term.inner.items():
+            ends = term.inner_ci95.get(name)
+            found.append(Estimate((*key, f"{name} of {term.term}"), value, ends, notes=notes))
+    return found
+
+
+def _determined(
+    term: RecoveredTerm, left: LackOfFit | None, rivals: Iterable[Collection[str]]
+) -> str:
+    if term.ci95 is None:
+        return "no: without interval"
+    if left is not None and left.verdict != "explained":
+        return "no: the law misses the runs by more than noise"
+    if not term.is_told_from_zero:
+        return "no: may be zero"
+    if any(term.term not in rival for rival in rivals):
+        return "no: a law without it fits as well"
+    return "yes, if the law is in the library"
+
+
+def _support(member: Mapping[str, Any]) -> set[str]:
+    return set(member["support"])
+
+
+@dataclass(frozen=True)
+class LearnerResult(HasEquation, TermTables):
+    """A learned law and how it was learned.
+
+    Attributes
+    ----------
+    learner
+        Name of the learner.
+    law
+        The law, dimensionless, ready to simulate.
+    terms
+        The law, or its projection on a library, term by term.
+    train_seconds
+        Wall-clock time of `fit`.
+    loss_history
+        Iterations and losses, both of shape (m,); empty where there is nothing to show.
+    details
+        What else this learner can say; JSON-able.
+    message
+        One sentence on how the fit ended.
+    members
+        Laws that fit the data about as well, this one among them; empty where there is one only.
+    """
+
+    learner: str
+    law: AbstractConstitutiveLaw
+    terms: tuple[RecoveredTerm, ...]
+    train_seconds: float = 0.0
+    loss_history: tuple[Num[np.ndarray, " m"], Float[np.ndarray, " m"]] = field(
+        default_factory=lambda: (np.zeros(0), np.zeros(0))
+    )
+    details: Mapping[str, Any] = field(default_factory=dict)
+    message: str = ""
+    members: tuple[AbstractConstitutiveLaw, ...] = ()
+
+    def __repr__(self) -> str:
+        terms = spell({t.term: t.coefficient for t in self.terms}) if self.terms else "no term"
+        return f"<LearnerResult {self.learner}: {terms}; {self.message}>"
+
+    def equation(self) -> Equation:
+        """Return the law term by term, a known law below it included, dimensionless.
+
+        Of a network this is its projection on the library.
+        """
+        base = getattr(self.law, "base", None)
+        found = tuple(term.in_law for term in self.terms)
+        named, known = (None, ()) if base is None else law_parts(base)
+        # one mode stands for all, but where each has constants of its own
+        unit = (1.0,) * (1 if named is None else len(named.constants))
+        return Equation(
+            combined(known + found) if known else found,
+            unit,
+            unit,
+            linear_relaxation=self.law.linear_relaxation,
+            named=named,
+        )
+
+    def _shown(self) -> Iterable[Any]:
+        yield f"{self.learner}: {self.message}"
+        yield self.equation()
+        yield self.table()
+
+
+if TYPE_CHECKING:
+    import xarray
+
+N_DRAWS = 1000
+
+
+def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
+    """Return draws of the coefficients of a law's terms, dimensions chain, draw and term.
+
+    Raises InputError if the law has no term, or xarray is missing.
+    """
+    rng = np.random.default_rng(seed)
+    terms, values, inner = _of_a_sparse_law(estimator, rng)
+    variables = {"coefficient": (("chain", "draw", "term"), values[None])}
+    variables |= {name: (("chain", "draw"), column[None]) for name, column in inner.items()}
+    coordinates = {"chain": [0], "draw": np.arange(len(values)), "term": terms}
+    told = {"given": "the terms that were chosen", **_source(estimator)}
+    return xarray_module().Dataset(variables, coordinates, told)
+
+
+def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":
+    """Return what each network of an ensemble predicts, dimensions member and sample.
+
+    `estimator`: a fitted `TBNNUDE`. `runs`: the flows; by default those that were fitted. σ12, N1
+    and N2 are in Pa, time is in s. Raises InputError if there are no runs, or xarray is missing.
+    """
+    wanted = getattr(estimator, "runs_", None) if runs is None else runs
+    if wanted is None:
+        raise InputError("A file holds no data; give the runs to predict: to_xarray(data).")
+    fluid = estimator.fluid_
+    followed = as_runs(wanted, fluid.relaxation_time, fluid.law.linear_relaxation)
+    each = [estimator.predict_members(run.protocol, run.time) for run in followed]
+    variables = {
+        name: (("member", "sample"), np.concatenate([getattr(one, name) for one in each], axis=1))
+        for name in ("sigma12", "N1", "N2")
+    }
+    coordinates = {
+        "member": np.arange(len(estimator.members_)),
+        "run": ("sample", np.concatenate([[run.name] * len(run) for run in followed])),
+        "time_s": ("sample", np.concatenate([run.time for run in followed])),
+    }
+    return xarray_module().Dataset(variables, coordinates, _source(estimator))
+
+
+def _of_a_sparse_law(
+    estimator: Any, rng: np.random.Generator
+) -> tuple[list[str], np.ndarray, dict[str, np.ndarray]]:
+    """Return the terms, and draws of their coefficients and of inner parameters."""
+    if estimator.covariance_ is None:
+        raise InputError("No term was chosen, so there is no coefficient to draw.")
+    found = [term.coefficient for term in estimator.terms_]
+    inner = {name: v for term in estimator.terms_ for name, v in term.inner.items()}
+    centre = [*found, *inner.values()]
+    values = rng.multivariate_normal(centre, estimator.covariance_, N_DRAWS)
+    size, terms = len(found), [term.term for term in estimator.terms_]
+    return terms, values[:, :size], dict(zip(inner, values[:, size:].T, strict=True))
+
+
+def _source(estimator: Any) -> dict[str, str]:
+    found = estimator.provenance_
+    return {"learner": estimator.learner, "data": found.data, "runs": ", ".join(found.runs)}

@@ -1,1 +1,0 @@
-"""What a learner answers: terms, their weights, and the table of both."""

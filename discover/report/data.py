@@ -1,0 +1,344 @@
+"""Pages on data: what was read, linear tests beside each other, shifted curves."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from discover.dataset.checking.runs import Finding
+from discover.dataset.dataset import Dataset
+from discover.dataset.linear.linear_tests import NAMES, SWEEP, Agreement
+from discover.dataset.linear.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
+from discover.dataset.linear_viscoelasticity import relaxation_spectrum
+from discover.dataset.material_functions import linear_sweep_as_run
+from discover.dataset.run import Run
+from discover.dataset.run_table import material_and_temperature, run_line
+from discover.dataset.tables.table import toml_string
+from discover.errors import InputError
+from discover.report.page import attempt, render
+from discover.report.plots.data import data_pictures, linear_function, superposition_pictures
+from discover.report.wording import percent
+from discover.statistics import HALF_BAND
+from discover.words import counted, significant
+
+# From so many runs on one can be spared to judge
+_ENOUGH_TO_HOLD_OUT = 3
+
+
+def data_page(
+    dataset: Dataset, findings: Sequence[Finding], folder: str, imported: Sequence[str] = ()
+) -> str:
+    """Return a page with every test drawn, what is doubtful, and a study to start from."""
+    try:
+        spectrum = None
+        if dataset.linear_sweep is not None:
+            spectrum = relaxation_spectrum(dataset.linear_sweep)
+    except (InputError, RuntimeError, np.linalg.LinAlgError):
+        spectrum = None  # the check says why
+    tables = list(dataset.material_functions.values())
+    if dataset.linear_sweep is not None:
+        tables.insert(0, linear_sweep_as_run(dataset.linear_sweep))
+    pictures = attempt("The pictures", lambda: data_pictures(dataset, spectrum))
+    return render(
+        "data.html",
+        name=dataset.name,
+        conditions=material_and_temperature(dataset),
+        doubts=[str(finding) for finding in findings if finding.severity != "note"],
+        notes=[*imported, *(str(finding) for finding in findings if finding.severity == "note")],
+        pictures=pictures if isinstance(pictures, list) else [],
+        missing=None if isinstance(pictures, list) else pictures.sentence,
+        lines=[*map(_line, dataset), *(_line(run, is_table=True) for run in tables)],
+        study=first_study(dataset, folder),
+        modes="" if spectrum is None else counted(len(spectrum), "mode"),
+    )
+
+
+def _line(run: Run, *, is_table: bool = False) -> dict[str, Any]:
+    """Return what the page says of one file, with the values that it holds."""
+    values, unit = run.recorded, "" if run.quantity == "strain" else "Pa"
+    rate = _ends(run.rate, "1/s")
+    along = _ends(run.time, "s")
+    if run.protocol.control == "oscillation":
+        values = np.concatenate([record.recorded for record in run.records])
+        along, rate = _ends(run.angular_frequency, "rad/s"), "–"
+        if run.strain is not None and np.ptp(run.strain) > 0.0:
+            along = f"{_ends(run.strain, 'strain')}, {along}"
+    elif run.protocol.control == "steady":
+        along = "–"
+    elif is_table:
+        rate = "–"
+        _, values, unit = linear_function(run)
+    return {
+        "name": run.name,
+        "taken_for": run_line(run)["flow"],
+        "samples": len(run),
+        "along": along,
+        "rate": rate,
+        "recorded": _ends(values, unit),
+        "beside": ", ".join(run.beside) or "–",
+    }
+
+
+def _ends(values: np.ndarray, unit: str) -> str:
+    low, high = (significant(float(end), 3) for end in (np.min(values), np.max(values)))
+    return f"{low if low == high else f'{low} to {high}'} {unit}".strip()
+
+
+def first_study(dataset: Dataset, folder: str) -> str:
+    """Return a study of these data that runs as it is, as TOML."""
+    lines = ["[data]", f"folder = {toml_string(folder)}"]
+    if len(dataset) >= _ENOUGH_TO_HOLD_OUT:
+        fastest = max(dataset, key=lambda run: float(np.max(np.abs(run.rate))))
+        lines.append(
+            f"held_out = [{toml_string(fastest.name)}]  # not fitted: it tests the law found"
+        )
+    for kind in dataset.material_functions:
+        role = "judge" if len(dataset) else "fit"
+        lines.append(f'{kind} = "{role}"  # or "{"fit" if role == "judge" else "judge"}"')
+    if dataset.linear_sweep is not None and not len(dataset) and not dataset.material_functions:
+        lines.append('lve = "fit"')
+    lines += ["", "[model]", 'law = "ucm"  # the part of the law that is taken as known']
+    if dataset.linear_sweep is not None:
+        lines.append('modes = "lve"')
+    else:
+        lines += ['modulus_Pa = "fit"', 'relaxation_time_s = "fit"']
+    lines += ["", "[loop]", "max_effects = 3"]
+    return "\n".join(lines) + "\n"
+
+
+def agreement_words(agreements: Sequence[Agreement]) -> list[str]:
+    """Return whether linear tests predict one another, a sentence for each two."""
+    groups = groupby(sorted(agreements, key=_pair), key=_pair)
+    said = [_sentence(list(group)) for _, group in groups]
+    return [*said, *_apart(agreements)]
+
+
+def _pair(one: Agreement) -> tuple[str, str]:
+    return one.source, one.test
+
+
+def _sentence(group: list[Agreement]) -> str:
+    source, test = NAMES[group[0].source], NAMES[group[0].test]
+    off = [one for one in group if not one.agrees]
+    good = [one for one in group if one.agrees]
+    parts = []
+    if good:
+        sizes = _range([one.error for one in good])
+        parts.append(f"predicts the {test} to {sizes} (root mean square) at {_degrees(good)}")
+    if off:
+        biases = [one.bias for one in off]
+        if all(one.bias > 0.5 * one.error for one in off):
+            where = f"lies {_range(biases)} above what was measured on average"
+        elif all(one.bias < -0.5 * one.error for one in off):
+            where = f"lies {_range([-bias for bias in biases])} below what was measured on average"
+        else:
+            where = f"is off by {_range([one.error for one in off])} (root mean square)"
+        left = _range([one.left for one in off])
+        parts.append(
+            f"does not predict {'it' if good else f'the {test}'} at {_degrees(off)}: what it "
+            f"predicts {where}, and divided by one factor at each temperature {left} would be left"
+        )
+    return f"The {source} {'; it '.join(parts)}."
+
+
+def _apart(agreements: Sequence[Agreement]) -> list[str]:
+    """Return which of three tests stands apart by one factor, if the two others agree better."""
+    kinds = sorted({one.source for one in agreements})
+    if len(kinds) < 3:
+        return []
+
+    def bias(first: str, second: str) -> float:
+        both = [abs(one.bias) for one in agreements if {one.source, one.test} == {first, second}]
+        return sum(both) / len(both) if both else float("inf")
+
+    pairs = sorted((bias(a, b), a, b) for i, a in enumerate(kinds) for b in kinds[i + 1 :])
+    (least, first, second), (more, *_) = pairs[0], pairs[1]
+    third = next(kind for kind in kinds if kind not in (first, second))
+    if not (least <= 0.5 * more and more > 0.1):
+        return []
+    return [
+        f"The {NAMES[first]} and the {NAMES[second]} agree on their size to {percent(least)} on "
+        f"average, and the {NAMES[third]} stands apart from both, by {percent(more)} or more: a "
+        f"gain, a trim or a loading of the {NAMES[third]}, or one that the two others share."
+    ]
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = percent(min(values)), percent(max(values))
+    return low if low == high else f"{low.removesuffix(' %')} to {high}"
+
+
+def _degrees(group: Sequence[Agreement]) -> str:
+    return f"{', '.join(f'{one.celsius:g}' for one in group)} °C"
+
+
+def agreement_lines(agreements: Sequence[Agreement]) -> list[dict[str, str]]:
+    """Return the lines of the table on the page."""
+    return [
+        {
+            "source": NAMES[one.source],
+            "test": NAMES[one.test],
+            "temperature": f"{one.celsius:g}",
+            "times": f"{one.times[0]:.3g} to {one.times[1]:.3g}",
+            "error": percent(one.error),
+            "bias": f"{'+' if one.bias > 0 else '−'}{percent(abs(one.bias))}",
+            "left": percent(one.left),
+        }
+        for one in agreements
+    ]
+
+
+_DESCRIBES = 0.1
+"""Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
+
+_UNKNOWN = 0.3
+"""Standard error in decades from which on a shift factor is said not to be determined: 95 % would
+span a factor of four either way."""
+
+_SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("E", "J/mol")}
+_PLURALS = {kind: f"{name}s" for kind, name in NAMES.items()} | {"relaxation": "relaxation moduli"}
+
+
+def superposition_words(
+    found: Superposition, own: Mapping[str, Superposition] | None = None
+) -> list[str]:
+    """Return what can be said of a superposition, a sentence each.
+
+    `found`: tests and shifts. `own`: what tables over time ask for by themselves, by kind, where
+    the shifts are the sweeps'.
+    """
+    said = [_verdict(found, kind) for kind in found.leading]
+    if found.verdict == "not_superposed":
+        return said
+    led = [kind for kind in found.tests if kind not in found.leading]
+    said += [_verdict(found, kind) for kind in led if found.misfits(kind)]
+    said += [_own_words(found, one, kind) for kind, one in (own or {}).items()]
+    open_ = [
+        f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
+    ]
+    if open_:
+        said.append(
+            f"At {', '.join(open_)} °C these data do not determine the shift factors: where the "
+            "curves overlap they are straight lines, which slide along themselves."
+        )
+    if found.apart:
+        degrees = ", ".join(f"{t:g}" for t in found.apart)
+        said.append(f"The tests at {degrees} °C are not moved: no test of their kind to compare.")
+    return [*said, *(_law_words(law, found) for law in found.laws)]
+
+
+def _verdict(found: Superposition, kind: str) -> str:
+    misfits = found.misfits(kind)
+    if not misfits:  # shifts that nothing determines may leave no overlap
+        return (
+            f"Whether the {_PLURALS[kind]} superpose is doubtful: moved by the shifts found, those "
+            "of neighbouring temperatures do not overlap."
+        )
+    (cold, warm), size = max(misfits.items(), key=lambda item: item[1])
+    worst, where = percent(size), f"{cold:g} and {warm:g} °C"
+    own = kind in found.leading
+    moved = "" if own else f" with the shifts of the {_PLURALS[found.leading[0]]}"
+    what = _PLURALS[kind]
+    verdict = found.verdict_of(kind)
+    if verdict == "superposed":
+        return f"The {what} superpose{moved}: the worst overlap, of {where}, is off by {worst}."
+    if verdict == "doubtful":
+        return (
+            f"Whether the {what} superpose{moved} is doubtful: those at {where} are off by {worst} "
+            "where they overlap, more than two loadings of one sample usually are "
+            f"({percent(SUPERPOSED)})."
+        )
+    one = "sweep" if kind == SWEEP else "table"
+    return (
+        f"The {what} do not superpose{moved}: those at {where} are off by {worst} where they "
+        f"overlap ({percent(FAILED)} or more). No single {one} stands for them; leave temperatures "
+        "out with --between, or allow a shift of the moduli with --vertical."
+    )
+
+
+def _own_words(found: Superposition, own: Superposition, kind: str) -> str:
+    """Return whether tables by themselves ask for the shifts that the sweeps gave."""
+    other = []
+    for i, degrees in enumerate(found.celsius):
+        j = np.flatnonzero(own.celsius == degrees)
+        if not len(j) or degrees == found.reference:
+            continue
+        apart = abs(own.log_shift[j[0]] - found.log_shift[i])
+        if apart > HALF_BAND * float(np.hypot(own.error[j[0], 0], found.error[i, 0])):
+            theirs, ours = own.factors(int(j[0]))[0], found.factors(i)[0]
+            other.append(f"at {degrees:g} °C {_factor(theirs)} and not {_factor(ours)}")
+    if not other:
+        return f"The {_PLURALS[kind]} by themselves ask for the same a_T, within the intervals."
+    return f"The {_PLURALS[kind]} by themselves ask for another a_T: {'; '.join(other)}."
+
+
+def _factor(factor: tuple[float, float, float]) -> str:
+    value, low, high = factor
+    return f"{value:.3g} (95 %: {low:.3g} to {high:.3g})"
+
+
+def _law_words(law: ShiftLaw, found: Superposition) -> str:
+    if law.error > _DESCRIBES:
+        return (
+            f"{law.name} does not describe the shifts: off by {law.error:.2g} decades (root mean "
+            "square)."
+        )
+    parts = []
+    for key, value in law.values.items():
+        symbol, unit = _SYMBOLS[key]
+        interval = law.intervals[key]
+        known = (
+            "not determined by these shifts"
+            if interval is None
+            else f"95 %: {interval[0]:.4g} to {interval[1]:.4g}"
+        )
+        parts.append(f"{symbol} = {f'{value:.4g} {unit}'.strip()} ({known})")
+    return (
+        f"{law.name} at {found.reference:g} °C: {', '.join(parts)}; off by {law.error:.2g} "
+        "decades (root mean square)."
+    )
+
+
+def superposition_page(
+    found: Superposition,
+    name: str,
+    agreements: Sequence[Agreement],
+    own: Mapping[str, Superposition] | None,
+) -> str:
+    """Return the page."""
+    pictures = attempt("The pictures", lambda: superposition_pictures(found))
+    kinds = [kind for kind in found.tests if found.misfits(kind)]
+    misfits = {kind: found.misfits(kind) for kind in kinds}
+    return render(
+        "superposition.html",
+        name=name,
+        words=superposition_words(found, own),
+        agreements=agreement_words(agreements),
+        agreement_lines=agreement_lines(agreements),
+        doubtful=found.verdict != "superposed",
+        pictures=pictures if isinstance(pictures, list) else [],
+        missing=None if isinstance(pictures, list) else pictures.sentence,
+        kinds=[_PLURALS[kind] for kind in kinds],
+        lines=[
+            {
+                "temperature": f"{degrees:g}",
+                "a": _table_factor(found, i, 0),
+                "b": _table_factor(found, i, 1),
+                "misfits": [
+                    next((percent(m) for (cold, _), m in pairs.items() if cold == degrees), "")
+                    for pairs in misfits.values()
+                ],
+            }
+            for i, degrees in enumerate(found.celsius)
+        ],
+    )
+
+
+def _table_factor(found: Superposition, at: int, which: int) -> str:
+    value, low, high = found.factors(at)[which]
+    if low == high:
+        return f"{value:.4g}"
+    if found.error[at, which] > _UNKNOWN:
+        return "not determined"
+    return f"{value:.4g} ({low:.4g} to {high:.4g})"
