@@ -43,6 +43,7 @@ class Search:
         self.fitter, self.problem, self.most = fitter, fitter.problem, most
         self.say = say or (lambda line: None)
         self.found: dict[Key, Fit] = {}
+        self._taken_out: set[tuple[tuple[str, ...], tuple[str, ...]]] = set()
 
     def rank(self, fit: Fit) -> float:
         """Return the log of evidence times prior."""
@@ -197,18 +198,20 @@ class Search:
                 if fit.at_an_end and fit.log_likelihood > top - _FALLEN
             ]
             fallen = sorted(fallen, key=lambda fit: -fit.log_likelihood)[:_BEST]
-            starts: dict[Key, Fit] = {}
+            starts = []
             for fit in [*alive[:_BEST], *fallen]:
                 for name in fit.at_an_end or fit.names:
-                    less = frozenset(fit.names) - {name}
-                    if less in self.found or less in starts:
-                        continue
-                    theta = self.problem.without(fit.theta, name)
+                    # also one that was fitted before: it may have ended beside its best constants
                     names = tuple(other for other in fit.names if other != name)
-                    starts[less] = self.fitter.start(names, theta, fit.linear)
+                    way = fit.names, names
+                    if way in self._taken_out:
+                        continue
+                    self._taken_out.add(way)
+                    theta = self.problem.without(fit.theta, name)
+                    starts.append(self.fitter.start(names, theta, fit.linear))
             if not starts:
                 break
-            self.add(starts.values())
+            self.add(starts)
         return self
 
 
