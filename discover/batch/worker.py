@@ -13,9 +13,9 @@ from dataclasses import asdict
 from queue import SimpleQueue
 from typing import Any
 
+from discover.inputs_kept import inputs_kept
 from discover.linear_algebra_threads import use_one_thread_from_the_start
 from discover.report.plots import keep_out_of_the_working_directory
-from discover.validation import inputs_kept
 
 
 def main() -> None:

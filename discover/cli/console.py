@@ -15,8 +15,8 @@ from typing import Annotated, Any
 import typer
 
 from discover.errors import InputError, plain_os_error, problems_in
+from discover.inputs_kept import inputs_kept
 from discover.progress import on_stop, run_stop_callbacks
-from discover.validation import inputs_kept
 
 Report = Callable[[str, float], None]
 

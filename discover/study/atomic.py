@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from discover.errors import InputError
-from discover.validation import require_not_read
+from discover.inputs_kept import require_not_read
 
 PART_SUFFIX = ".discover-part"
 """Ends the name of a file that is being written."""

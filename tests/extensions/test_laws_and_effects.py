@@ -91,7 +91,7 @@ def test_the_study_of_the_page_on_effects_runs_as_it_stands(workplace):
 
 def test_the_reference_prints_the_effect_too(workplace):
     workplace.follow(EFFECT)
-    script = "import runpy; runpy.run_module('discover.effects.registry', run_name='__main__')"
+    script = "import runpy; runpy.run_module('discover.effects.reference', run_name='__main__')"
     assert "### `transducer_saturation`" in workplace.run(script=script).stdout
 
 

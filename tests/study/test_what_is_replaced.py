@@ -9,9 +9,9 @@ import pytest
 from discover.batch.run import run_batch
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
+from discover.inputs_kept import inputs_kept
 from discover.study import RunFolder
 from discover.study.atomic import remove_file, write_text
-from discover.validation import inputs_kept
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 
 from discover.dataset.tables.units import Quantity, find_column
 from discover.errors import InputError, Problems
-from discover.validation import note_input
+from discover.inputs_kept import note_input
 from discover.words import did_you_mean, listed, nearest
 
 LARGEST_FILE = 300_000_000  # bytes; some five million samples, more than can be looked at

@@ -57,8 +57,8 @@ class ModeConstant:
     relaxation_time_s
         Of the mode.
     value, ci95
-        The constant with its 95 % interval, given that it is a smooth function of the time (see
-        `discover.inference.by_mode.as_fitted`); without one where it is left open.
+        The constant with its 95 % interval, given that it is a smooth function of the time;
+        without one where it is left open.
     left_open
         Whether these data leave it open: the interval leaves hardly a value out, the runs are as
         well described whatever this mode's constant, or it stands at the upper end of its range.
