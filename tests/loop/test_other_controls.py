@@ -1,5 +1,7 @@
 """What the loop says of creep, flow curves and N1, on data by scipy and closed forms."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from independent import Giesekus
@@ -10,11 +12,13 @@ import discover as dc
 
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_offset"]
+CREEP_TIMES = np.geomspace(0.02, 10.0, 60)
 BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
 
 
-def creep(stress, mobility, times):
-    """Return the strain of a Giesekus fluid with solvent, by scipy."""
+@cache
+def creep(stress, mobility):
+    """Return the strain of a Giesekus fluid with solvent at `CREEP_TIMES`, by scipy."""
     law = Giesekus(mobility, MODULUS, TIME)
 
     def change(t, y):
@@ -24,18 +28,22 @@ def creep(stress, mobility, times):
         return [slope[0, 0], slope[1, 1], slope[2, 2], slope[0, 1], rate]
 
     return solve_ivp(
-        change, (0.0, times[-1]), np.zeros(5), method="Radau", t_eval=times, rtol=1e-8, atol=1e-9
+        change, (0.0, CREEP_TIMES[-1]), np.zeros(5), "Radau", CREEP_TIMES, rtol=1e-8, atol=1e-9
     ).y[4]
 
 
 def creep_folder(folder, mobility, draw=0):
-    generator, times = np.random.default_rng(draw), np.geomspace(0.02, 10.0, 60)
+    generator = np.random.default_rng(draw)
     folder.mkdir(exist_ok=True)
     lines = ["file,control"]
     for stress in (20.0, 40.0, 60.0):
-        strain = creep(stress, mobility, times)
+        strain = creep(stress, mobility)
         noise = NOISE * np.sqrt(np.mean(strain**2)) * generator.standard_normal(60)
-        columns = {"time_s": times, "stress_Pa": np.full(60, stress), "strain": strain + noise}
+        columns = {
+            "time_s": CREEP_TIMES,
+            "stress_Pa": np.full(60, stress),
+            "strain": strain + noise,
+        }
         write_table(folder / f"creep_{stress:g}.csv", columns)
         lines.append(f"creep_{stress:g}.csv,stress")
     (folder / "runs.csv").write_text("\n".join(lines) + "\n")
