@@ -174,8 +174,9 @@ class Found:
         curves = free_functions(self.posterior)
         if not curves:
             return self
-        posterior = self.posterior.with_something_else(curves[0].log_odds)
-        return replace(self, posterior=posterior, curves=curves)
+        odds = float(np.logaddexp.reduce([curve.log_odds for curve in curves]))
+        shown = [curve for curve in curves if curve.is_shown]
+        return replace(self, posterior=self.posterior.with_something_else(odds), curves=shown)
 
     @cached_property
     def _reported(self) -> Posterior:

@@ -15,12 +15,8 @@ from discover.loop.run_record import RunRecord, errors_of, record_runs
 from discover.loop.runs import why_untested
 from discover.statistics.residual import fast_part
 
-_EFFECT = {
-    "yield_stress": "yield_stress",
-    "viscous": "solvent_viscosity",
-    "solid": "relaxation_mode",
-}
-"""Effect of the contract that a Maxwell fluid lacks to be such a material."""
+_EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
+"""Effect that is all that such a material has; another law stands for itself."""
 
 _ALREADY = ("saramito",)
 """Laws that hold a yield stress themselves."""
@@ -99,7 +95,7 @@ def _result(
         one.name: StageParameter(one.value, one.ci95 or (one.value, one.value), one.unit)
         for one in material.constants
     }
-    effect = _EFFECT[material.kind]
+    effect = _EFFECT.get(material.law, material.law)
     stage = Stage(
         effect, "constitutive", parameters, (), after, 0.0, material.latex,
         "least squares, held against laws that relax by Schwarz's criterion", CHECKS[material.kind],

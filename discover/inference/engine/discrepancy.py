@@ -38,6 +38,9 @@ GROWTHS = (0.0, 1.0, 2.0)
 TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
 """τ."""
 
+SCATTERS = (1.0, 6.0)
+"""By which runs may differ, over the usual: with a discrepancy or without, it is summed over."""
+
 _MODES = 20
 _AFTER_A_STEP = 10.0
 """Samples of a run over those that the logarithm leaves as they are."""
@@ -138,7 +141,7 @@ class Discrepancy:
         rows = fitter.rows
         self.record = fitter.record(fit)
         pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        self.widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths])
+        self.widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths(0.0 * fit.linear, 1.0)])
         centres = np.array([p.centre for p in fit.priors.values()])
         self.offset = np.concatenate([fit.coordinates - centres, fit.linear])
         self.names, self._steps = self._others()
@@ -179,11 +182,18 @@ class Discrepancy:
 
     # the grid ---------------------------------------------------------------------------------
 
-    def _scale(self, terms: float) -> Float[np.ndarray, " m"]:
-        """Return the prior deviations of constants and terms, over the noise."""
-        scale = np.full(self.columns.shape[1], 1.0 / self.fit.noise.common)
+    def _scale(self, terms: float, scatter: float) -> tuple[Float[np.ndarray, " m"], float]:
+        """Return the prior deviations of constants and terms, over the noise.
+
+        And the log of how likely it is that runs differ by that.
+        """
+        scale, first, log = np.ones(self.columns.shape[1]), len(self.fit.priors), 0.0
+        for at, known in self.fitter.deviations:
+            if np.isfinite(known.known):
+                scale[first + at.start : first + at.stop] = scatter
+                log += known.log_odds_of_size(scatter * known.size)
         scale[len(self.widths) :] *= terms
-        return scale
+        return scale / self.fit.noise.common, log
 
     def _deviations(self) -> Float[np.ndarray, "grid runs k"]:
         """Return the deviations of the curves of each run, for each curve of the grid."""
@@ -247,8 +257,8 @@ class Discrepancy:
             total, logs, *_ = self._products(correlation)
             known = np.log(0.5 if correlation == 0.0 else 0.5 / 3.0)
             least = self.fitter.noise.least(self.record, self._noise(correlation))
-            for terms in TERMS:
-                scale = self._scale(terms)
+            for terms, scatter in product(TERMS, SCATTERS):
+                scale, differ = self._scale(terms, scatter)
                 used = scale > 0
                 matrix = scale[used, None] * total[:, 1:, 1:][:, used][:, :, used] * scale[used]
                 chol = np.linalg.cholesky(np.eye(matrix.shape[1]) + matrix)
@@ -256,11 +266,14 @@ class Discrepancy:
                 squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 0.0) + least
                 values = logs + known - np.sum(np.log(np.diagonal(chol, axis1=1, axis2=2)), axis=1)
                 values -= 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
+                values += differ
                 prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
                 for which, (value, square) in enumerate(zip(values, squares, strict=True)):
                     if which or terms:
                         log = value + prior + (own[which - 1] if which else np.log(0.1))
-                        some.append((log, correlation, terms, which, np.sqrt(square / n)))
+                        some.append(
+                            (log, correlation, (terms, scatter), which, np.sqrt(square / n))
+                        )
                     else:
                         plain.append(value)
         weights = np.array([one[0] for one in some])
@@ -270,12 +283,13 @@ class Discrepancy:
             weight, correlation, terms, which, noise = some[at]
             if weight - total < -_LIKELY:
                 break
-            mean, root = _posterior(self._products(correlation).gram[which], self._scale(terms))
+            scale, _ = self._scale(*terms)
+            mean, root = _posterior(self._products(correlation).gram[which], scale)
             size, stiff, growth, _ = self._grid[which - 1] if which else _NO_CURVE
             log = float(weight - total)
             members.append(
                 Member(
-                    size, stiff, growth, terms, which, correlation, log, float(noise), mean, root
+                    size, stiff, growth, terms[0], which, correlation, log, float(noise), mean, root
                 )
             )
         return members, total - none

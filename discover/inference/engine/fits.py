@@ -8,8 +8,13 @@ from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
 from discover.inference.engine.noise import Noise, NoiseModel
-from discover.inference.engine.priors import Prior
-from discover.inference.engine.problem import SOUND_GAIN, SOUND_ZERO, Problem
+from discover.inference.engine.priors import Deviations, Prior
+from discover.inference.engine.problem import (
+    SCATTER_KNOWN,
+    SCATTER_OF_RUNS,
+    SOUND_GAIN,
+    Problem,
+)
 from discover.inference.engine.rows import Rows
 
 _STEP = 1e-4
@@ -18,8 +23,9 @@ _STEP = 1e-4
 _MOVED = 0.1
 """Standard deviations by which moduli are moved; records at a given rate are linear in them."""
 
-_DAMPINGS = (0.1, 3.0, 100.0)
-"""Multiples of the last damping that are tried side by side."""
+_TRIALS = ((0.1, 0.0), (0.1, 10.0), (3.0, 0.0), (100.0, 0.0))
+"""What is tried side by side: multiples of the last damping, and the least size over the usual one
+by which runs may differ, for from where they do not, it takes a leap to where they do."""
 
 _ENOUGH = 0.01
 """Gain of log posterior of a step below which a fit has ended."""
@@ -122,7 +128,7 @@ class Fitter:
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
-        self.widths = self._widths()
+        self.deviations = self._deviations()
 
     def noise_of(self, fit: Fit) -> NoiseModel:
         """Return the likelihood of the rows that a fit sees."""
@@ -151,13 +157,36 @@ class Fitter:
         with _running_away():
             return np.nan_to_num((up - down).T / (2.0 * _MOVED))
 
-    def _widths(self) -> Float[np.ndarray, " q"]:
-        """Return the prior deviations of what is linear, all about zero."""
-        runs, loading = len(self.rows.runs), self.problem.loading
-        loadings = [loading] * runs if loading else []
-        sound = np.array([SOUND_GAIN, *[SOUND_ZERO] * (2 * runs)])
-        sound = np.full_like(sound, _NEXT_TO_NONE) if self.problem.computed else sound
-        return np.array([*sound, *loadings, *[1.0] * self._shifts.shape[1]])
+    def _deviations(self) -> list[tuple[slice, Deviations]]:
+        """Return what is known of what is linear, all about zero, with the place of each."""
+        runs, problem = len(self.rows.runs), self.problem
+        own = Deviations(SCATTER_OF_RUNS, SCATTER_KNOWN)
+        gain, zeros = Deviations(SOUND_GAIN), own
+        if problem.computed:
+            gain = zeros = Deviations(_NEXT_TO_NONE)
+        parts = [(1, gain), (2 * runs, zeros)]
+        if problem.loading:
+            parts.append((runs, Deviations(problem.loading) if problem.loads_anew else own))
+        parts.append((self._shifts.shape[1], Deviations(1.0)))
+        ends = np.cumsum([0, *[count for count, _ in parts]])
+        return [
+            (slice(low, high), one)
+            for low, high, (_, one) in zip(ends, ends[1:], parts, strict=False)
+        ]
+
+    @property
+    def linear_count(self) -> int:
+        """How much is linear in the records."""
+        return int(self.deviations[-1][0].stop)
+
+    def widths(
+        self, linear: Float[np.ndarray, " q"], least: float = 0.0
+    ) -> Float[np.ndarray, " q"]:
+        """Return the standard deviations of what is linear, as far as it tells of them itself."""
+        found = np.empty(len(linear))
+        for at, known in self.deviations:
+            found[at] = known.width(linear[at], least)
+        return found
 
     def linear_columns(
         self,
@@ -208,7 +237,7 @@ class Fitter:
         theta = theta.copy()
         for at, prior in priors.items():
             theta[at] = np.clip(theta[at], prior.low, prior.high)
-        linear = np.zeros(len(self.widths)) if linear is None else linear
+        linear = np.zeros(self.linear_count) if linear is None else linear
         nothing = np.full(len(self.rows), np.nan)
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
         return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
@@ -222,7 +251,7 @@ class Fitter:
         known = sum(
             p.log_density(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)
         )
-        known += float(-0.5 * np.sum((fit.linear / self.widths) ** 2))
+        known += sum(one.log_density(fit.linear[at]) for at, one in self.deviations)
         fit.log_posterior = fit.log_likelihood + known
 
     def _steps(self, fit: Fit) -> Float[np.ndarray, " free"]:
@@ -280,8 +309,8 @@ class Fitter:
             self.linearise(active)
             trials = [trial for fit in active for trial in self._trials(fit)]
             found = self.predict([theta for theta, _ in trials])
-            each = range(0, len(trials), len(_DAMPINGS))
-            own = [slice(first, first + len(_DAMPINGS)) for first in each]
+            each = range(0, len(trials), len(_TRIALS))
+            own = [slice(first, first + len(_TRIALS)) for first in each]
             with _running_away():
                 active = [
                     fit for fit, at in zip(active, own, strict=True)
@@ -333,8 +362,9 @@ class Fitter:
         gradient[:n] += own[:, 0]
         curvature[np.arange(n), np.arange(n)] += own[:, 1]
         at = np.arange(n, len(gradient))
-        gradient[n:] -= fit.linear / self.widths**2
-        curvature[at, at] += 1.0 / self.widths**2
+        widths = self.widths(fit.linear)
+        gradient[n:] -= fit.linear / widths**2
+        curvature[at, at] += 1.0 / widths**2
         return gradient, curvature
 
     def _trials(self, fit: Fit) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -347,12 +377,15 @@ class Fitter:
             ((now <= ends[:, 0]) & (gradient[:n] < 0)) | ((now >= ends[:, 1]) & (gradient[:n] > 0))
         )
         out = []
-        for multiple in _DAMPINGS:
+        tight = self.widths(fit.linear)
+        for multiple, least in _TRIALS:
             step = np.zeros(len(gradient))
             at = np.flatnonzero(free)
-            inner = curvature[np.ix_(at, at)]
+            known = 1.0 / self.widths(fit.linear, least) ** 2 - 1.0 / tight**2
+            inner = (curvature + np.diag(np.append(np.zeros(n), known)))[np.ix_(at, at)]
+            slope = gradient - np.append(np.zeros(n), known * fit.linear)
             damped = inner + multiple * fit.damping * np.diag(np.diag(inner))
-            step[at] = np.linalg.solve(damped, gradient[at])
+            step[at] = np.linalg.solve(damped, slope[at])
             theta = fit.theta.copy()
             for i, (position, prior) in enumerate(fit.priors.items()):
                 theta[position] = prior.to_value(np.clip(now[i] + step[i], *ends[i]))
@@ -364,7 +397,7 @@ class Fitter:
         before = fit.log_posterior
         saved = fit.theta, fit.linear, fit.predicted, fit.log_likelihood, fit.noise
         best, best_value, chosen = saved, before, None
-        for multiple, (theta, linear), predicted in zip(_DAMPINGS, trials, found, strict=True):
+        for (multiple, _), (theta, linear), predicted in zip(_TRIALS, trials, found, strict=True):
             fit.theta, fit.linear = theta, linear
             self._set(fit, predicted)
             if fit.log_posterior > best_value:
@@ -386,7 +419,7 @@ class Fitter:
         fit.noise = self.noise_of(fit).refined(left, record, grid)
         _, curvature = self._normal_equations(fit)
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
-        scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths)
+        scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths(fit.linear))
         factor = np.linalg.cholesky(scale[:, None] * curvature * scale)
         root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
         fit.root, fit.covariance = root, root @ root.T
@@ -399,7 +432,6 @@ class Fitter:
                 ended.append(name)
         fit.at_an_end = tuple(ended)
         n = len(curvature)
-        linear = float(-np.sum(np.log(self.widths)) - 0.5 * len(self.widths) * LOG_2PI)
         fit.log_evidence = (
-            -np.inf if ended else fit.log_posterior + linear + 0.5 * n * LOG_2PI - 0.5 * determinant
+            -np.inf if ended else fit.log_posterior + 0.5 * n * LOG_2PI - 0.5 * determinant
         )

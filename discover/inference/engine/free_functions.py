@@ -17,6 +17,7 @@ from scipy.stats import chi2
 from discover.dataset import Run
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import Posterior
+from discover.inference.engine.priors import Deviations
 from discover.inference.engine.problem import TERM_ODDS
 from discover.linear_algebra_threads import in_one_thread
 
@@ -36,8 +37,12 @@ _BASES = 12
 _LARGEST_BASE = 2
 _REFITTED = 4
 _TOLD = 15.0
-"""Log odds against all that has a name and any other discrepancy. On development seeds a curve that
-is there has 35 and more; one that stands for a law of no dictionary, up to 10."""
+"""Log odds against all that has a name and any other discrepancy, from which on a curve is shown.
+On development seeds one that is there has 35 and more; one that stands for a law of no dictionary,
+up to 10."""
+
+_POSSIBLE = -7.0
+"""Log odds from which on a curve is among what is possible, shown or not."""
 
 _POINTS = 61
 _TRIED = 60
@@ -114,6 +119,11 @@ class FreeFunction:
     high95: Float[np.ndarray, " n"]
     nearest: str | None
 
+    @property
+    def is_shown(self) -> bool:
+        """Whether it stands out so far that the runs have a curve of this shape."""
+        return self.log_odds > _TOLD
+
 
 class WithFunction(Fitter):
     """Fits of hypotheses with a function of one variable beside them.
@@ -129,7 +139,8 @@ class WithFunction(Fitter):
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
         self.__dict__.update(vars(fitter))
         self.variable = variable
-        self.widths = np.append(fitter.widths, [width] * _KNOTS)
+        first = fitter.linear_count
+        self.deviations = [*fitter.deviations, (slice(first, first + _KNOTS), Deviations(width))]
 
     def linear_columns(
         self,
@@ -152,7 +163,7 @@ class WithFunction(Fitter):
 
 @in_one_thread
 def free_functions(posterior: Posterior) -> list[FreeFunction]:
-    """Return the functions that are likelier than any other explanation, the likeliest first.
+    """Return the functions that are possible beside all other explanations, the likeliest first.
 
     They are tried beside hypotheses of few effects: a larger one may have taken up what they are.
     """
@@ -173,7 +184,7 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
                 rank = fit.log_evidence + posterior.problem.log_prior(fit.names) + prior
                 if np.isfinite(rank) and (best is None or rank > best[0]):
                     best = rank, fitter, fit
-        if best is not None and best[0] - other > _TOLD:
+        if best is not None and best[0] - other > _POSSIBLE:
             found.append(_described(*best[1:], float(best[0] - other)))
     return sorted(found, key=lambda one: -one.log_odds)
 

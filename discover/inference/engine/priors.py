@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float
+from scipy.special import gammaln
 
 Kind = Literal["normal", "amplitude", "logarithm"]
 
@@ -69,3 +71,47 @@ class Prior:
             curvature = 2.0 / (self.width**2 + off**2)
             return -curvature * off, curvature
         return -off / self.width**2, 1.0 / self.width**2
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """What is known of deviations about zero that have one common size.
+
+    Attributes
+    ----------
+    size
+        Their standard deviation, or its usual value where it is not known.
+    known
+        Degrees of freedom by which it is: the square of the standard deviation is size²·known/χ²,
+        and integrated out   [Gelman et al. 2013, Bayesian Data Analysis, ch. 5].
+    """
+
+    size: float
+    known: float = np.inf
+
+    def log_density(self, values: Float[np.ndarray, " n"]) -> float:
+        """Return the log density of all deviations together."""
+        n, square = len(values), float(values @ values) / self.size**2
+        if not np.isfinite(self.known):
+            return -0.5 * square - n * float(np.log(self.size) + 0.5 * np.log(2.0 * np.pi))
+        known = self.known
+        factor = gammaln(0.5 * (known + n)) - gammaln(0.5 * known)
+        factor -= n * (np.log(self.size) + 0.5 * np.log(np.pi * known))
+        return float(factor - 0.5 * (known + n) * np.log1p(square / known))
+
+    def width(self, values: Float[np.ndarray, " n"], least: float = 0.0) -> float:
+        """Return the standard deviation that such deviations tell of.
+
+        `least`: times the usual size, for where they do not tell yet.
+        """
+        if not np.isfinite(self.known):
+            return self.size
+        square = self.known * self.size**2 + float(values @ values)
+        return max(float(np.sqrt(square / (self.known + len(values)))), least * self.size)
+
+    def log_odds_of_size(self, width: float) -> float:
+        """Return the log density of a standard deviation, over that of the usual one."""
+        if not np.isfinite(self.known):
+            return 0.0
+        ratio = width / self.size
+        return float(-self.known * (np.log(ratio) + 0.5 / ratio**2 - 0.5))

@@ -75,14 +75,12 @@ differs from mode to mode; in e-foldings."""
 OWN_OF_A_MODE = 0.3
 """Standard deviation by which the constant of one mode deviates from that."""
 
-SOUND_ZERO = 0.005
-"""Zero and drift of a record, over its root mean square, to which a torque is tared and stays."""
+SCATTER_OF_RUNS = 0.001
+"""Usual size of zero and drift of a run, and of its gain over that of all, over the root mean
+square of its record: to which a torque is tared, and to which the same loading repeats."""
 
-
-SOUND_LOADING = 0.005
-"""Relative deviation of one run from the next of the same loading: edge, gap and transducer repeat
-to half of what they are calibrated to. Read with faults of each run of up to 1 %, of 13 records of
-development seeds one is then unexplained, and with a fifth of zero and drift two thirds."""
+SCATTER_KNOWN = 1.0
+"""Degrees of freedom by which that is known: of six instruments one scatters by 0.5 %."""
 
 
 class Problem:
@@ -118,7 +116,7 @@ class Problem:
         beside = [make_effect(n.effect) for n in NUISANCES if n.effect not in names]
         self.declared, self.candidates = declared, tuple(candidates)
         self.noise, self.computed, self.loads_anew = noise, computed, bool(loading)
-        self.loading = loading or (0.0 if computed else SOUND_LOADING)
+        self.loading = loading or (0.0 if computed else SCATTER_OF_RUNS)
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
         effects = [*candidates, *beside]
