@@ -10,8 +10,8 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
 
 Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
 run, and never used to change anything: 20261130; since each set is fitted from larger ones too
-20261208 for ``close-loop``; since bands of N1 weigh more laws, 20261206 and, since, 20261209
-for ``compare``.
+20261208 for ``close-loop``, and 20261206 and 20261209 for ``compare``; since runs tell how far they
+differ, 20261210 for ``close-loop`` and 20261211 for ``compare``.
 """
 
 from collections.abc import Callable
