@@ -145,6 +145,9 @@ def test_a_fluid_without_elasticity_is_named_where_effects_are_listed(stress, la
     found = run_loop(oscillations(stress, noise), declared, effects=["solvent_viscosity"])
     assert found.verdict != "unexplained"
     assert (found.material.law if found.material else None) == law
+    # a viscosity that thins is no solvent, which has one viscosity
+    effect = {"newtonian": "solvent_viscosity", None: None}.get(law, law)
+    assert [stage.effect for stage in found.stages] == ([effect] if effect else [])
     if law == "newtonian":
         # the gain of a sound bench is known to 1 %
         assert found.use["constants"]["viscosity_Pa_s"]["value"] == pytest.approx(3.0, rel=0.03)
