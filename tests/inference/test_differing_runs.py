@@ -1,4 +1,4 @@
-"""How far zero, drift and gain of runs differ: told by the runs, on closed forms of Maxwell's law."""
+"""How far zero, drift and gain of runs differ: told by them, on closed forms of one mode."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import jax.numpy as jnp
@@ -246,3 +249,22 @@ def test_one_start_up_gives_the_law_though_modulus_and_time_are_unknown_too():
         low, high = result.declared_parameters[name].ci95
         # twice the interval: one case in a thousand
         assert abs(result.declared_parameters[name].value - value) < high - low
+
+
+@pytest.mark.slow
+def test_an_answer_does_not_depend_on_the_order_of_python_sets(tmp_path):
+    code = (
+        "import discover as dc\n"
+        "data = dc.synthetic_dataset('giesekus', {'alpha': 0.2}, noise=0.01)\n"
+        "loop = dc.close_loop(data, dc.Fluid(dc.make_law('ucm'), 1.0, 1.0), max_effects=2)\n"
+        "print([(e.members, e.probability) for e in loop.explanations.likeliest_first])\n"
+    )
+    said = {
+        subprocess.run(
+            [sys.executable, "-c", code], env={**os.environ, "PYTHONHASHSEED": seed},
+            cwd=tmp_path, capture_output=True, text=True, check=True,
+        ).stdout
+        for seed in ("1", "2")
+    }  # fmt: skip
+    assert len(said) == 1
+    assert "giesekus_mobility" in said.pop()
