@@ -8,7 +8,7 @@ from scipy.stats import multivariate_normal, norm
 import discover as dc
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.noise import LEAST, Noise, NoiseModel
-from discover.inference.engine.priors import Prior
+from discover.inference.engine.priors import Prior, Priors
 from discover.inference.engine.rows import Rows
 from discover.protocols import start_up
 
@@ -124,7 +124,7 @@ PRIORS = [
 @pytest.mark.parametrize("prior", PRIORS)
 def test_a_prior_is_a_density_of_its_coordinate(prior):
     low = prior.centre if prior.low == prior.centre and not prior.is_logarithm else -np.inf
-    whole, _ = quad(lambda x: np.exp(prior.log_density(x)), low, np.inf)
+    whole, _ = quad(lambda x: np.exp(Priors({0: prior}).log_density(np.array([x]))), low, np.inf)
     assert whole == pytest.approx(1.0, abs=1e-6)  # of the quadrature
 
 
@@ -132,8 +132,10 @@ def test_a_prior_is_a_density_of_its_coordinate(prior):
 @pytest.mark.parametrize("coordinate", [0.05, 0.7, 3.0])
 def test_the_pull_of_a_prior_is_its_slope(prior, coordinate):
     step = 1e-6
-    ends = [prior.log_density(coordinate + sign * step) for sign in (1, -1)]
-    slope, curvature = prior.pull(coordinate)
+    ends = [
+        Priors({0: prior}).log_density(np.array([coordinate + sign * step])) for sign in (1, -1)
+    ]
+    ((slope, curvature),) = Priors({0: prior}).pulls(np.array([coordinate]))
     assert slope == pytest.approx((ends[0] - ends[1]) / (2 * step), rel=1e-6, abs=1e-8)
     assert curvature > 0.0
 

@@ -140,10 +140,9 @@ class Discrepancy:
         self.fitter, self.fit, self.smallest = fitter, fit, smallest
         rows = fitter.rows
         self.record = fitter.record(fit)
-        pulls = [p.pull(c)[1] for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        self.widths = np.concatenate([1.0 / np.sqrt(pulls), fitter.widths(0.0 * fit.linear, 1.0)])
-        centres = np.array([p.centre for p in fit.priors.values()])
-        self.offset = np.concatenate([fit.coordinates - centres, fit.linear])
+        stiff = fit.priors.pulls(fit.coordinates)[:, 1]
+        self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.widths(0.0 * fit.linear, 1.0)])
+        self.offset = np.concatenate([fit.coordinates - fit.priors.centres, fit.linear])
         self.names, self._steps = self._others()
         unused = self.signatures(fitter, fit.predicted)
         size = np.sqrt(np.mean((unused / rows.size[:, None]) ** 2, axis=0))
@@ -151,7 +150,7 @@ class Discrepancy:
         self.columns = np.column_stack([fit.jacobian * self.widths, unused * self.shares])
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
-        self._curves = _cosines(rows) * rows.size[:, None]
+        self._curves = _cosines(rows) * rows.size[:, None]  # of each row's own run
         self._grid = [
             *product(CURVES, STIFFNESS, GROWTHS, (False,)),
             *product(CURVES, STIFFNESS[-1:], GROWTHS[:1], (True,)),
@@ -216,11 +215,10 @@ class Discrepancy:
             noise = self._noise(correlation)
             both = np.column_stack([self.left, self.columns, self._curves])
             white = self.fitter.noise.whitened(both, self.record, noise)
-            run, m = self.fitter.rows.run[self.fitter.noise.kept], 1 + self.columns.shape[1]
+            run = self.fitter.rows.run[self.fitter.noise.kept]
             plain, cross, inner, width = [], [], [], 2 * _MODES
             for i in range(len(self.growth)):
-                own = white[run == i, :m]
-                curve = white[run == i, m + i * width : m + (i + 1) * width]
+                own, curve = white[run == i, :-width], white[run == i, -width:]
                 plain.append(own.T @ own)
                 cross.append(curve.T @ own)
                 inner.append(curve.T @ curve)
@@ -259,12 +257,16 @@ class Discrepancy:
             least = self.fitter.noise.least(self.record, self._noise(correlation))
             for terms, scatter in product(TERMS, SCATTERS):
                 scale, differ = self._scale(terms, scatter)
-                used = scale > 0
-                matrix = scale[used, None] * total[:, 1:, 1:][:, used][:, :, used] * scale[used]
-                chol = np.linalg.cholesky(np.eye(matrix.shape[1]) + matrix)
-                ahead = np.linalg.solve(chol, (scale * total[:, 0, 1:])[:, used, None])[..., 0]
-                squares = np.maximum(total[:, 0, 0] - np.sum(ahead**2, axis=1), 0.0) + least
-                values = logs + known - np.sum(np.log(np.diagonal(chol, axis1=1, axis2=2)), axis=1)
+                # what was left last: its pivot is the square that columns and curves do not take
+                used = np.append(np.flatnonzero(scale) + 1, 0)
+                scale = np.append(scale[scale > 0], 1.0)
+                matrix = scale[:, None] * total[:, used[:, None], used] * scale
+                at = np.arange(len(used) - 1)
+                matrix[:, at, at] += 1.0
+                matrix[:, -1, -1] += least
+                pivots = np.diagonal(np.linalg.cholesky(matrix), axis1=1, axis2=2)
+                squares = pivots[:, -1] ** 2
+                values = logs + known - np.sum(np.log(pivots[:, :-1]), axis=1)
                 values -= 0.5 * n * (np.log(squares / n) + 1.0 + LOG_2PI)
                 values += differ
                 prior = np.log(0.5 if not terms else 0.5 / (len(TERMS) - 1))
@@ -330,7 +332,8 @@ class Discrepancy:
 
     def _drawn_curves(self, member: Member, own: np.ndarray, lot: np.random.Generator):
         """Return draws of the curves of all runs, given constants and terms, in Pa."""
-        products, out = self._products(member.correlation), np.zeros((len(own), len(self.left)))
+        products, rows = self._products(member.correlation), self.fitter.rows
+        out = np.zeros((len(own), len(self.left)))
         deviations = self._deviations()[member.which - 1]
         for i, d in enumerate(deviations):
             inner = np.eye(len(d)) + d[:, None] * products.inner[i] * d
@@ -338,8 +341,8 @@ class Discrepancy:
             middle = np.linalg.solve(inner, right).T
             normal = lot.standard_normal(middle.shape)
             spread = member.noise * np.linalg.solve(np.linalg.cholesky(inner).T, normal.T).T
-            curves = self._curves[:, i * len(d) : (i + 1) * len(d)]
-            out += ((middle + spread) * d) @ curves.T
+            own_rows = rows.run == i
+            out[:, own_rows] = ((middle + spread) * d) @ self._curves[own_rows].T
         return out
 
 
@@ -359,18 +362,17 @@ def _posterior(
 
 
 def _cosines(rows: Rows) -> Float[np.ndarray, "rows curves"]:
-    """Return cosines along the samples of each run and after its steps, zero in the others."""
-    width = 2 * _MODES
-    out = np.zeros((len(rows), len(rows.runs) * width))
+    """Return cosines along the samples of the run of each row, and after its steps."""
+    out = np.zeros((len(rows), 2 * _MODES))
     for i, run in enumerate(rows.runs):
         n, rate = len(run), np.asarray(run.rate, float)
         steps = np.abs(np.diff(rate, prepend=rate[0])) > _STEP * rows.fastest[i]
         since = np.arange(n) - np.maximum.accumulate(np.where(steps, np.arange(n), 0)) + 0.5
         after = np.log1p(_AFTER_A_STEP * since / n) / np.log1p(_AFTER_A_STEP)
-        for place, x in enumerate(((np.arange(n) + 0.5) / n, after)):
-            first = i * width + place * _MODES
-            waves = np.cos(np.pi * np.outer(x, np.arange(_MODES)))
-            if place:
-                waves = uniform_filter1d(waves, _ALONE, axis=0)
-            out[np.flatnonzero(rows.run == i), first : first + _MODES] = waves
+        along, afterwards = (
+            np.cos(np.pi * np.outer(x, np.arange(_MODES)))
+            for x in ((np.arange(n) + 0.5) / n, after)
+        )
+        afterwards = uniform_filter1d(afterwards, _ALONE, axis=0)
+        out[rows.run == i] = np.column_stack([along, afterwards])
     return out

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
 from discover.inference.engine.noise import Noise, NoiseModel
-from discover.inference.engine.priors import Deviations, Prior
+from discover.inference.engine.priors import Deviations, Prior, Priors
 from discover.inference.engine.problem import (
     SCATTER_KNOWN,
     SCATTER_OF_RUNS,
@@ -75,7 +75,7 @@ class Fit:
     names: tuple[str, ...]
     theta: Float[np.ndarray, " p"]
     linear: Float[np.ndarray, " q"]
-    priors: Mapping[int, Prior]
+    priors: Priors
     predicted: Float[np.ndarray, " rows"]
     log_likelihood: float
     log_posterior: float
@@ -98,14 +98,12 @@ class Fit:
     @property
     def coordinates(self) -> Float[np.ndarray, " free"]:
         """Coordinates of the free constants."""
-        return np.array([p.to_coordinate(self.theta[at]) for at, p in self.priors.items()])
+        return self.priors.coordinates(self.theta)
 
     def at(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, " p"]:
         """Return the constants at other coordinates of what is free, inside their ranges."""
-        theta = self.theta.copy()
-        for (at, prior), value in zip(self.priors.items(), coordinates, strict=True):
-            theta[at] = prior.to_value(np.clip(value, *prior.ends))
-        return theta
+        ends = self.priors.ends
+        return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
 
 
 def _running_away() -> np.errstate:
@@ -128,6 +126,9 @@ class Fitter:
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
+        self._own = (rows.run[:, None] == np.arange(len(rows.runs))).astype(float)
+        level = self._own * rows.size[:, None]
+        self._zeros = np.column_stack([level, level * (rows.time - 0.5)[:, None]])
         self.deviations = self._deviations()
 
     def noise_of(self, fit: Fit) -> NoiseModel:
@@ -202,12 +203,9 @@ class Fitter:
         shifts
             What errors of the moduli do to these; by default nothing.
         """
-        rows, shifts = self.rows, self._shifts if shifts is None else shifts
-        own = rows.run[:, None] == np.arange(len(rows.runs))
-        level = own * rows.size[:, None]
-        drift = level * (rows.time - 0.5)[:, None]
-        loadings = own * predicted[:, None] if self.problem.loading else np.zeros((len(rows), 0))
-        return np.column_stack([predicted, level, drift, loadings, shifts])
+        shifts = self._shifts if shifts is None else shifts
+        loadings = self._own * predicted[:, None] if self.problem.loading else self._own[:, :0]
+        return np.column_stack([predicted, self._zeros, loadings, shifts])
 
     # predictions ------------------------------------------------------------------------------
 
@@ -233,8 +231,7 @@ class Fitter:
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
     ) -> Fit:
         """Return a hypothesis before its first step."""
-        priors = self.priors(names)
-        theta = theta.copy()
+        priors, theta = Priors(self.priors(names)), theta.copy()
         for at, prior in priors.items():
             theta[at] = np.clip(theta[at], prior.low, prior.high)
         linear = np.zeros(self.linear_count) if linear is None else linear
@@ -248,27 +245,19 @@ class Fitter:
         record = self.record(fit)
         left = self.rows.recorded - record
         fit.log_likelihood, fit.noise = self.noise_of(fit).log_likelihood(left, record)
-        known = sum(
-            p.log_density(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)
-        )
+        known = fit.priors.log_density(fit.coordinates)
         known += sum(one.log_density(fit.linear[at]) for at, one in self.deviations)
         fit.log_posterior = fit.log_likelihood + known
 
     def _steps(self, fit: Fit) -> Float[np.ndarray, " free"]:
         """Return by how much each coordinate is moved for a derivative, away from an upper end."""
-        steps = [_STEP * prior.width for prior in fit.priors.values()]
-        ends = [prior.ends[1] for prior in fit.priors.values()]
-        return np.where(fit.coordinates + steps > ends, np.negative(steps), steps)
+        steps = _STEP * fit.priors.widths
+        return np.where(fit.coordinates + steps > fit.priors.ends[:, 1], -steps, steps)
 
     def _moved(self, fit: Fit) -> list[np.ndarray]:
         """Return vectors whose differences from the fit are its derivatives."""
-        thetas = []
-        moves = zip(fit.priors.items(), fit.coordinates + self._steps(fit), strict=True)
-        for (at, prior), coordinate in moves:
-            moved = fit.theta.copy()
-            moved[at] = prior.to_value(coordinate)
-            thetas.append(moved)
-        return thetas
+        moved = fit.coordinates + np.diag(self._steps(fit))
+        return [fit.priors.placed(fit.theta, one) for one in moved]
 
     def _columns(self, fit: Fit, moved: np.ndarray) -> Float[np.ndarray, "rows n"]:
         """Return the derivatives of the records, of predictions at `_moved`."""
@@ -345,11 +334,6 @@ class Fitter:
             if k and np.isfinite(fit.log_posterior):
                 self._set(fit, fit.predicted)
 
-    def _pulls(self, fit: Fit) -> Float[np.ndarray, "free 2"]:
-        """Return the derivative of the log prior of each coordinate, and its curvature."""
-        pulls = [p.pull(c) for p, c in zip(fit.priors.values(), fit.coordinates, strict=True)]
-        return np.array(pulls).reshape(len(fit.priors), 2)
-
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
         assert fit.jacobian is not None
@@ -358,7 +342,7 @@ class Fitter:
         white = self.noise_of(fit).whitened(both, record, fit.noise)
         columns, left = white[:, :-1], white[:, -1]
         curvature, gradient = columns.T @ columns, columns.T @ left
-        n, own = len(fit.priors), self._pulls(fit)
+        n, own = len(fit.priors), fit.priors.pulls(fit.coordinates)
         gradient[:n] += own[:, 0]
         curvature[np.arange(n), np.arange(n)] += own[:, 1]
         at = np.arange(n, len(gradient))
@@ -370,27 +354,22 @@ class Fitter:
     def _trials(self, fit: Fit) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return vectors to try, and what is linear in them."""
         gradient, curvature = self._normal_equations(fit)
-        ends = np.array([prior.ends for prior in fit.priors.values()]).reshape(-1, 2)
-        now, n = fit.coordinates, len(fit.priors)
-        free = np.ones(len(gradient), bool)
-        free[:n] = ~(
-            ((now <= ends[:, 0]) & (gradient[:n] < 0)) | ((now >= ends[:, 1]) & (gradient[:n] > 0))
-        )
-        out = []
-        tight = self.widths(fit.linear)
-        for multiple, least in _TRIALS:
-            step = np.zeros(len(gradient))
-            at = np.flatnonzero(free)
-            known = 1.0 / self.widths(fit.linear, least) ** 2 - 1.0 / tight**2
-            inner = (curvature + np.diag(np.append(np.zeros(n), known)))[np.ix_(at, at)]
-            slope = gradient - np.append(np.zeros(n), known * fit.linear)
-            damped = inner + multiple * fit.damping * np.diag(np.diag(inner))
-            step[at] = np.linalg.solve(damped, slope[at])
-            theta = fit.theta.copy()
-            for i, (position, prior) in enumerate(fit.priors.items()):
-                theta[position] = prior.to_value(np.clip(now[i] + step[i], *ends[i]))
-            out.append((theta, fit.linear + step[n:]))
-        return out
+        ends, now, n = fit.priors.ends, fit.coordinates, len(fit.priors)
+        slope = gradient[:n]
+        stays = ((now <= ends[:, 0]) & (slope < 0)) | ((now >= ends[:, 1]) & (slope > 0))
+        at = np.flatnonzero(np.append(~stays, np.ones(len(gradient) - n, bool)))
+        multiples, least = np.array(_TRIALS).T
+        widths = np.array([self.widths(fit.linear, one) for one in least])
+        known = np.zeros((len(_TRIALS), len(gradient)))
+        known[:, n:] = 1.0 / widths**2 - 1.0 / self.widths(fit.linear) ** 2
+        place = np.append(np.zeros(n), fit.linear)
+        inner = np.tile(curvature[np.ix_(at, at)], (len(_TRIALS), 1, 1))
+        diagonal = np.arange(len(at))
+        inner[:, diagonal, diagonal] += known[:, at]
+        inner[:, diagonal, diagonal] *= 1.0 + fit.damping * multiples[:, None]
+        steps = np.zeros((len(_TRIALS), len(gradient)))
+        steps[:, at] = np.linalg.solve(inner, (gradient - known * place)[:, at, None])[..., 0]
+        return [(fit.at(now + step[:n]), fit.linear + step[n:]) for step in steps]
 
     def _take(self, fit: Fit, trials, found) -> bool:
         """Take the best of some trials; return whether the fit is to go on."""
@@ -418,8 +397,9 @@ class Fitter:
         _, grid = self.noise_of(fit).log_likelihood(left, record)
         fit.noise = self.noise_of(fit).refined(left, record, grid)
         _, curvature = self._normal_equations(fit)
+        pulls = fit.priors.pulls(fit.coordinates)
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
-        scale = np.append(1.0 / np.sqrt(self._pulls(fit)[:, 1]), self.widths(fit.linear))
+        scale = np.append(1.0 / np.sqrt(pulls[:, 1]), self.widths(fit.linear))
         factor = np.linalg.cholesky(scale[:, None] * curvature * scale)
         root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
         fit.root, fit.covariance = root, root @ root.T

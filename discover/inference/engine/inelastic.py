@@ -157,6 +157,9 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
         off = (fitter.record(alive[0]) - fitted.record(fit)) / noise
         if np.sqrt(np.mean(off**2)) < SAME:
             other -= _NEAR
+    odds = rank - float(np.logaddexp(other, nothing))
+    if odds < 0.0:
+        return None
     beside = Discrepancy(fitted, fit).log_factor + np.log(NONE / (1.0 - NONE))
     odds = rank - float(np.logaddexp.reduce([other, nothing, rank + beside]))
     if odds < 0.0:

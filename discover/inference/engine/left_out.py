@@ -13,6 +13,7 @@ from scipy.special import logsumexp
 from scipy.stats import t as student
 
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.priors import Priors
 from discover.statistics import HALF_BAND
 
 FEWEST_RUNS = 3
@@ -44,7 +45,8 @@ def left_out(fitter: Fitter, fits: Sequence[Fit]) -> Float[np.ndarray, "fits run
             start.without = i
             # when a rate steps is read off its own record, and is no prediction
             own = {first + step.place for step in run.rate_steps if step.place is not None}
-            start.priors = {at: prior for at, prior in start.priors.items() if at not in own}
+            kept = {at: prior for at, prior in start.priors.items() if at not in own}
+            start.priors = Priors(kept)
             starts.append(start)
     parts = fitter.fit(starts, _ROUNDS, derivatives=False)
     found = [_error(fitter, part) for part in parts]

@@ -76,6 +76,8 @@ class NoiseModel:
         self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
         self._there = np.flatnonzero(self._count)
+        half = 0.5 * self._alike
+        self._gammas = float(np.sum(gammaln(half + 0.5 * self._count) - gammaln(half)))
         self._starts = np.searchsorted(self._run, self._there)
         # samples of one run as far from the one before decay alike
         self._order = np.lexsort((self._gap, self._run))
@@ -168,20 +170,16 @@ class NoiseModel:
 
     def _marginal(self, square: Float[np.ndarray, "grid runs"]):
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""
-        n, total = self._count, np.sum(self._count)
-        common = np.sum(square, axis=1) / total
+        counts, total = self._alike + self._count, float(np.sum(self._count))
+        common = square @ np.ones(len(counts)) / total
         if self.known is not None:
             common = np.full_like(common, max(self.known, LEAST) ** 2)
         for _ in range(6 if self.known is None else 0):
-            weight = np.sum((self._alike + n) / (self._alike * common[:, None] + square), axis=1)
-            common = len(n) / weight
-        runs = (
-            gammaln(0.5 * (self._alike + n))
-            - gammaln(0.5 * self._alike)
-            + 0.5 * self._alike * np.log(self._alike * common[:, None])
-            - 0.5 * (self._alike + n) * np.log(self._alike * common[:, None] + square)
-        )
-        return np.sum(runs, axis=1) - 0.5 * total * np.log(np.pi), common
+            common = len(counts) / ((1.0 / (self._alike * common[:, None] + square)) @ counts)
+        alike = self._alike * common
+        density = self._gammas - 0.5 * total * np.log(np.pi)
+        density += 0.5 * self._alike * len(counts) * np.log(alike)
+        return density - 0.5 * np.log(alike[:, None] + square) @ counts, common
 
     def least(self, predicted: Float[np.ndarray, " rows"], noise: Noise) -> float:
         """Return the sum of squares that `whitened` makes of the independent noise `LEAST`."""

@@ -1,10 +1,11 @@
 """Priors of constants: what is known of each before the data."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.special import gammaln
 
 Kind = Literal["normal", "amplitude", "logarithm"]
@@ -56,21 +57,71 @@ class Prior:
         """Middle of the coordinate."""
         return float(np.log(self.middle)) if self.is_logarithm else self.middle
 
-    def log_density(self, coordinate: float) -> float:
-        """Return the log density of the coordinate."""
-        off = (coordinate - self.centre) / self.width
-        sided = np.log(2.0) if self.low == self.centre or self.high == self.centre else 0.0
-        if self.kind == "amplitude":
-            return float(-np.log(np.pi * self.width) - np.log1p(off**2) + sided)
-        return float(-0.5 * off**2 - np.log(self.width) - 0.5 * np.log(2.0 * np.pi) + sided)
 
-    def pull(self, coordinate: float) -> tuple[float, float]:
-        """Return the derivative of the log density, and a curvature that bounds it."""
-        off = coordinate - self.centre
-        if self.kind == "amplitude":
-            curvature = 2.0 / (self.width**2 + off**2)
-            return -curvature * off, curvature
-        return -off / self.width**2, 1.0 / self.width**2
+class Priors(dict[int, Prior]):
+    """Priors of all that is free, by position in the constants, as arrays too."""
+
+    @cached_property
+    def positions(self) -> Int[np.ndarray, " free"]:
+        """Positions of what is free."""
+        return np.array([*self], int)
+
+    @cached_property
+    def centres(self) -> Float[np.ndarray, " free"]:
+        """Middles of the coordinates."""
+        return np.array([prior.centre for prior in self.values()])
+
+    @cached_property
+    def widths(self) -> Float[np.ndarray, " free"]:
+        """Standard deviations, or the scale of an amplitude."""
+        return np.array([prior.width for prior in self.values()])
+
+    @cached_property
+    def ends(self) -> Float[np.ndarray, "free 2"]:
+        """Ends of the coordinates."""
+        return np.array([prior.ends for prior in self.values()]).reshape(-1, 2)
+
+    @cached_property
+    def _are_logarithms(self) -> np.ndarray:
+        return np.array([prior.is_logarithm for prior in self.values()], bool)
+
+    @cached_property
+    def _are_amplitudes(self) -> np.ndarray:
+        return np.array([prior.kind == "amplitude" for prior in self.values()], bool)
+
+    @cached_property
+    def _constant(self) -> float:
+        """What of the log density does not depend on the coordinates."""
+        sided = np.any(self.ends == self.centres[:, None], axis=1)
+        scales = np.where(self._are_amplitudes, np.pi, np.sqrt(2.0 * np.pi))
+        return float(np.sum(sided) * np.log(2.0) - np.sum(np.log(scales * self.widths)))
+
+    def coordinates(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " free"]:
+        """Return the coordinates that are fitted, of the constants."""
+        values, logs = theta[self.positions], self._are_logarithms
+        values[logs] = np.log(values[logs])
+        return values
+
+    def placed(
+        self, theta: Float[np.ndarray, " p"], coordinates: Float[np.ndarray, " free"]
+    ) -> Float[np.ndarray, " p"]:
+        """Return the constants at other coordinates of what is free."""
+        values, logs, found = coordinates.copy(), self._are_logarithms, theta.copy()
+        values[logs] = np.exp(values[logs])
+        found[self.positions] = values
+        return found
+
+    def log_density(self, coordinates: Float[np.ndarray, " free"]) -> float:
+        """Return the log density of the coordinates."""
+        square = ((coordinates - self.centres) / self.widths) ** 2
+        logs = np.where(self._are_amplitudes, np.log1p(square), 0.5 * square)
+        return self._constant - float(np.sum(logs))
+
+    def pulls(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, "free 2"]:
+        """Return the derivatives of the log density, and curvatures that bound it."""
+        off, square = coordinates - self.centres, self.widths**2
+        curvature = np.where(self._are_amplitudes, 2.0 / (square + off**2), 1.0 / square)
+        return np.column_stack([-curvature * off, curvature])
 
 
 @dataclass(frozen=True)
