@@ -14,7 +14,6 @@ from discover.forward.integrators.exponential_weights import (
     krogstad_weights,
     relax,
 )
-from discover.programs import compiled
 from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 
@@ -42,22 +41,6 @@ class Series(NamedTuple):
     def slip_at(self, stress: Float[Array, ""]) -> Float[Array, ""]:
         """Return s at a stress in Pa."""
         return self.slip if self.slip_by_stress is None else self.slip + self.slip_by_stress(stress)
-
-
-@compiled
-def declared_weights(
-    times: Float[Array, "runs m"], relaxation_time: Float[Array, " k"], decay: Float[Array, ""]
-) -> Float[Array, "runs s 1 11 k"]:
-    """Return the weights of all steps of runs for modes whose trace relaxes as the rest does.
-
-    They are a quarter of what a prediction with ten modes and more costs, and the same in each that
-    has the same times.
-
-    `times`: ends and middles of steps in turn, in s. `relaxation_time`: of the modes, in s.
-    `decay`: rate over 1/λ of the relaxation that is integrated exactly.
-    """
-    h = jnp.diff(times[:, ::2], axis=1)[..., None] / relaxation_time
-    return jnp.stack(krogstad_weights(-decay * h, h), axis=2)[:, :, None]
 
 
 class Dynamics(NamedTuple):

@@ -25,6 +25,7 @@ from discover.forward.batches import (
 )
 from discover.forward.declared import DeclaredModel, Numbers
 from discover.forward.program import Program
+from discover.forward.side_by_side import Asked
 from discover.programs import in_threads, on_device
 from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 
@@ -132,7 +133,7 @@ class Predictor:
         if np.all(alone):
             return self._one_by_one(trials, part, normal)
         some = beside.taken(~alone)
-        found = kernel.predict(self._numbers, *some, part, *judging, normal)
+        found = kernel.predict(Asked(self._numbers, *some, part, *judging, normal))
         if not np.any(alone):
             return found
         out = np.empty((len(alone), *found.shape[1:]))

@@ -189,21 +189,25 @@ class Difference:
     N2: float
 
 
-def differences(
-    library: TermLibrary,
-    reference: LawTerms,
-    others: Sequence[LawTerms],
-    base: AbstractConstitutiveLaw | None = None,
-) -> list[Difference]:
-    """Return how far each of several laws is from a reference in random shear histories.
+def stresses_in_histories(
+    library: TermLibrary, laws: Sequence[LawTerms], base: AbstractConstitutiveLaw | None = None
+) -> Float[np.ndarray, "laws runs n 4"]:
+    """Return the stresses of laws in `histories_for` a known part; by default UCM.
 
-    Histories in which the reference itself runs away are left out.
-
-    `library`: holds every term of the laws. `base`: the known part; by default UCM.
+    `library`: holds every term of the laws.
     """
     flows = histories_for(base)
-    stresses = stresses_of_laws(library, [reference, *others], flows.protocols, flows.grids, base)
-    observed = observe_differences(stresses[:, : flows.n_random])
+    return stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
+
+
+def differences(stresses: Float[np.ndarray, "laws runs n 4"]) -> list[Difference]:
+    """Return how far each law is from the first in random shear histories.
+
+    Histories in which the first itself runs away are left out.
+
+    `stresses`: from `stresses_in_histories`.
+    """
+    observed = observe_differences(stresses[:, : _EACH * len(_AMPLITUDES)])
     return [difference(observed[0], other) for other in observed[1:]]
 
 
@@ -261,18 +265,18 @@ class Separation:
 
 def separations(
     library: TermLibrary,
-    reference: LawTerms,
-    others: Sequence[LawTerms],
+    laws: Sequence[LawTerms],
+    stresses: Float[np.ndarray, "laws runs n 4"],
     base: AbstractConstitutiveLaw | None = None,
 ) -> list[tuple[Separation, ...]]:
-    """Return for each law the flows that tell it from the reference, best in each quantity.
+    """Return for each law the flows that tell it from the first, best in each quantity.
 
     Oscillations and start-ups of shear, and the start of uniaxial and planar extension. A shear
     quantity comes first where one differs, as it needs the fewest new instruments.
+
+    `stresses`: of the laws, from `stresses_in_histories`.
     """
-    laws = [reference, *others]
     flows = histories_for(base)
-    stresses = stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
     names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
     times = np.linspace(0.0, _DURATION, 161)
     starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]

@@ -35,6 +35,7 @@ from discover.identify.side_by_side import (
     histories_for,
     joint_library,
     separations,
+    stresses_in_histories,
 )
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
@@ -138,12 +139,15 @@ def find_twins(
             unique.append(one)
     if not unique:
         return []
-    laws = [one[0] for one in unique]
-    apart = differences(library, law, laws, base)
-    kept = [(one, d) for one, d in zip(unique, apart, strict=True) if d.sigma12 <= SAME]
-    if not kept:
+    laws = [law, *(one[0] for one in unique)]
+    stresses = stresses_in_histories(library, laws, base)
+    apart = differences(stresses)
+    same = [i for i, d in enumerate(apart) if d.sigma12 <= SAME]
+    if not same:
         return []
-    told = separations(library, law, [one[0] for one, _ in kept], base)
+    kept = [(unique[i], apart[i]) for i in same]
+    places = [0, *(1 + i for i in same)]
+    told = separations(library, [laws[i] for i in places], stresses[places], base)
     return [
         Twin(
             law=twin,

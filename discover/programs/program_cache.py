@@ -133,6 +133,8 @@ _UNPROMISED = [jax.export.DisabledSafetyCheck.custom_call("lapack_dormqr_ffi")]
 
 _ALL: weakref.WeakSet = weakref.WeakSet()
 
+_ARRAYS = (jax.Array, np.ndarray, np.generic)
+
 # bytes as exported; those of a loop with all candidates are larger, and from there on the newer
 # emitters compile them sooner
 _LARGE = 200_000
@@ -194,17 +196,18 @@ class Compiled(Generic[P, R]):
     def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
         """Return what the function returns."""
         leaves, tree = jax.tree.flatten((args, kwargs))
-        arrays = [leaf for leaf in leaves if isinstance(leaf, (jax.Array, np.ndarray, np.generic))]
-        if any(isinstance(leaf, Tracer) for leaf in arrays):
-            return self._traced(*args, **kwargs)
-        rest = tuple(None if eqx.is_array(leaf) else leaf for leaf in leaves)
+        arrays, rest, kinds = [], [], []
+        for leaf in leaves:
+            if not isinstance(leaf, _ARRAYS):
+                rest.append(leaf)
+                continue
+            if isinstance(leaf, Tracer):
+                return self._traced(*args, **kwargs)
+            arrays.append(leaf)
+            rest.append(None)
+            kinds.append((leaf.shape, leaf.dtype, _weak(leaf)))
+        key = (tree, tuple(rest), tuple(kinds), program_folder())
         try:
-            key = (
-                tree,
-                rest,
-                tuple((a.shape, a.dtype, _weak(a)) for a in arrays),
-                program_folder(),
-            )
             program = self._programs.get(key)
         except TypeError:  # of something without a hash: left to equinox, which says so
             return self._traced(*args, **kwargs)

@@ -37,19 +37,21 @@ STAMP_FILE = ".discover-programs"
 
 def program_folder() -> Path | None:
     """Return where programs of this code are kept; None where JAX keeps none either."""
-    folder = jax.config.jax_compilation_cache_dir  # pyright: ignore[reportAttributeAccessIssue]
-    plain = jax.config.jax_disable_jit or jax.config.jax_debug_nans  # pyright: ignore
-    if not folder or plain or os.environ.get("DISCOVER_NO_CACHE"):
+    config: Any = jax.config
+    plain = config.jax_disable_jit or config.jax_debug_nans
+    if plain or os.environ.get("DISCOVER_NO_CACHE"):
         return None
-    return _prepared(Path(folder) / FOLDER, _stamp(_circumstances()))
+    # what decides how a function is traced
+    traced = bool(config.jax_enable_x64), os.environ.get("EQX_ON_ERROR")
+    return _folder(config.jax_compilation_cache_dir, *traced)  # asked at every call of a program
 
 
-def _circumstances() -> str:
-    """Return what else decides how a function is traced."""
-    config = jax.config
-    return json.dumps(
-        [jax.default_backend(), bool(config.jax_enable_x64), os.environ.get("EQX_ON_ERROR")]  # pyright: ignore
-    )
+@cache
+def _folder(folder: str | None, *circumstances: Any) -> Path | None:
+    if not folder:
+        return None
+    stamp = _stamp(json.dumps([jax.default_backend(), *circumstances]))
+    return _prepared(Path(folder) / FOLDER, stamp)
 
 
 @cache
@@ -68,7 +70,6 @@ def _stamp(circumstances: str) -> str:
     return total.hexdigest()
 
 
-@cache
 def _prepared(parent: Path, stamp: str) -> Path | None:
     """Make the folder of a stamp, and remove those of code that is no longer used."""
     folder = parent / stamp

@@ -12,6 +12,7 @@ from discover.identify.side_by_side import (
     differences,
     random_histories,
     separations,
+    stresses_in_histories,
     stresses_of_laws,
 )
 from discover.identify.twins import find_twins, hidden_stresses
@@ -94,7 +95,7 @@ def test_laws_that_feel_the_trace_have_no_small_twin(law):
 
 def test_giesekus_is_no_twin_of_maxwell_at_any_mobility_worth_the_name():
     others = [LawTerms({"sigma.sigma": a}) for a in (0.001, 0.2)]
-    apart = differences(LIBRARY, LawTerms({}), others)
+    apart = differences(stresses_in_histories(LIBRARY, [LawTerms({}), *others]))
     assert all(d.sigma12 > SAME for d in apart)
     assert apart[0].sigma12 < 0.1 * apart[1].sigma12
     series = compare_series({}, {"sigma.sigma": Fraction(1, 5)})
@@ -102,7 +103,8 @@ def test_giesekus_is_no_twin_of_maxwell_at_any_mobility_worth_the_name():
 
 
 def test_a_law_that_runs_away_is_infinitely_far():
-    (apart,) = differences(LIBRARY, LawTerms({}), [LawTerms({"tr(sigma)*sigma": -5.0})])
+    laws = [LawTerms({}), LawTerms({"tr(sigma)*sigma": -5.0})]
+    (apart,) = differences(stresses_in_histories(LIBRARY, laws))
     assert apart.sigma12 == np.inf
 
 
@@ -129,7 +131,8 @@ def test_laws_side_by_side_extend_as_one_alone():
 
 def test_what_separates_a_law_from_itself_is_nothing():
     law = LawTerms({"sigma.sigma": 0.2})
-    assert separations(LIBRARY, law, [law]) == [()]
+    stresses = stresses_in_histories(LIBRARY, [law, law])
+    assert separations(LIBRARY, [law, law], stresses) == [()]
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ from discover.programs.store import (
     FOLDER,
     STAMP_FILE,
     NotDescribable,
-    _prepared,
+    _folder,
     fingerprint,
     load_program,
     program_folder,
@@ -139,7 +139,7 @@ def test_a_cache_that_others_can_write_to_is_not_opened(folder, mode, within):
     with pytest.warns(UserWarning, match="can be written to by other users"):
         assert program_folder() is None
     place.chmod(0o700)
-    _prepared.cache_clear(), is_ours_alone.cache_clear()
+    _folder.cache_clear(), is_ours_alone.cache_clear()
     assert program_folder() is not None  # the control
 
 

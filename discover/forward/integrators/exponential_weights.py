@@ -10,22 +10,24 @@ from jaxtyping import Array, Float
 
 _TAYLOR_TERMS = 14
 
+Numbers = Float[Array | np.ndarray, " ..."]
 
-def phi_functions(
-    z: Float[Array, " ..."],
-) -> tuple[Float[Array, " ..."], Float[Array, " ..."], Float[Array, " ..."]]:
+
+def phi_functions(z: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Return φ₁, φ₂, φ₃ with φ₁(z) = (eᶻ − 1)/z and φₖ₊₁(z) = (φₖ(z) − 1/k!)/z.
 
     The recurrence loses digits near zero, so a Taylor series serves there: with 14 terms its
     remainder at |z| = 1 is below 1e-15, and the recurrence loses less than three digits beyond.
+    Of an array of NumPy's they are computed by NumPy.
     """
-    small = jnp.abs(z) < 1.0
-    safe = jnp.where(small, 1.0, z)
-    first = jnp.expm1(safe) / safe
+    of: Any = np if isinstance(z, np.ndarray) else jnp
+    small = of.abs(z) < 1.0
+    safe = of.where(small, 1.0, z)
+    first = of.expm1(safe) / safe
     second = (first - 1.0) / safe
     third = (second - 0.5) / safe
-    near = jnp.where(small, z, 0.0)
-    series = jnp.zeros_like(z)
+    near = of.where(small, z, 0.0)
+    series = of.zeros_like(z)
     factorial = [1.0]
     for n in range(1, _TAYLOR_TERMS + 4):
         factorial.append(factorial[-1] * n)
@@ -34,9 +36,9 @@ def phi_functions(
     series_second = 0.5 + near * series
     series_first = 1.0 + near * series_second
     return (
-        jnp.where(small, series_first, first),
-        jnp.where(small, series_second, second),
-        jnp.where(small, series, third),
+        of.where(small, series_first, first),
+        of.where(small, series_second, second),
+        of.where(small, series, third),
     )
 
 
@@ -64,17 +66,17 @@ class KrogstadWeights(NamedTuple):
     is the weight of N4; those of the others follow from it and from the stages.
     """
 
-    half: Float[Array, " ..."]
-    full: Float[Array, " ..."]
-    a21: Float[Array, " ..."]
-    a31: Float[Array, " ..."]
-    a32: Float[Array, " ..."]
-    a41: Float[Array, " ..."]
-    a43: Float[Array, " ..."]
-    b1: Float[Array, " ..."]
-    b23: Float[Array, " ..."]
-    b4: Float[Array, " ..."]
-    m4: Float[Array, " ..."]
+    half: Numbers
+    full: Numbers
+    a21: Numbers
+    a31: Numbers
+    a32: Numbers
+    a41: Numbers
+    a43: Numbers
+    b1: Numbers
+    b23: Numbers
+    b4: Numbers
+    m4: Numbers
 
     def tableau(self) -> tuple[Float[Array, "4 ..."], Float[Array, "4 4 ..."]]:
         """Return what each stage multiplies the state with, and the remainders of all stages."""
@@ -227,9 +229,7 @@ def _mean_normal(stress: Float[Array, " s *c"]) -> Float[Array, " *c"]:
     return jnp.sum(stress[:3], axis=0) / 3.0
 
 
-def krogstad_weights(
-    z: Float[Array, " ..."], step: Float[Array, " ..."] | Float[Array, ""]
-) -> KrogstadWeights:
+def krogstad_weights(z: Numbers, step: Numbers) -> KrogstadWeights:
     """Return the weights of a step   [Krogstad 2005, JCP 203, 72].
 
     `z`: minus the decay over the step. `step`: its length, in the unit of time of the remainders.
@@ -237,7 +237,7 @@ def krogstad_weights(
     half_first, half_second, half_third = phi_functions(0.5 * z)
     # those of z follow from those of its half   [Skaflestad & Wright 2009, Appl. Numer. Math. 59,
     # 783]: sums of positive numbers, which lose no digit
-    half = jnp.exp(0.5 * z)
+    half = np.exp(0.5 * z) if isinstance(z, np.ndarray) else jnp.exp(0.5 * z)
     first = 0.5 * (half + 1.0) * half_first
     second = 0.25 * (half_first * half_first + 2.0 * half_second)
     third = 0.125 * (half_first * half_second + half_second + 2.0 * half_third)

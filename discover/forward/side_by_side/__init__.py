@@ -3,11 +3,13 @@
 from discover.forward.side_by_side.code import code_of
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.periodic import PeriodicCode, PeriodicSideBySide
+from discover.forward.side_by_side.predictors import Asked
 from discover.forward.side_by_side.steady import SteadyCode, SteadySideBySide
 from discover.forward.side_by_side.stress import StressCode, StressSideBySide
 from discover.forward.side_by_side.transients import SideBySide, intervals
 
 __all__ = [
+    "Asked",
     "Kernel",
     "PeriodicCode",
     "PeriodicSideBySide",

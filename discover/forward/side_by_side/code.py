@@ -1,7 +1,7 @@
 """Machine code for the effects of a fluid and a law, made once for all whose constants differ."""
 
-from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, TypeVar
 
 import equinox as eqx
 import jax
@@ -12,7 +12,7 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
 from discover.forward.side_by_side.step import Flags, Mode, Shared, laid_out
 from discover.programs import compiled
-from discover.programs.lanes import LANES, Arithmetic, Translation, Writing, callable_of, kept
+from discover.programs.lanes import Arithmetic, Translation, Writing, callable_of, kept
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
 
@@ -62,42 +62,6 @@ class Layout:
 
 _MADE: dict[tuple, "Code"] = {}
 _KEPT = 16
-
-
-def in_whole_eights(count: int) -> np.ndarray:
-    """Return places of so many lanes, the last again until the eights are full."""
-    return np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
-
-
-def lanes_last(values: np.ndarray) -> np.ndarray:
-    """Return values of lanes, in whole eights, with these eights first and their lanes last."""
-    return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
-
-
-class Eights(NamedTuple):
-    """Vectors in whole eights, the last again until they are full.
-
-    `modes`, `shared`: what the vectors say of each mode, and of all of them, lanes first.
-    """
-
-    pairs: list[tuple[np.ndarray, np.ndarray]]  # of each eight its vectors and their moduli
-    modes: np.ndarray
-    shared: np.ndarray
-
-    @classmethod
-    def of(cls, packed: Callable, numbers: Numbers, thetas, moduli) -> "Eights":
-        """Return vectors packed by a program of `Code.packing`, whose lanes are first."""
-        places = in_whole_eights(len(thetas))
-        both = (values[places].reshape(-1, LANES, values.shape[1]) for values in (thetas, moduli))
-        pairs = list(zip(*both, strict=True))
-        each = [packed(numbers, *pair) for pair in pairs]
-        return cls(pairs, *(np.concatenate(arrays) for arrays in zip(*each, strict=True)))
-
-    def rates(self, commanded: np.ndarray, shaped: Callable | None) -> np.ndarray:
-        """Return the rates that each vector feels: as commanded, or what a program makes of it."""
-        if shaped is None:
-            return np.broadcast_to(commanded, (len(self.modes), *commanded.shape))
-        return np.concatenate([shaped(thetas) for thetas, _ in self.pairs])
 
 
 class Code:
@@ -158,6 +122,11 @@ class Code:
         code = kept((type(self).__name__, fluid.structure, empty, *others), self._written)
         self._call = callable_of(code, len(self.counts), len(self.arrays))
 
+    def _run(self, counts: Sequence[int], arrays: Mapping[str, np.ndarray]) -> None:
+        # contiguous already; were one of them not, the code would read what is not its own
+        laid = [np.ascontiguousarray(arrays[name]) for name in self.arrays]
+        self._call(*counts, *(array.ctypes.data for array in laid))
+
     def _written(self) -> bytes:
         known = set(vars(self))
         self._w = Writing(self.counts, self.arrays, self.wide, self.whole)
@@ -205,6 +174,14 @@ class Code:
                 more = a.multiply(own, value)
                 w.store(a.add(w.load("of_modes", place), more), "of_modes", place)
 
+    def _goes_on(self) -> Any:
+        return self._w.builder.icmp_signed("!=", self._w.load("goes_on", 0), INTEGER(0))
+
+    def _go_on_if(self, lanes: Any) -> None:
+        """Write whether something holds in some lane, which `_goes_on` asks."""
+        some = self._arithmetic.in_some(lanes)
+        self._w.store(self._w.builder.zext(some, INTEGER), "goes_on", 0)
+
     def _truths(self) -> dict[str, Any]:
         """Return which parts are needed, by name."""
         truths = [
@@ -215,8 +192,10 @@ class Code:
 
     def _rest(self, levels: Sequence[tuple[int, float]], place: int) -> None:
         """Write states of the fluid at rest, of so many numbers each."""
-        at_rest = [rest for count, rest in levels for _ in range(count)]
-        self._keep(at_rest, place)
+        self._keep([rest for count, rest in levels for _ in range(count)], place)
+
+    def _keep_states(self, states: Sequence[Any], place: int) -> None:
+        self._keep([value for state in states for value in state.flat], place)
 
     def _states(self, levels: Sequence[tuple[int, float]], place: int) -> tuple:
         """Return the states of the fluid, in the shapes of their effects."""

@@ -6,8 +6,6 @@ each run is followed to its own end, and states of the fluid stay in a scratch a
 
 from typing import Any
 
-import jax
-import llvmlite.ir as ir
 import numpy as np
 
 from discover.forward.augmented_fluid import AugmentedFluid
@@ -26,8 +24,6 @@ _WIDE = ("rate", "shared", "mode", "limit", "stress", "felt", "of_modes", "scrat
 _WHOLE = ("last", "held", "cycle", "flags", "goes_on")
 _SCALAR = ("width", "whole", "least", "period", "table", "flow", "jump", "weight", "recorded")
 _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
-
-_EIGHT_BITS = ir.IntType(8)
 
 # Where the number of steps stands, beside whether any vector is of use
 _STEPS = 1
@@ -108,18 +104,9 @@ class Kernel(Code):
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
             "of_modes": of_modes,
         }  # fmt: skip
-        # contiguous already; were one of them not, the code would read what is not its own
-        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
-        self._call(runs, steps, modes, tabled, int(normal), *(array.ctypes.data for array in laid))
+        self._run((runs, steps, modes, tabled, int(normal)), arrays)
         self.steps_taken += int(goes_on[_STEPS])
         return stress, felt, of_modes, bool(goes_on[0])
-
-    def flows(self, flow: Kinematics | None) -> np.ndarray:
-        """Return the kinematics of runs as one array, shape (runs, numbers)."""
-        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(flow)]
-        if not leaves:
-            return np.zeros((1, 1))
-        return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
     def _body(self) -> None:
         w = self._w
@@ -141,9 +128,6 @@ class Kernel(Code):
         w.store(INTEGER(1), "goes_on", 0)
         with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
             self._of_run(run)
-
-    def _goes_on(self):
-        return self._w.builder.icmp_signed("!=", self._w.load("goes_on", 0), INTEGER(0))
 
     def _splat(self, name: str, place: Any) -> Any:
         return self._arithmetic.splat(self._w.load(name, place))
@@ -243,16 +227,14 @@ class Kernel(Code):
             with w.builder.if_then(on["series"]), self._arithmetic.apart():
                 self._foresee(run, number, flow, width, slow, rates, before, scale_last, is_held)
         taken = self._kept(_TAKEN)
-        for place in (_SUM, _OTHER_SUM):
-            self._keep(0.0, place)
+        self._keep(np.zeros(2), _SUM)
         with w.loop(counts["modes"]) as mode_number, self._arithmetic.apart():
             mode, weights, stress, at = self._mode(run, number, mode_number, width, slow, is_held)
             after = write(
                 step.of_mode,
                 shared, mode, on, flow, slow, stress, tuple(rates), taken, earlier, weights,
             )  # fmt: skip
-            for i, value in enumerate(after):
-                self._keep(value, w.at((at, 1), (i, 1)))
+            self._keep(after, at)
             sheared, recorded = write(step.felt, mode, flow, after)
             self._keep(add(self._kept(_SUM), sheared[()]), _SUM)
             if flow is not None:
@@ -265,9 +247,7 @@ class Kernel(Code):
             shared, on, flow, levels, add(rates[1], taken), width, before, scale_last, sheared,
             recorded,
         )  # fmt: skip
-        flat = [value for level in after for value in level.flat]
-        for place, value in enumerate(flat, start=_LEVELS):
-            self._keep(value, place)
+        self._keep_states(after, _LEVELS)
         if self._series:
             with w.builder.if_then(on["series"]), self._arithmetic.apart():
                 missing = write(
@@ -284,8 +264,7 @@ class Kernel(Code):
         w, write, step, add = self._w, self._write, self._step, self._arithmetic.add
         shared, on, earlier = self._parameters, self._on, self._kept(_EARLIER)
         sums = (_SUM, _OTHER_SUM)
-        for place in sums:
-            self._keep(0.0, place)
+        self._keep(np.zeros(2), _SUM)
         with w.loop(w.counts["modes"]) as mode_number, self._arithmetic.apart():
             mode, weights, stress, _ = self._mode(run, number, mode_number, width, slow, is_held)
             rate = add(rates[0], earlier)
@@ -314,8 +293,7 @@ class Kernel(Code):
         on = {"own weights": own}
         weights = self._write(self._step.weights, mode, on, width, _array(table))
         at = self._place_of_mode(mode_number)
-        stress = [self._kept(w.at((at, 1), (i, 1))) for i in range(4 + self._variables)]
-        return mode, weights, _array(stress), at
+        return mode, weights, self._kept(at, 4 + self._variables), at
 
     def _record(self, run, number, flow, rate, is_run) -> None:
         """Write a stress down, and give up where no vector is of use any more."""
@@ -342,10 +320,7 @@ class Kernel(Code):
             limit = w.load("limit", 0)
             # what is no number is below no limit
             endless = a.compare("==", limit, float("inf"))
-            of_use = builder.or_(endless, a.compare("<", missed, limit))
-            bits = builder.bitcast(of_use, _EIGHT_BITS)
-            some = builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
-            w.store(builder.zext(some, INTEGER), "goes_on", 0)
+            self._go_on_if(builder.or_(endless, a.compare("<", missed, limit)))
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""

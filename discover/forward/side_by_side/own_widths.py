@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import llvmlite.ir as ir
-
 from discover.programs.lanes import Arithmetic, Writing
 from discover.programs.lanes.arithmetic import INTEGER
 
@@ -44,7 +42,6 @@ OWN = ("elapsed", "width", "own", "slope", "off", "moved")
 """Of an interval the time that has passed, and the width that comes next; of a step its width; the
 slope of the rate; by how much halves and whole differ, and how far both went."""
 
-_EIGHT_BITS = ir.IntType(8)
 _ENOUGH = 10**9
 
 
@@ -84,10 +81,6 @@ class OwnWidths:
     def _keep(self, value: Any, place: Any) -> None:
         self._w.store(self._arithmetic.lanes(value), "scratch", place)
 
-    def _any(self, truths: Any) -> Any:
-        bits = self._w.builder.bitcast(truths, _EIGHT_BITS)
-        return self._w.builder.icmp_unsigned("!=", bits, _EIGHT_BITS(0))
-
     def steps(self, run: Any, number: Any, half: Any) -> tuple[Any, Any]:
         """Return how many steps of the grid are one interval, and whether widths in it are chosen.
 
@@ -113,7 +106,7 @@ class OwnWidths:
                     line = a.add(first, a.multiply(slope, a.add(begin, a.multiply(share, width))))
                     rate = w.load("rate", w.at((half, 1), (more, 2), (i, 1)))
                     off = a.compare(">", a.size(a.subtract(rate, line)), most, of_nothing=True)
-                    with b.if_then(self._any(off)):
+                    with b.if_then(self._arithmetic.in_some(off)):
                         b.store(INTEGER(0), self._straight)
                 self._keep(a.add(begin, width), self._at["elapsed"])
         return b.select(self._is_straight(), several, INTEGER(1)), self._is_straight()
@@ -217,7 +210,7 @@ class OwnWidths:
         ended = a.both("and", taken, a.compare("<", width, known))
         following = a.chosen(ended, a.larger(known, following), following)
         self._keep(a.chosen(a.compare(">", width, 0.0), following, known), at["width"])
-        is_left = self._any(a.compare("<", elapsed, whole))
+        is_left = self._arithmetic.in_some(a.compare("<", elapsed, whole))
         b.store(b.zext(is_left, INTEGER), self._left)
 
     def _differences(self) -> tuple[Any, Any]:

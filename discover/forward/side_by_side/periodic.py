@@ -10,19 +10,18 @@ from jaxtyping import Bool, Float
 
 from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import PeriodicFlows, Records
 from discover.forward.declared import Numbers
-from discover.forward.side_by_side.code import Code, Eights, in_whole_eights, lanes_last
-from discover.forward.side_by_side.step import WEIGHTS, Flags, Mode, Shared, Step
+from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.cycles import approximation
+from discover.forward.side_by_side.predictors import Asked, Eights, StatePredictor, lanes_last
+from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.starts.half_cycles import mirror
 from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
 from discover.forward.starts.steady_states import (
-    Approximation,
     goes_on,
     next_approximation,
     relative_change,
 )
-from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
@@ -57,7 +56,7 @@ class PeriodicStep(Step):
         Half a cycle later the state is mirrored, by the signs in `back`.
         """
         size = len(end)
-        now = _approximation(way, size)
+        now = approximation(way, size)
         jacobian = (tangents * back)[None]
         following, better = next_approximation(now, (back * end)[:, None], jacobian)
         slowness = (frequency * mode.relaxation_time)[None]
@@ -71,14 +70,6 @@ class PeriodicStep(Step):
             jnp.where(moving, moved, change),
             jnp.where(moving & further, 1.0, 0.0),
         )
-
-
-def _approximation(way, size: int) -> Approximation:
-    """Return what `improved` makes of its numbers, which follow one another."""
-    stress, best, rest = way[:size], way[size : 2 * size], way[2 * size :]
-    return Approximation(
-        stress[:, None], best[:, None], rest[:1], rest[1 : size + 1, None], rest[-2:-1], rest[-1]
-    )
 
 
 class PeriodicCode(Code):
@@ -117,24 +108,18 @@ class PeriodicCode(Code):
         """
         groups, modes = given["mode"].shape[:2]
         storage, loss = np.empty((2, groups, LANES))
-        scratch = np.empty((self._now_at + self._size * (1 + self._size), LANES))
         arrays = given | {
-            "flags": used.astype(np.int64), "storage": storage, "loss": loss, "scratch": scratch,
+            "flags": used.astype(np.int64), "storage": storage, "loss": loss,
+            "scratch": np.empty((self._now_at + self._size * (1 + self._size), LANES)),
             "goes_on": np.ones(1, np.int64),
         }  # fmt: skip
-        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
-        most = given["cosine"].shape[1]
-        self._call(groups, modes, most, *(array.ctypes.data for array in laid))
+        self._run((groups, modes, given["cosine"].shape[1]), arrays)
         return storage + 1j * loss
 
     def _body(self) -> None:
         w, a = self._w, self._arithmetic
-        on = self._truths() | {
-            "series": False,
-            "states": False,
-            "times": False,
-            "own weights": True,
-        }
+        on = self._truths() | dict.fromkeys(("series", "states", "times"), False)
+        on["own weights"] = True
         modes = w.counts["modes"]
         with w.loop(w.counts["groups"]) as group, a.apart():
             shared = self._tree("shared", self._shared, group)
@@ -158,11 +143,7 @@ class PeriodicCode(Code):
         self._keep(1.0, _ALIVE)
         self._keep(np.inf, _CHANGE)
         w.store(INTEGER(1), "goes_on", 0)
-
-        def anew():
-            return w.builder.icmp_signed("!=", w.load("goes_on", 0), INTEGER(0))
-
-        with w.loop(MOST_CYCLES + 1, anew), a.apart():
+        with w.loop(MOST_CYCLES + 1, self._goes_on), a.apart():
             self._keep(self._kept(self._way_at, size), self._now_at)
             self._keep(np.eye(size), self._now_at + size)
             with w.loop(w.load("steps", group)) as number, a.apart():
@@ -182,8 +163,7 @@ class PeriodicCode(Code):
             )  # fmt: skip
             for value, place in ((way, self._way_at), (change, _CHANGE), (alive, _ALIVE)):
                 self._keep(value, place)
-            some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
-            w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
+            self._go_on_if(a.compare(">", self._kept(_ALIVE), 0.0))
         self._harmonic(group, shared, mode, on, frequency, strain, steps)
 
     def _harmonic(self, group, shared, mode, on, frequency, strain, steps) -> None:
@@ -227,13 +207,12 @@ class PeriodicCode(Code):
 _AT_ONCE = 2
 
 
-class PeriodicSideBySide:
+class PeriodicSideBySide(StatePredictor):
     """Predictions of moduli for one structure of law and effects.
 
-    `fluid`, `code`: the fluid with its effects, and its machine code. `rates`: of a vector, the
-    effects that are present, and states: the amplitude of the rate that the fluid feels.
-    `recorded`: of the numbers, these and the moduli of the modes, the moduli recorded. `made_from`:
-    what tells these from those of another structure.
+    `fluid`, `code`, `rates`, `made_from`: as `StatePredictor` takes them. `recorded`: of the
+    numbers, a vector, the effects that are present, states and the moduli of the modes in these:
+    the moduli recorded.
     """
 
     def __init__(
@@ -244,22 +223,16 @@ class PeriodicSideBySide:
         recorded: Callable,
         made_from: tuple,
     ):
-        self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
-        at = fluid.slices
-        self._shaping = [at[e.name].start for e in acting if isinstance(e, KinematicEffect)]
+        shaping = [e for e in acting if isinstance(e, KinematicEffect)]
+        super().__init__(fluid, code, made_from, shaping, rates, (0, None, None))
         coupling = [*fluid.series, *(e for e in fluid.states if e.acts_on_steady_states)]
-        self._coupling = [at[e.name].start for e in coupling]
-
-        self._packed = code.packing(fluid, made_from, 0)
-        of_trials = jax.vmap(rates, (0, None, None))
-        self._rates = compiled(of_trials, ("periodic rates", *made_from))
+        self._coupling = self._amplitudes(coupling)
 
         def of_solvent(numbers: Numbers, solvent, *others):
             return recorded(replace(numbers, solvent_viscosity=solvent), *others)
 
-        of_trials = jax.vmap(of_solvent, (None, 0, 0, None, None, 0))
-        self._recorded = compiled(of_trials, ("moduli", *made_from))
+        self._recorded = self._program("moduli", of_solvent, (None, 0, 0, None, None, 0))
 
     def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
         """Return which vectors are left to the other program.
@@ -268,70 +241,40 @@ class PeriodicSideBySide:
         """
         return np.any(thetas[:, self._coupling], axis=1)
 
-    def predict(
-        self,
-        numbers: Numbers,
-        thetas: Float[np.ndarray, "trials p"],
-        moduli: Float[np.ndarray, "trials c"],
-        limits: Float[np.ndarray, " trials"],
-        part: PeriodicFlows,
-        judging: Records | None,
-        runs: int,
-        normal: bool,
-    ) -> Float[np.ndarray, "trials states 2"]:
-        """Return both moduli; see `SideBySide.predict`.
+    def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
+        """Return both moduli.
 
         Limits, what judges and how many runs are no padding say nothing here, and a modulus has no
         normal stresses beside it.
         """
-        del limits, judging, runs, normal
-        count, frequency = len(thetas), np.asarray(part.frequency)
-        present = self._fluid.present(thetas)
-        eights = Eights.of(self._packed, numbers, thetas, moduli)
-        is_shaped = np.any(thetas[:, self._shaping])
-        shaped = (lambda eight: self._rates(eight, present, part)) if is_shaped else None
-        rate = eights.rates(frequency * np.asarray(part.strain), shaped)
-        found = self._solved(thetas, eights, len(numbers.modulus), rate / frequency, part)
-        places = np.split(in_whole_eights(count), len(eights.pairs))
+        part, eights = asked.part, self._eights(asked)
+        frequency = np.asarray(part.frequency)
+        rate = self._felt(asked, eights, frequency * np.asarray(part.strain))
+        found = self._solved(asked, eights, rate / frequency)
+        present = self._fluid.present(asked.thetas)
         recorded = [
-            self._recorded(numbers, own[:, -1], eight, present, part, found[at])
-            for (eight, own), at in zip(eights.pairs, places, strict=True)
+            self._recorded(asked.numbers, own[:, -1], eight, present, part, found[at])
+            for (eight, own), at in zip(eights.pairs, eights.places, strict=True)
         ]
-        return np.concatenate(recorded)[:count]
+        return np.concatenate(recorded)[: len(asked.thetas)]
 
-    def _solved(self, thetas, eights: Eights, declared: int, strain, part) -> np.ndarray:
+    def _solved(self, asked: Asked, eights: Eights, strain) -> np.ndarray:
         """Return the complex moduli of the modes, shape (trials, states)."""
+        part, declared = asked.part, len(asked.numbers.modulus)
         frequency, steps = np.asarray(part.frequency), np.asarray(part.steps).astype(np.int64)
-        patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
-        out = np.empty((len(thetas), len(frequency)), complex)
+        out = np.empty((len(asked.thetas), len(frequency)), complex)
 
-        def some(lanes: tuple[np.ndarray, np.ndarray]) -> None:
-            trial, state = (lane[in_whole_eights(len(lane))] for lane in lanes)
+        def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             own = steps[state[::LANES]]
             half = np.arange(2 * own.max() + 1) * (0.5 * np.pi / own[:, None])
-
-            of_mode = eights.modes[trial]
-            # what effects add is left out where no lane has it
-            present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
-            present[:declared] = True
-            given = {
+            given = eights.of_lanes(trial, declared) | {
                 "strain": lanes_last(strain[trial, state]),
                 "frequency": lanes_last(frequency[state]),
-                "shared": lanes_last(eights.shared[trial]), "mode": lanes_last(of_mode[:, present]),
                 "steps": own, "cosine": np.cos(half), "sine": np.sin(half),
             }  # fmt: skip
-            found = self._code(patterns[which.ravel()[trial[0]]], given)
-            out[trial, state] = found.ravel()
+            out[trial, state] = self._code(used, given).ravel()
 
-        pieces = []
-        for number in range(len(patterns)):
-            trials = np.flatnonzero(which.ravel() == number)
-            # those of a group take as many steps
-            for count in np.unique(steps):
-                states = np.flatnonzero(steps == count)
-                trial, state = np.repeat(trials, len(states)), np.tile(states, len(trials))
-                for first in range(0, len(trial), _AT_ONCE * LANES):
-                    piece = slice(first, first + _AT_ONCE * LANES)
-                    pieces.append((trial[piece], state[piece]))
-        in_threads(some, pieces, is_compiled=True)
+        # those of a group take as many steps
+        alike = [np.flatnonzero(steps == count) for count in np.unique(steps)]
+        self._by_states(asked.thetas, alike, _AT_ONCE, solve)
         return out

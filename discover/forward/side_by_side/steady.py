@@ -3,17 +3,21 @@
 from collections.abc import Callable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.batches import Records, SteadyFlows
-from discover.forward.declared import Numbers
-from discover.forward.side_by_side.code import Code, Eights, as_array, in_whole_eights, lanes_last
-from discover.forward.side_by_side.step import Flags, Mode, Shared, Step, _if
+from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.predictors import (
+    Asked,
+    Eights,
+    StatePredictor,
+    flows_of,
+    lanes_last,
+)
+from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.forward.starts.steady_states import (
     MOST_STEPS,
     Approach,
@@ -22,7 +26,6 @@ from discover.forward.starts.steady_states import (
     arrived,
     moves,
 )
-from discover.programs import compiled, in_threads
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics, normal_stress_differences
@@ -145,14 +148,12 @@ class SteadyCode(Code):
         """
         groups, modes = given["mode"].shape[:2]
         (stress, felt), of_modes = np.empty((2, groups, LANES)), np.empty((groups, 4, LANES))
-        scratch = np.empty((self._modes_at + modes * self._numbers, LANES))
-        flags, goes_on = used.astype(np.int64), np.ones(1, np.int64)
         arrays = given | {
-            "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
-            "of_modes": of_modes,
+            "flags": used.astype(np.int64), "stress": stress, "felt": felt, "of_modes": of_modes,
+            "scratch": np.empty((self._modes_at + modes * self._numbers, LANES)),
+            "goes_on": np.ones(1, np.int64),
         }  # fmt: skip
-        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
-        self._call(groups, modes, *(array.ctypes.data for array in laid))
+        self._run((groups, modes), arrays)
         return stress, felt, of_modes
 
     def _body(self) -> None:
@@ -173,50 +174,35 @@ class SteadyCode(Code):
         with w.loop(w.at((modes, self._numbers))) as number:
             self._keep(0.0, w.at((number, 1), (self._modes_at, 1)))
         w.store(INTEGER(1), "goes_on", 0)
-
-        def goes_on():
-            return w.builder.icmp_signed("!=", w.load("goes_on", 0), INTEGER(0))
-
-        with w.loop(MOST_STEPS, goes_on), a.apart():
-            levels, felt, alive = (
-                self._states(self._levels, _LEVELS),
-                self._kept(_FELT),
-                self._kept(_ALIVE),
-            )
-            index = self._kept(_INDEX)
-            self._keep(0.0, _SUM)
-            self._keep(0.0, _MOVING)
+        with w.loop(MOST_STEPS, self._goes_on), a.apart():
+            levels = self._states(self._levels, _LEVELS)
+            felt, index, alive = (self._kept(place) for place in (_FELT, _INDEX, _ALIVE))
+            self._keep(np.zeros(2), _SUM)
             with w.loop(modes) as number, a.apart():
                 mode, way, at = self._mode(group, number)
                 after, moving, sheared = write(
                     step.onward, shared, mode, on, flow, levels, felt, rate, index, alive, way
                 )
-                for i, value in enumerate(after):
-                    self._keep(value, w.at((at, 1), (i, 1)))
+                self._keep(after, at)
                 self._keep(a.larger(self._kept(_MOVING), moving[()]), _MOVING)
                 self._keep(a.add(self._kept(_SUM), sheared[()]), _SUM)
             felt, after, moving = write(
                 step.beside_modes, shared, on, flow, levels, felt, rate, self._kept(_SUM), alive
             )
             self._keep(felt, _FELT)
-            for place, value in enumerate(
-                (value for level in after for value in level.flat), start=_LEVELS
-            ):
-                self._keep(value, place)
+            self._keep_states(after, _LEVELS)
             alive = a.multiply(alive, a.larger(self._kept(_MOVING), moving[()]))
             self._keep(alive, _ALIVE)
             self._keep(a.add(index, 1.0), _INDEX)
-            some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
-            w.store(w.builder.zext(some, INTEGER), "goes_on", 0)
+            self._go_on_if(a.compare(">", alive, 0.0))
         levels, felt = self._states(self._levels, _LEVELS), self._kept(_FELT)
-        for place in _TOTAL:
-            self._keep(0.0, place)
+        self._keep(np.zeros(len(_TOTAL)), _TOTAL.start)
         with w.loop(modes) as number, a.apart():
             mode, way, _ = self._mode(group, number)
             found = write(step.reached, shared, mode, on, flow, levels, felt, rate, way)
             for place, value in zip(_TOTAL, found, strict=True):
                 self._keep(a.add(self._kept(place), value), place)
-        total = as_array([self._kept(place) for place in _TOTAL])
+        total = self._kept(_TOTAL.start, len(_TOTAL))
         stress, of_modes = write(step.recorded, shared, on, flow, levels, felt, total)
         w.store(a.lanes(stress[()]), "stress", group)
         for i, value in enumerate(of_modes):
@@ -228,21 +214,18 @@ class SteadyCode(Code):
         w, modes = self._w, self._w.counts["modes"]
         mode = self._tree("mode", self._of_mode, w.at((group, modes), (number, 1)))
         at = w.at((number, self._numbers), (self._modes_at, 1))
-        way = [self._kept(w.at((at, 1), (i, 1))) for i in range(self._numbers)]
-        return mode, as_array(way), at
+        return mode, self._kept(at, self._numbers), at
 
 
 # Eights of states that one call of the code takes
 _AT_ONCE = 8
 
 
-class SteadySideBySide:
+class SteadySideBySide(StatePredictor):
     """Predictions of flow curves for one structure of law and effects.
 
-    `fluid`, `code`: the fluid with its effects, and its machine code. `rates`: of a vector, the
-    effects that are present, and a run: the felt rate without slip. `recorded`: of these, the
-    stress and the felt rate, what is recorded. `made_from`: what tells these from those of another
-    structure.
+    `fluid`, `code`, `rates`, `made_from`: as `StatePredictor` takes them. `recorded`: of a vector,
+    the effects that are present, and a run, its stress and felt rate: what is recorded.
     """
 
     def __init__(
@@ -253,57 +236,35 @@ class SteadySideBySide:
         recorded: Callable,
         made_from: tuple,
     ):
-        self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
-        self._shaping = [
-            fluid.slices[e.name].start for e in acting if isinstance(e, KinematicEffect)
-        ]
-        self._distorting = [
-            fluid.slices[e.name].start for e in acting if isinstance(e, SignalEffect)
-        ]
+        shaping = [e for e in acting if isinstance(e, KinematicEffect)]
+        axes = (None, None, 0), (0, None, None)
+        super().__init__(fluid, code, made_from, shaping, rates, *axes)
+        self._distorting = self._amplitudes(e for e in acting if isinstance(e, SignalEffect))
+        axes = (None, None, 0, 0, 0), (0, None, None, 0, 0)
+        self._recorded = self._program("steady records", recorded, *axes)
 
-        self._packed = code.packing(fluid, made_from, 0)
-        of_runs = jax.vmap(rates, in_axes=(None, None, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, None))
-        self._rates = compiled(of_trials, ("steady rates", *made_from))
-        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0))
-        self._recorded = compiled(of_trials, ("steady records", *made_from))
-
-    def predict(
-        self,
-        numbers: Numbers,
-        thetas: Float[np.ndarray, "trials p"],
-        moduli: Float[np.ndarray, "trials c"],
-        limits: Float[np.ndarray, " trials"],
-        part: SteadyFlows,
-        judging: Records | None,
-        runs: int,
-        normal: bool,
-    ) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded; see `SideBySide.predict`.
+    def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
+        """Return what is recorded, and N1 and N2 behind it if asked for.
 
         Limits, what judges and how many runs are no padding say nothing here.
         """
-        del limits, judging, runs
-        count, present = len(thetas), self._fluid.present(thetas)
-        eights = Eights.of(self._packed, numbers, thetas, moduli)
-        is_shaped = np.any(thetas[:, self._shaping])
-        shaped = (lambda eight: self._rates(eight, present, part)) if is_shaped else None
-        rate = eights.rates(np.asarray(part.rate), shaped)
-        found = self._states(thetas, eights, len(numbers.modulus), rate, part)
+        thetas, part, eights = asked.thetas, asked.part, self._eights(asked)
+        rate = self._felt(asked, eights, np.asarray(part.rate))
+        found = self._states(thetas, eights, len(asked.numbers.modulus), rate, part)
         stress, felt, of_modes = found[..., 0], found[..., 1], found[..., 2:]
         beside = []
-        if normal:
+        if asked.normal:
             beside = [normal_stress_differences(part.kinematics, stress, of_modes)]
-        if not np.any(thetas[:, self._distorting]):
-            return np.concatenate([stress[..., None], *beside], axis=-1)
-        places = np.split(in_whole_eights(count), len(eights.pairs))
-        recorded = [
-            self._recorded(eight, present, part, stress[at], felt[at])
-            for (eight, _), at in zip(eights.pairs, places, strict=True)
-        ]
-        return np.concatenate([np.concatenate(recorded)[:count, ..., None], *beside], axis=-1)
+        if np.any(thetas[:, self._distorting]):
+            present = self._fluid.present(thetas)
+            stress = np.concatenate(
+                [
+                    self._recorded(eight, present, part, stress[at], felt[at])
+                    for (eight, _), at in zip(eights.pairs, eights.places, strict=True)
+                ]
+            )[: len(thetas)]
+        return np.concatenate([stress[..., None], *beside], axis=-1)
 
     def _states(self, thetas, eights: Eights, declared: int, rate, part) -> np.ndarray:
         """Return stresses, felt rates and those of the modes, shape (trials, runs, n, 6)."""
@@ -314,42 +275,18 @@ class SteadySideBySide:
         last = np.where(np.any(changes, axis=1), last, 0)
         place = np.minimum(np.arange(own.shape[1]), last[:, None])
         of_run, at = np.nonzero(np.arange(own.shape[1]) <= last[:, None])
-        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(part.kinematics)]
-        flows = (
-            np.concatenate([leaf.reshape(len(own), -1) for leaf in leaves], 1) if leaves else None
-        )
-        flags = self._flags.of(thetas)
-        patterns, which = np.unique(flags, axis=0, return_inverse=True)
+        flows = flows_of(part.kinematics)
         out = np.empty((len(thetas), *own.shape, 6))
 
-        def some(lanes: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-            pattern, trial, state = lanes
-            filled = in_whole_eights(len(trial))
-            trial, state = trial[filled], state[filled]
+        def solve(used: np.ndarray, trial: np.ndarray, state: np.ndarray) -> None:
             row, column = of_run[state], at[state]
-
-            of_mode = eights.modes[trial]
-            # what effects add is left out where no lane has it
-            present = np.any(of_mode[:, :, 0] != 0.0, axis=0)
-            present[:declared] = True
-            given = {
+            given = eights.of_lanes(trial, declared) | {
                 "rate": lanes_last(rate[trial, row, column]),
-                "shared": lanes_last(eights.shared[trial]),
-                "mode": lanes_last(of_mode[:, present]),
-                "flow": np.zeros(1) if flows is None else lanes_last(flows[row]),
+                "flow": lanes_last(flows[row]) if part.kinematics is not None else flows,
             }
-            stress, felt, of_modes = self._code(patterns[pattern[0]], given)
-            found = [stress[:, None], felt[:, None], of_modes]
-            found = np.moveaxis(np.concatenate(found, axis=1), 1, -1)
-            out[trial, row, column] = found.reshape(-1, 6)
+            stress, felt, of_modes = self._code(used, given)
+            found = np.concatenate([stress[:, None], felt[:, None], of_modes], axis=1)
+            out[trial, row, column] = np.moveaxis(found, 1, -1).reshape(-1, 6)
 
-        pieces = []
-        for number in range(len(patterns)):
-            trials = np.flatnonzero(which.ravel() == number)
-            trial = np.repeat(trials, len(of_run))
-            state = np.tile(np.arange(len(of_run)), len(trials))
-            for first in range(0, len(trial), _AT_ONCE * LANES):
-                piece = slice(first, first + _AT_ONCE * LANES)
-                pieces.append((np.array([number]), trial[piece], state[piece]))
-        in_threads(some, pieces, is_compiled=True)
+        self._by_states(thetas, [np.arange(len(of_run))], _AT_ONCE, solve)
         return np.take_along_axis(out, place[None, :, :, None], axis=2)

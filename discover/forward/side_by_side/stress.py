@@ -10,13 +10,16 @@ from jaxtyping import Float
 
 from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import Records, StressFlows
-from discover.forward.declared import Numbers
 from discover.forward.integrators.exponential_weights import KrogstadWeights
 from discover.forward.integrators.stepping import RATE_OF_RATE
-from discover.forward.side_by_side.code import Code, in_whole_eights
-from discover.forward.side_by_side.step import Flags, Mode, Shared, Step, _if
-from discover.programs import compiled, in_threads
+from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.predictors import (
+    Asked,
+    LanePredictor,
+    flows_of,
+    modes_in_use,
+)
+from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics, normal_stress_differences
@@ -137,13 +140,11 @@ class StressCode(Code):
         strain = np.full((runs, steps + 1, LANES), np.nan)
         of_modes = np.full((runs, steps + 1, 4 if normal else 0, LANES), np.nan)
         strain[:, 0], of_modes[:, 0] = 0.0, 0.0
-        scratch = np.empty((self._modes_at + modes * self._numbers, LANES))
         arrays = given | {
             "flags": used.astype(np.int64), "strain": strain, "of_modes": of_modes,
-            "scratch": scratch,
+            "scratch": np.empty((self._modes_at + modes * self._numbers, LANES)),
         }  # fmt: skip
-        laid = [np.ascontiguousarray(arrays[name]) for name in _ARRAYS]
-        self._call(runs, steps, modes, int(normal), *(array.ctypes.data for array in laid))
+        self._run((runs, steps, modes, int(normal)), arrays)
         return strain, of_modes
 
     def _body(self) -> None:
@@ -206,7 +207,7 @@ class StressCode(Code):
         after, *_ = write(
             step.after_modes, shared, on, flow, levels, mean, width, now, scale[1], sheared, sheared
         )
-        self._keep([value for level in after for value in level.flat], _LEVELS)
+        self._keep_states(after, _LEVELS)
         with w.loop(w.counts["modes"]) as mode_number, a.apart():
             _, at = self._mode(mode_number)
             self._keep(self._kept(w.at((at, 1), (self._size, 1)), self._size), at)
@@ -245,79 +246,50 @@ class StressCode(Code):
         return self._tree("mode", self._of_mode, number), at
 
 
-class StressSideBySide:
+class StressSideBySide(LanePredictor):
     """Predictions of strains for one structure of law and effects.
 
-    `fluid`, `code`: the fluid with its effects, and its machine code. `driven`: of a vector and a
-    run: the true stress at step ends in Pa, the inertia of the tool in Pa s², and the strain of
-    what gives way in series. `made_from`: what tells these from those of another structure.
+    `fluid`, `code`, `made_from`: as `LanePredictor` takes them. `driven`: of a vector and a run:
+    the true stress at step ends in Pa, the inertia of the tool in Pa s², and the strain of what
+    gives way in series.
     """
 
     def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):
-        self._code, self._flags = code, Flags(fluid)
-        at = fluid.slices
+        super().__init__(fluid, code, made_from)
         signal = [e for e in fluid.structure.effects if isinstance(e, SignalEffect)]
-        self._driving = [at[e.name].start for e in (*signal, *fluid.series)]
-        self._packed = code.packing(fluid, made_from, -1)
-        of_trials = jax.vmap(jax.vmap(driven, (None, 0)), (0, None))
-        self._driven = compiled(of_trials, ("driven", *made_from))
+        self._driving = self._amplitudes((*signal, *fluid.series))
+        self._driven = self._program("driven", driven, (None, 0), (0, None))
 
-    def predict(
-        self,
-        numbers: Numbers,
-        thetas: Float[np.ndarray, "trials p"],
-        moduli: Float[np.ndarray, "trials c"],
-        limits: Float[np.ndarray, " trials"],
-        part: StressFlows,
-        judging: Records | None,
-        runs: int,
-        normal: bool,
-    ) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return strains, and N1 and N2 behind them if asked for; see `SideBySide.predict`.
+    def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
+        """Return strains, and N1 and N2 behind them if asked for.
 
         Limits, what judges and how many runs are no padding say nothing here.
         """
-        del limits, judging, runs
-        flags = self._flags.of(thetas)
-        # those that need the same parts of the code go together
-        order = np.lexsort(flags.T)
-        sample = np.asarray(part.sample_index)
-        out = np.empty((len(thetas), *sample.shape, 3 if normal else 1))
+        return self._by_eights(
+            asked.thetas, (), lambda lanes, _, used: self._eight(asked, lanes, used)
+        )
 
-        def eight(trials: np.ndarray) -> None:
-            lanes = trials[in_whole_eights(len(trials))]
-            used = np.any(flags[trials], axis=0)
-            found = self._eight(numbers, thetas[lanes], moduli[lanes], part, used, normal)
-            out[trials] = found[: len(trials)]
-
-        in_threads(eight, np.split(order, range(LANES, len(order), LANES)), is_compiled=True)
-        return out
-
-    def _eight(
-        self, numbers: Numbers, thetas, moduli, part: StressFlows, used, normal: bool
-    ) -> np.ndarray:
+    def _eight(self, asked: Asked, lanes: np.ndarray, used: np.ndarray) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas, moduli))
-        # what effects add is left out where none of the eight has it
-        present = np.any(modes[:, 0] != 0.0, axis=-1)
-        present[: len(numbers.modulus)] = True
+        thetas, part = asked.thetas[lanes], asked.part
+        packed = self._packed(asked.numbers, thetas, asked.moduli[lanes])
+        modes, shared = (np.asarray(array) for array in packed)
+        present = modes_in_use(modes[:, 0].T, len(asked.numbers.modulus))
         times, sample = np.asarray(part.times), np.asarray(part.sample_index)
         last = np.max(sample, axis=1).astype(np.int64)
         imposed = np.broadcast_to(np.asarray(part.imposed), (LANES, *times.shape))
         inertia, given_way = np.zeros((LANES, len(times))), np.zeros(imposed.shape)
         if np.any(thetas[:, self._driving]):
             imposed, inertia, given_way = (np.asarray(of) for of in self._driven(thetas, part))
-        leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(part.kinematics)]
-        flows = [leaf.reshape(len(leaf), -1) for leaf in leaves]
         given = {
             "imposed": np.moveaxis(imposed, 0, -1), "inertia": np.moveaxis(inertia, 0, -1),
             "shared": shared, "mode": modes[present], "last": last,
-            "width": np.diff(times), "flow": np.concatenate(flows or [np.zeros((1, 1))], axis=1),
+            "width": np.diff(times), "flow": flows_of(part.kinematics),
         }  # fmt: skip
-        strain, of_modes = self._code(used, given, normal)
+        strain, of_modes = self._code(used, given, asked.normal)
         places = np.arange(len(times))[:, None], sample
         found = np.moveaxis(strain[places], -1, 0) + given_way[:, *places]
-        if not normal:
+        if not asked.normal:
             return found[..., None]
         own = np.moveaxis(of_modes[places], -1, 0)
         beside = normal_stress_differences(part.kinematics, imposed[:, *places], own)

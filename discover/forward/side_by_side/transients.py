@@ -1,7 +1,6 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
-Vectors that need the same parts of the kernel go together, for what one of eight needs is computed
-for all of them. The rate that an instrument shapes and the signal that it distorts are left to JAX,
+The rate that an instrument shapes and the signal that it distorts are left to JAX,
 which is called only where a vector asks for it.
 """
 
@@ -10,7 +9,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -18,11 +16,16 @@ from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.batches import Records, TransientFlows
 from discover.forward.declared import Numbers
-from discover.forward.dynamics import declared_weights
+from discover.forward.integrators.exponential_weights import krogstad_weights
 from discover.forward.integrators.stepping import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.step import WEIGHTS, Flags
-from discover.programs import compiled, in_threads
+from discover.forward.side_by_side.predictors import (
+    Asked,
+    LanePredictor,
+    flows_of,
+    modes_in_use,
+)
+from discover.forward.side_by_side.step import WEIGHTS
 from discover.programs.lanes import LANES
 from discover.protocols.kinematics import normal_stress_differences
 
@@ -53,7 +56,8 @@ class _Runs(NamedTuple):
     `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
         negative where there is none, and how long it is, in s.
     `weight`, `recorded`: what was measured, at step ends.
-    `rate`, `tool_rate`: without effects of the instrument, with the lanes first.
+    `rate`, `tool_rate`: without effects of the instrument, the lanes of the former last and those
+        of the latter first.
     `in_shear`: whether any of them is simple shear, where alone an instrument shapes and distorts.
     """
 
@@ -71,7 +75,6 @@ class _Runs(NamedTuple):
     recorded: np.ndarray
     rate: np.ndarray
     tool_rate: np.ndarray
-    in_lanes: np.ndarray  # the rate with the lanes last
     in_shear: bool
 
 
@@ -119,117 +122,83 @@ def _between(
     )
 
 
-class SideBySide:
+class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
-    `fluid`, `kernel`: the fluid with its effects, and its machine code. `rates`: of a vector, the
-    effects that are present, and a run: the felt rate at ends and middles of steps, without what
-    series elements take, and the tool's rate at ends. `recorded`: of these, the stress, the felt
-    rate and the tool's, what is recorded at samples. `made_from`: what tells these from those of
-    another structure.
+    `fluid`, `code`, `made_from`: as `LanePredictor` takes them. `rates`: of a vector, the effects
+    that are present, and a run: the felt rate at ends and middles of steps, without what series
+    elements take, and the tool's rate at ends. `recorded`: of these, the stress, the felt rate and
+    the tool's, what is recorded at samples.
     """
 
     def __init__(
         self,
         fluid: AugmentedFluid,
-        kernel: Kernel,
+        code: Kernel,
         rates: Callable,
         recorded: Callable,
         made_from: tuple,
     ):
-        self._fluid, self._kernel, self._flags = fluid, kernel, Flags(fluid)
-        effects, at = fluid.structure.effects, fluid.slices
-        still = KinematicEffect.felt_rate
-        shaping = [
-            e for e in effects if isinstance(e, KinematicEffect) and type(e).felt_rate is not still
-        ]
-        self._shaping = [at[e.name].start for e in shaping]
-        self._distorting = [at[e.name].start for e in effects if isinstance(e, SignalEffect)]
-
-        self._packed = kernel.packing(fluid, made_from, -1)
-        over_runs = jax.vmap(rates, in_axes=(None, None, 0))
-        of_trials = jax.vmap(over_runs, in_axes=(0, None, None))
-        self._rates = compiled(of_trials, ("rates", *made_from))
-        of_runs = jax.vmap(recorded, in_axes=(None, None, 0, 0, 0, 0))
-        of_trials = jax.vmap(of_runs, in_axes=(0, None, None, 0, 0, 0))
-        self._recorded = compiled(of_trials, ("recorded", *made_from))
+        super().__init__(fluid, code, made_from)
+        effects, still = fluid.structure.effects, KinematicEffect.felt_rate
+        shaping = [e for e in effects if isinstance(e, KinematicEffect)]
+        self._shaping = self._amplitudes(e for e in shaping if type(e).felt_rate is not still)
+        self._distorting = self._amplitudes(e for e in effects if isinstance(e, SignalEffect))
+        axes = (None, None, 0), (0, None, None)
+        self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
+        axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
+        self._recorded = self._program("recorded", recorded, *axes)
         self._known_runs: list[tuple[TransientFlows, Records, _Runs]] = []
         self._known_table: tuple | None = None
 
-    def predict(
-        self,
-        numbers: Numbers,
-        thetas: Float[np.ndarray, "trials p"],
-        moduli: Float[np.ndarray, "trials c"],
-        limits: Float[np.ndarray, " trials"],
-        part: TransientFlows,
-        judging: Records,
-        runs: int,
-        normal: bool,
-    ) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded of the first runs, and N1 and N2 behind it if asked for.
+    def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
+        """Return what is recorded of the runs that are no padding, and N1 and N2 if asked for."""
+        times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
+        most = int(np.argmax(counts))
+        table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
+        laid_out = self._runs(asked.part, asked.judging)
 
-        `moduli`: of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
-        `limits`: sums of squared residuals from which on a vector is of no use. Infinity follows it
-        to the end. `part`, `judging`: runs, and what was recorded of them. `runs`: how many are
-        asked for; those behind are padding. `normal`: whether N1 and N2 are.
-        """
-        flags = self._flags.of(thetas)
-        order = np.lexsort([thetas[:, 1], *flags.T])
-        laid_out = self._runs(part, judging)
-        times, counts = np.unique(thetas[:, 1], return_counts=True)
-        table = self._table(numbers, part, float(times[np.argmax(counts)]), int(np.max(counts)))
-        out = np.empty((len(thetas), runs, laid_out.sample.shape[1], 3 if normal else 1))
+        def eight(lanes: np.ndarray, different: np.ndarray, used: np.ndarray) -> np.ndarray:
+            limits = np.where(different, asked.limits[lanes], -np.inf)
+            own = asked._replace(
+                thetas=asked.thetas[lanes], moduli=asked.moduli[lanes], limits=limits
+            )
+            return self._eight(own, laid_out, used, table)
 
-        def eight(trials: np.ndarray) -> None:
-            lanes = trials[np.minimum(np.arange(LANES), len(trials) - 1)]
-            limit = np.where(np.arange(LANES) < len(trials), limits[lanes], -np.inf)
-            used = np.any(flags[trials], axis=0)
-            each = thetas[lanes], moduli[lanes], limit
-            found = self._eight(numbers, *each, part, laid_out, runs, used, table, normal)
-            out[trials] = found[: len(trials)]
-
-        # to compile is behind a lock, so that no first call is needed alone
-        in_threads(eight, np.split(order, range(LANES, len(order), LANES)), is_compiled=True)
-        return out
+        return self._by_eights(asked.thetas, [asked.thetas[:, 1]], eight)
 
     def _eight(
         self,
-        numbers: Numbers,
-        thetas: np.ndarray,
-        moduli: np.ndarray,
-        limit: np.ndarray,
-        part: TransientFlows,
+        asked: Asked,
         laid_out: _Runs,
-        runs: int,
         used: np.ndarray,
         table: tuple[float, np.ndarray | None],
-        normal: bool,
     ) -> np.ndarray:
         """Return what is recorded of eight vectors, shape (lanes, runs, n, kinds)."""
-        modes, shared = (np.asarray(array) for array in self._packed(numbers, thetas, moduli))
+        numbers, thetas, part, runs = asked.numbers, asked.thetas, asked.part, asked.runs
+        packed = self._packed(numbers, thetas, asked.moduli)
+        modes, shared = (np.asarray(array) for array in packed)
         declared = len(numbers.modulus)
         if len(modes) > declared:
-            # what effects add is left out where none of the eight has it
-            absent = np.all(modes[:, 0] == 0.0, axis=-1) & (np.arange(len(modes)) >= declared)
-            modes = np.ascontiguousarray(modes[~absent])
-        rate, tool_rate, in_lanes = laid_out.rate, laid_out.tool_rate, laid_out.in_lanes
+            modes = modes[modes_in_use(modes[:, 0].T, declared)]
+        rate, tool_rate = laid_out.rate, laid_out.tool_rate
         present = self._fluid.present(thetas)
         is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
         if part.steps is not None or is_shaped:
             rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, present, part))
-            in_lanes = np.ascontiguousarray(np.moveaxis(rate, 0, -1))
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
-        given = {"rate": in_lanes, "shared": shared, "mode": modes, "limit": limit, "table": tabled}
-        given |= {name: getattr(laid_out, name) for name in _OF_RUNS}
-        stress, felt, of_modes, goes_on = self._kernel(runs, declared, used, given, normal)
+        given = {
+            "rate": rate, "shared": shared, "mode": modes, "limit": asked.limits,
+            "table": tabled, **{name: getattr(laid_out, name) for name in _OF_RUNS},
+        }  # fmt: skip
+        stress, felt, of_modes, goes_on = self._code(runs, declared, used, given, asked.normal)
         if not goes_on:
             stress[:] = np.nan
         places = np.arange(runs)[:, None], laid_out.sample[:runs]
         at_samples, beside = stress[places], []
-        if normal:
+        if asked.normal:
             flow = jax.tree.map(lambda leaf: leaf[:runs], part.kinematics)
             own = (np.moveaxis(of, -1, 0) for of in (at_samples, of_modes[places]))
             beside = [normal_stress_differences(flow, *own)]
@@ -238,13 +207,11 @@ class SideBySide:
         if np.any(laid_out.held > 1):
             # what alters a signal looks beyond its samples, at all steps of the grid
             given["held"] = np.ones_like(laid_out.held)
-            stress, felt, *_ = self._kernel(runs, declared, used, given)
+            stress, felt, *_ = self._code(runs, declared, used, given)
             stress[:runs] += _between(at_samples - stress[places], part)
-        beyond = (np.arange(stress.shape[1]) > laid_out.last[:, None])[..., None]
-        felt = np.where(beyond, in_lanes[:, ::2], felt)
-        stress = np.where(beyond, 0.0, stress)
-        first = (np.moveaxis(array, -1, 0) for array in (stress, felt))
-        found = np.asarray(self._recorded(thetas, present, part, *first, tool_rate))
+        beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
+        felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
+        found = np.asarray(self._recorded(thetas, present, part, stress, felt, tool_rate))
         return np.concatenate([found[:, :runs, :, None], *beside], axis=-1)
 
     def _runs(self, part: TransientFlows, judging: Records) -> _Runs:
@@ -253,8 +220,9 @@ class SideBySide:
             if known is part and by is judging:
                 return found
         # as commanded, where no instant at which it steps is fitted
-        rate = np.tile(np.asarray(part.commanded_rate), (LANES, 1, 1))
-        tool_rate = np.ascontiguousarray(rate[:, :, ::2])
+        commanded = np.asarray(part.commanded_rate)
+        rate = np.repeat(commanded[..., None], LANES, axis=-1)
+        tool_rate = np.tile(commanded[:, ::2], (LANES, 1, 1))
         times, sample = np.asarray(part.times)[:, ::2], np.asarray(part.sample_index)
         weight, recorded = np.zeros(times.shape), np.zeros(times.shape)
         places = (np.arange(len(times))[:, None], sample)
@@ -275,13 +243,12 @@ class SideBySide:
             whole,
             least,
             JUMP * times[:, -1],
-            self._kernel.flows(part.kinematics),
+            flows_of(part.kinematics),
             sample,
             weight,
             recorded,
             rate,
             tool_rate,
-            np.ascontiguousarray(np.moveaxis(rate, 0, -1)),
             flow is None or bool(np.any(np.asarray(flow.gradient)[:, 3] == 1.0)),
         )
         self._known_runs.append((part, judging, found))
@@ -298,9 +265,9 @@ class SideBySide:
         # those of chains that retract depend on more than the times
         if numbers.law.retracts or (count < _MANY and time != 0.0):
             return time, None
-        times = np.asarray(own) * np.exp(time)
-        decay = jnp.asarray(float(numbers.law.linear_relaxation))
-        weights = np.asarray(declared_weights(part.times, jnp.asarray(times), decay))
-        found = np.ascontiguousarray(np.swapaxes(weights[:, :, 0, :WEIGHTS], 2, 3))
+        width = np.diff(np.asarray(part.times)[:, ::2], axis=1)
+        h = width[..., None] / (np.asarray(own) * np.exp(time))
+        weights = krogstad_weights(-float(numbers.law.linear_relaxation) * h, h)
+        found = np.stack(weights[:WEIGHTS], axis=-1)
         self._known_table = own, part, time, found
         return time, found

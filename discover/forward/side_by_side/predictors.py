@@ -1,0 +1,206 @@
+"""What is asked of many vectors of parameters at once, and how eights of lanes take it up."""
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from discover.effects import AbstractEffect
+from discover.forward.augmented_fluid import AugmentedFluid
+from discover.forward.batches import Records
+from discover.forward.declared import Numbers
+from discover.forward.side_by_side.code import Code
+from discover.forward.side_by_side.step import Flags
+from discover.programs import compiled, in_threads
+from discover.programs.lanes import LANES
+
+
+class Asked(NamedTuple):
+    """What is asked of vectors of parameters.
+
+    `moduli`: of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
+    `limits`: sums of squared residuals from which on a vector is of no use; infinite ones follow it
+        to the end.
+    `part`, `judging`: runs of one control, and what was recorded of them.
+    `runs`: how many of these are no padding.
+    `normal`: whether N1 and N2 are to stand behind what is recorded.
+    """
+
+    numbers: Numbers
+    thetas: Float[np.ndarray, "trials p"]
+    moduli: Float[np.ndarray, "trials c"]
+    limits: Float[np.ndarray, " trials"]
+    part: Any
+    judging: Records | None
+    runs: int
+    normal: bool
+
+
+def in_whole_eights(count: int) -> Int[np.ndarray, " lanes"]:
+    """Return places of so many lanes, the last again until the eights are full."""
+    return np.arange(-(-count // LANES) * LANES).clip(max=count - 1)
+
+
+def lanes_last(values: np.ndarray) -> np.ndarray:
+    """Return values of lanes, in whole eights, with these eights first and their lanes last."""
+    return np.moveaxis(values.reshape(-1, LANES, *values.shape[1:]), 1, -1)
+
+
+def modes_in_use(modulus: Float[np.ndarray, "lanes k"], declared: int) -> Bool[np.ndarray, " k"]:
+    """Return which modes any lane has: the declared ones, and of those of effects some."""
+    present = np.any(modulus != 0.0, axis=0)
+    present[:declared] = True
+    return present
+
+
+def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
+    """Return the kinematics of runs as one array; a zero where all are simple shear."""
+    leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(kinematics)]
+    if not leaves:
+        return np.zeros((1, 1))
+    return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
+
+
+class LanePredictor:
+    """Predictions of one kind of flows for one structure of law and effects, in lanes.
+
+    `fluid`, `code`: the fluid with its effects, and its machine code. `made_from`: what tells these
+    from those of another structure. `axis`: where vectors stand in what is packed.
+    """
+
+    def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple, axis: int = -1):
+        self._fluid, self._code, self._flags = fluid, code, Flags(fluid)
+        self._made_from = made_from
+        self._packed = code.packing(fluid, made_from, axis)
+
+    def _amplitudes(self, effects: Iterable[AbstractEffect]) -> list[int]:
+        return [self._fluid.slices[effect.name].start for effect in effects]
+
+    def _program(
+        self, name: str, function: Callable, *axes: Sequence[int | None], vectors_to: Any = 0
+    ) -> Callable:
+        """Return a program of a function that is mapped over axes, the innermost first.
+
+        `vectors_to`: where those of the outermost, the vectors, stand in what is returned.
+        """
+        *inner, outermost = axes
+        for along in inner:
+            function = jax.vmap(function, along)
+        function = jax.vmap(function, outermost, vectors_to)
+        return compiled(function, (name, *self._made_from))
+
+    def _by_eights(
+        self,
+        thetas: Float[np.ndarray, "trials p"],
+        keys: Sequence[np.ndarray],
+        of_eight: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray],
+    ) -> np.ndarray:
+        """Return what is found of vectors, eights of which are computed together.
+
+        Vectors that need the same parts of the code go together, and of these such that agree in
+        `keys`: what one of eight needs is computed for all of them.
+
+        `of_eight`: of eight vectors, the last again until there are eight, which are different, and
+        which parts of the code they need.
+        """
+        flags = self._flags.of(thetas)
+        order = np.lexsort([*keys, *flags.T])
+
+        def found(trials: np.ndarray) -> np.ndarray:
+            different = np.arange(LANES) < len(trials)
+            lanes = trials[in_whole_eights(len(trials))]
+            return of_eight(lanes, different, np.any(flags[trials], axis=0))[different]
+
+        # to compile is behind a lock, so that no first call is needed alone
+        eights = np.split(order, range(LANES, len(order), LANES))
+        each = np.concatenate(in_threads(found, eights, is_compiled=True))
+        out = np.empty_like(each)
+        out[order] = each
+        return out
+
+
+class Eights(NamedTuple):
+    """Vectors in whole eights, the last again until they are full.
+
+    `pairs`: of each eight its vectors and their moduli.
+    `places`: where each of them stands among the vectors.
+    `modes`, `shared`: what the vectors say of each mode, and of all of them, lanes first.
+    """
+
+    pairs: list[tuple[np.ndarray, np.ndarray]]
+    places: list[np.ndarray]
+    modes: np.ndarray
+    shared: np.ndarray
+
+    def of_lanes(self, trial: np.ndarray, declared: int) -> dict[str, np.ndarray]:
+        """Return what the code takes of vectors, one a lane, in whole eights."""
+        of_mode = self.modes[trial]
+        present = modes_in_use(of_mode[:, :, 0], declared)
+        return {
+            "shared": lanes_last(self.shared[trial]),
+            "mode": lanes_last(of_mode[:, present]),
+        }
+
+
+class StatePredictor(LanePredictor):
+    """Predictions of states, steady or periodic, each of which is a lane of its own.
+
+    `shaping`: effects that shape the rate. `rates`: of a vector, the effects that are present, and
+    runs: the rate that the fluid feels. `axes`: over which it is mapped.
+    """
+
+    def __init__(
+        self,
+        fluid: AugmentedFluid,
+        code: Code,
+        made_from: tuple,
+        shaping: Iterable[AbstractEffect],
+        rates: Callable,
+        *axes: Sequence[int | None],
+    ):
+        super().__init__(fluid, code, made_from, axis=0)
+        self._shaping = self._amplitudes(shaping)
+        self._rates = self._program(f"rates of {type(code).__name__}", rates, *axes)
+
+    def _eights(self, asked: Asked) -> Eights:
+        places = in_whole_eights(len(asked.thetas))
+        each = [
+            values[places].reshape(-1, LANES, values.shape[1])
+            for values in (asked.thetas, asked.moduli)
+        ]
+        pairs = list(zip(*each, strict=True))
+        packed = [self._packed(asked.numbers, *pair) for pair in pairs]
+        both = (np.concatenate(arrays) for arrays in zip(*packed, strict=True))
+        return Eights(pairs, np.split(places, len(pairs)), *both)
+
+    def _felt(self, asked: Asked, eights: Eights, commanded: np.ndarray) -> np.ndarray:
+        """Return the rates that each vector feels: as commanded, or as effects shape them."""
+        if not np.any(asked.thetas[:, self._shaping]):
+            return np.broadcast_to(commanded, (len(eights.modes), *commanded.shape))
+        present = self._fluid.present(asked.thetas)
+        return np.concatenate([self._rates(own, present, asked.part) for own, _ in eights.pairs])
+
+    def _by_states(
+        self,
+        thetas: Float[np.ndarray, "trials p"],
+        alike: Sequence[Int[np.ndarray, " states"]],
+        eights_at_once: int,
+        solve: Callable[[np.ndarray, np.ndarray, np.ndarray], None],
+    ) -> None:
+        """Solve for states of vectors, those together that need the same parts of the code.
+
+        `alike`: groups of states that may stand side by side. `eights_at_once`: of which a call
+        takes at most so many. `solve`: of the parts needed, and of each lane its vector and state.
+        """
+        patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
+        size, pieces = eights_at_once * LANES, []
+        for number, pattern in enumerate(patterns):
+            trials = np.flatnonzero(which.ravel() == number)
+            for states in alike:
+                trial, state = np.repeat(trials, len(states)), np.tile(states, len(trials))
+                for first in range(0, len(trial), size):
+                    some = first + in_whole_eights(min(size, len(trial) - first))
+                    pieces.append((pattern, trial[some], state[some]))
+        in_threads(lambda piece: solve(*piece), pieces, is_compiled=True)
