@@ -112,9 +112,8 @@ def model_of(function, size, bounds=None):
 
     low, high = np.array(bounds or [[-1e3] * size, [1e3] * size])
     return SimpleNamespace(
-        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked,
-        vectors_at_once=lambda batch: 1,
-    )  # fmt: skip
+        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -129,10 +128,10 @@ def test_a_textbook_problem_ends_at_the_minimum_that_scipy_finds(function):
     exact = least_squares(function, start, method="lm", xtol=1e-14, ftol=1e-14)
     model = model_of(function, start.size)
     fit = fit_batch(model, None, [start], [range(start.size)])[0]
-    # the tolerance, a step's gain, is 1e-4; several such steps may be left
+    # the tolerance, a step's gain, is 1e-5; several such steps may be left
     assert fit.cost <= 2.0 * exact.cost * (1.0 + 1e-3) + 1e-9
-    # derivatives are differences and count; Wood's function takes most
-    assert sum(model.asked) < 250
+    # two a step, and Wood's function takes most
+    assert len(model.asked) < 120
 
 
 @pytest.mark.parametrize("function", PROBLEMS, ids=lambda function: function.__name__)
@@ -177,7 +176,7 @@ def test_within_bounds_it_ends_at_the_minimum_that_scipy_finds_there(function):
     assert fit.cost <= 2.0 * exact * (1.0 + 1e-3)
     assert np.any((fit.theta == low) | (fit.theta == high))  # or the bounds are none
     # a step that is only cut off takes 400 to 600 on six of the nine, and ends elsewhere on five
-    assert sum(model.asked) < 100
+    assert sum(model.asked) < 150
 
 
 def test_a_range_of_one_value_holds_a_parameter_and_lets_the_others_go():
