@@ -21,7 +21,7 @@ from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 @cache

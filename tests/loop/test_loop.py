@@ -54,7 +54,7 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
     return Dataset("made", tuple(runs))
 
 
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 def loop(dataset, **options):

@@ -10,6 +10,7 @@ from discover.forward import DeclaredModel
 from discover.loop import run_loop
 from discover.protocols import oscillatory_shear, start_up, steady_rates
 
+pytestmark = pytest.mark.usefixtures("verdict_alone")
 RATES = np.geomspace(0.01, 100.0, 25)
 FREQUENCIES = np.geomspace(0.1, 100.0, 25)
 
