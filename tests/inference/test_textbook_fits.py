@@ -1,4 +1,4 @@
-"""Least squares on problems from the literature, by both ways, against scipy's.
+"""Least squares on problems from the literature, against scipy's.
 
 Moré, Garbow & Hillstrom 1981, ACM Trans. Math. Softw. 7, 17: their functions and starts. In several
 of them derivatives change so much on the way that those of a few steps before mislead.
@@ -6,7 +6,6 @@ of them derivatives change so much on the way that those of a few steps before m
 
 from types import SimpleNamespace
 
-import jax
 import jax.numpy as jnp
 import jaxtyping
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from scipy.optimize import least_squares
 
 from discover.inference.least_squares import fit_batch
-from discover.inference.least_squares.tangents import bounded, by_differentiation, descend
 
 _TIMES = 0.1 * np.arange(1, 11)
 _Y = np.array(
@@ -132,36 +130,6 @@ def test_a_textbook_problem_ends_at_the_minimum_that_scipy_finds(function):
     assert fit.cost <= 2.0 * exact.cost * (1.0 + 1e-3) + 1e-9
     # two a step, and Wood's function takes most
     assert len(model.asked) < 120
-
-
-@pytest.mark.parametrize("function", PROBLEMS, ids=lambda function: function.__name__)
-def test_a_descent_by_tangents_ends_at_the_minimum_that_scipy_finds(function):
-    start = np.array(PROBLEMS[function])
-    exact = least_squares(function, start, method="lm", xtol=1e-14, ftol=1e-14)
-    linearise = by_differentiation(lambda x, _: function(x))
-    run = jax.jit(lambda x: descend(linearise, x, None, 1e-9, 300)[0])
-    found = np.sum(np.asarray(function(run(jnp.asarray(start)))) ** 2)
-    assert found <= 2.0 * exact.cost * (1.0 + 1e-6) + 1e-12
-
-
-def test_what_is_known_beside_the_residuals_is_told_where_a_descent_ends():
-    def linearise(x, factor):
-        return factor * (x - 2.0), factor * jnp.eye(2), {"twice": 2.0 * x}
-
-    found, beside = descend(linearise, jnp.zeros(2), jnp.asarray(3.0), 1e-9, 50)
-    np.testing.assert_allclose(found, 2.0, rtol=1e-8)
-    np.testing.assert_allclose(beside["twice"], 2.0 * found)
-
-
-def test_a_trial_that_runs_away_is_a_rejected_step():
-    def linearise(x, _):
-        # nothing finite beyond one, where a step from the start leads: the curve is flat there
-        residual = jnp.where(x > 1.0, jnp.inf, jnp.tanh(2.0 * x) - 0.9)
-        columns = jnp.diag(2.0 / jnp.cosh(2.0 * x) ** 2)
-        return *bounded(residual, columns)[:2], None
-
-    found, _ = descend(linearise, jnp.full(1, -0.9), None, 1e-10, 200)
-    np.testing.assert_allclose(found, np.arctanh(0.9) / 2.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("function", BOUNDS, ids=lambda function: function.__name__)

@@ -1,4 +1,4 @@
-"""Levenberg–Marquardt for many small problems that share one compiled model."""
+"""Least squares of many small problems that share one compiled model, by Levenberg–Marquardt."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
