@@ -119,8 +119,14 @@ CONSTANTS = {
 }
 
 
-@pytest.mark.parametrize("name", CONSTANTS)
-@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("shear", "giesekus_mobility"), ("uniaxial", "alpha"),
+        pytest.param("shear", "alpha", marks=pytest.mark.slow),
+        pytest.param("uniaxial", "giesekus_mobility", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_the_forward_model_gives_each_mode_its_constant(kind, name):
     mobilities = np.array([0.1, 0.3, 0.6])
     declared = CONSTANTS[name]()
