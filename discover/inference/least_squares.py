@@ -47,11 +47,6 @@ class Fit:
             return float(np.sum(self.residual**2))
 
     @property
-    def run_errors(self) -> Float[np.ndarray, " runs"]:
-        """Root-mean-square error over root-mean-square stress of each run."""
-        return np.sqrt(np.sum(self.residual**2, axis=1))
-
-    @property
     def usable(self) -> bool:
         """Whether residuals and derivatives are all finite."""
         return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
