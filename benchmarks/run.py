@@ -25,8 +25,7 @@ from types import ModuleType
 TASKS = {
     "calibration": "calibration", "field": "field.task", "five-hundred": "five_hundred",
     "hostile": "hostile", "malformed": "malformed", "measured": "measured",
-    "measured-laws": "measured_laws",
-    "readings": "readings", "several-modes": "several_modes", "several-tests": "several_tests",
+    "readings": "readings", "several-tests": "several_tests",
 }  # fmt: skip
 TIMERS = (signal.ITIMER_PROF, signal.SIGPROF, 1), (signal.ITIMER_REAL, signal.SIGALRM, 10)
 FAILED = ("refused", "fault", "late")

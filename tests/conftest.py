@@ -29,6 +29,7 @@ sys.path += [str(folder) for folder in (_HERE, *_HERE.iterdir()) if folder.is_di
 sys.path.append(str(_HERE.parent / "benchmarks"))
 
 first_calls = importlib.import_module("first_calls")
+fewer_hypotheses = importlib.import_module("fewer_hypotheses")
 
 # What is first imported inside a module under the hook below is compiled anew, in every worker.
 _LARGE = ("jax", "pandas", "scipy.stats", "sklearn.base", "matplotlib.figure", "pydantic")
@@ -172,6 +173,17 @@ def without_curves() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.loop.loop.free_functions", lambda posterior: [])
+        yield
+
+
+@pytest.fixture(scope="module")
+def verdict_alone() -> Iterator[None]:
+    """Let loops and comparisons of a module neither design a test nor say what laws have in common.
+
+    Both have tests of their own and stand on the pages of `tests/report`.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        fewer_hypotheses.verdict_alone(patch)
         yield
 
 

@@ -13,7 +13,7 @@ from discover.forward import DeclaredModel, make_batch
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.laws import LAWS
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found, with_law
 

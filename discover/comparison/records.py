@@ -30,7 +30,7 @@ from discover.forward import TransientFlows
 from discover.forward.batches.flows import transients
 from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.protocols.protocol import FlowProtocol
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel

@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
-from discover.laws.textbook.fene_p import fene_p_terms
+from discover.laws.textbook.classical import fene_p_terms
 from tensor_library.algebra import anticommutator, identity_like, inner, square, trace
 from tensor_library.law_terms import LawTerm
 

@@ -15,7 +15,7 @@ from discover.forward.grids.grid import IntegrationGrid, make_grids
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import (
     FlowProtocol,

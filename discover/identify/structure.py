@@ -36,7 +36,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.runs import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, SentenceAndTable, table_of

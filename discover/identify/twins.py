@@ -39,7 +39,7 @@ from discover.identify.side_by_side import (
 )
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView

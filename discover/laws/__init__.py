@@ -7,13 +7,13 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, laws_table, make_law
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.laws.textbook.fene_p import FenePeterlin
-from discover.laws.textbook.giesekus import Giesekus
-from discover.laws.textbook.johnson_segalman import JohnsonSegalman
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
-from discover.laws.textbook.phan_thien_tanner import (
+from discover.laws.textbook.classical import (
     ExponentialPhanThienTanner,
+    FenePeterlin,
+    Giesekus,
+    JohnsonSegalman,
     LinearPhanThienTanner,
+    UpperConvectedMaxwell,
 )
 
 __all__ = [

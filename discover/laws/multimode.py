@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
 from discover.laws.each_mode import of_each_mode, over_modes, require_modes
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation

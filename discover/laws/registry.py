@@ -75,14 +75,12 @@ def law_of_function(
 if TYPE_CHECKING:
     import pandas as pd
 
-_CLASSICAL = ("maxwell", "johnson_segalman", "giesekus", "phan_thien_tanner", "fene_p")
-"""Files whose laws come first in lists, in the order of textbooks."""
-
 
 def _named_laws() -> dict[str, NamedLaw]:
     files = [module.name for module in pkgutil.iter_modules(textbook.__path__)]
     laws: dict[str, NamedLaw] = {}
-    for file in dict.fromkeys([*_CLASSICAL, *files]):
+    # those of textbooks come first in lists, in their order
+    for file in dict.fromkeys(["classical", *files]):
         laws |= getattr(importlib.import_module(f"{textbook.__name__}.{file}"), "NAMED", {})
     return laws
 

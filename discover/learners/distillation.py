@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import equinox as eqx
@@ -10,11 +10,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
+from scipy.optimize import least_squares
 
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.inference.least_squares.tangents import RUNAWAY, by_differentiation, descend
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
@@ -33,6 +33,7 @@ from discover.protocols.protocol import (
 from discover.simulate.solve import SimulationError, simulate
 
 _TOLERANCE, _MOST_STEPS = 1e-10, 200
+_RUNAWAY = 1e3  # misfit of a trial that has no finite trajectory: it is always rejected
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
 
 # slower than any Maxwell mode with the teacher's times can bear for ever
@@ -120,19 +121,35 @@ class _Lesson(eqx.Module):
         stress = jax.vmap(solve)(self.protocols, self.grids)[..., 3] / jnp.sum(self.modulus)
         difference = (stress - self.target) / jnp.sqrt(1.0 * self.target.shape[1])
         # a trial that runs away is an increase, which the solver rejects
-        difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, RUNAWAY)
+        difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, _RUNAWAY)
         return difference, jnp.sqrt(kappa) * jnp.sqrt(jnp.abs(parameters))
 
 
 @compiled
-def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
-    def residual(moved, args):
-        lesson, kappa = args
+def _linearised(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
+    """Return all residuals and their derivatives, shape (p, rows)."""
+
+    def rows(moved):
         difference, penalty = lesson.residual(moved, kappa)
         return jnp.concatenate([difference.reshape(-1), penalty])
 
-    found, _ = descend(by_differentiation(residual), free, (lesson, kappa), _TOLERANCE, _MOST_STEPS)
-    return found, lesson.residual(found, kappa)[0]
+    found, change = jax.linearize(rows, free)
+    return found, jax.vmap(change)(jnp.eye(free.size))
+
+
+def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: float):
+    """Return the unbounded parameters of least squares, and the sum of squares there."""
+
+    @cache
+    def at(values: tuple[float, ...]):
+        found, columns = _linearised(lesson, jnp.asarray(values), jnp.asarray(kappa))
+        return np.asarray(found), np.asarray(columns).T
+
+    ended = least_squares(
+        lambda moved: at(tuple(moved))[0], np.asarray(free), lambda moved: at(tuple(moved))[1],
+        ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=_TOLERANCE, max_nfev=_MOST_STEPS,
+    )  # fmt: skip
+    return jnp.asarray(ended.x), 2.0 * ended.cost
 
 
 @in_one_thread
@@ -192,9 +209,9 @@ def distil(
         jnp.asarray(target),
     )
     starts = (lesson.free(np.array(values)) for values in (pupil.start, *pupil.more_starts))
-    taught_from = [_teach(lesson, start, jnp.asarray(0.0)) for start in starts]
-    debiased_free, difference = min(taught_from, key=lambda one: float(jnp.sum(one[1] ** 2)))
-    penalised_free, _ = _teach(lesson, debiased_free, jnp.asarray(float(penalty)))
+    taught_from = [_teach(lesson, start, 0.0) for start in starts]
+    debiased_free, squares = min(taught_from, key=lambda one: one[1])
+    penalised_free, _ = _teach(lesson, debiased_free, float(penalty))
     debiased = np.asarray(lesson.parameters(debiased_free))
     penalised = np.asarray(lesson.parameters(penalised_free))
     law = pupil.build(*debiased)
@@ -207,7 +224,7 @@ def distil(
         penalised=dict(zip(pupil.bounds, map(float, penalised), strict=True)),
         debiased=dict(zip(pupil.bounds, map(float, debiased), strict=True)),
         penalty=float(penalty),
-        misfit=float(np.linalg.norm(difference) / scale),
+        misfit=float(np.sqrt(squares) / scale),
         viscosity_ratio=float(debiased[1] / debiased[0]) if maxwell else None,
         relaxation_time_ratio=float(1.0 / debiased[0]) if maxwell else None,
         errors={name: compare_fluids(fluid, taught, flow) for name, flow in test_flows.items()},

@@ -14,7 +14,7 @@ from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.settings import per_mode
 from discover.protocols.kinematics import FOLLOWED
 

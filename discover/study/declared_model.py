@@ -19,7 +19,7 @@ from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.each_mode import law_of_each_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, starting_value
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.study.from_result import EarlierResult, read_earlier
 from discover.study.schema import Model, Study
 from discover.words import counted, percent_of

@@ -92,7 +92,7 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     InputError if `base` is no fluid.
     """
     if base is None:
-        from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+        from discover.laws.textbook.classical import UpperConvectedMaxwell
 
         base = Fluid.dimensionless(UpperConvectedMaxwell())
     if not isinstance(base, Fluid):

@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from fewer_hypotheses import few_candidates
+from fewer_hypotheses import few_candidates, verdict_alone
 from independent_folder import MOBILITY, write_folder
 
 import discover as dc
@@ -43,6 +43,7 @@ def after(request, tmp_path_factory):
         network, loop = {"quick": True}, {}
         if not request.param:
             network, loop = {"recipe": SMALL}, {"explanations": 1}
+            verdict_alone(patch)
         network["progress"], loop["progress"] = heard["network"], heard["loop"]
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
         patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, **network))

@@ -147,8 +147,7 @@ def test_python_m_discover_is_the_command():
 FIRST_CALL = """
 import discover as dc
 flows = {"a": dc.start_up(1.0), "b": dc.oscillatory_shear(2.0, 1.0)}
-data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, flows, noise=0.01, n_samples=31)
-dc.close_loop(data, max_effects=1, effects=["giesekus_mobility"])
+dc.synthetic_dataset("giesekus", {"alpha": 0.2}, flows, noise=0.01, n_samples=31)
 """
 
 # XLA raises an alarm where it takes more than a second to compute a constant

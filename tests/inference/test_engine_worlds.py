@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fewer_hypotheses import FEW
 from independent.folders import write_folder
 from independent.worlds import MODULUS, TIME, draw_world
 
@@ -20,22 +21,32 @@ CLIPPED, SETTLING = (4, 50), (4, 48)
 """Exponential PTT on a transducer that saturates; linear PTT beside a zero that settles."""
 
 
-def ask(folder, seed, index):
-    """Return the posterior of a world, and its problem and truth."""
+def ask(folder, seed, index, effects=None):
+    """Return the posterior of a world among some effects or all, and its problem and truth."""
     world = draw_world(seed, index)
     runs = world.make(np.random.default_rng([seed, index, 1]))
     data = dc.load_dataset(write_folder(folder / f"{seed}-{index}", runs))
     held = [name for name in data.names if name.startswith("held_")]
     fitted, held_out, _ = split_runs(data, None, held, None, 400)
     declared = DeclaredModel.maxwell([MODULUS], [TIME])
-    problem = Problem(declared, candidates_of(None), fitted, held_out)
+    problem = Problem(declared, candidates_of(effects), fitted, held_out)
     return explain(problem), problem, world
 
 
 @pytest.fixture(scope="module")
 def asked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("worlds")
-    return {one: ask(folder, *one) for one in (GIESEKUS, MAXWELL, POM_POM)}
+    return {one: ask(folder, *one, FEW) for one in (GIESEKUS, MAXWELL, POM_POM)}
+
+
+@pytest.mark.slow
+def test_among_all_candidates_the_verdicts_are_those_among_a_few(tmp_path):
+    found = [ask(tmp_path, *one)[0] for one in (GIESEKUS, MAXWELL, POM_POM)]
+    verdicts = [posterior.verdict for posterior in found]
+    assert verdicts == ["effects_added", "no_effect_needed", "unexplained"]
+    assert found[0].explanations[0].members[0] == ("giesekus_mobility",)
+    (curve,) = free_functions(ask(tmp_path, *CLIPPED)[0])
+    assert (curve.variable.slot, curve.beside) == ("recorded_stress", ("ptt_exponential",))
 
 
 def inside(posterior, problem):
@@ -91,12 +102,12 @@ def test_one_explanation_alone_asks_for_no_test_to_tell_it_from_another(asked):
 
 
 def test_a_transducer_that_saturates_is_told_as_a_function_of_the_stress(tmp_path):
-    posterior, _, world = ask(tmp_path, *CLIPPED)
+    posterior, _, world = ask(tmp_path, *CLIPPED, FEW)
     assert posterior.verdict == "unexplained"
     found = [one for one in free_functions(posterior) if one.is_shown]
     assert [one.variable.slot for one in found] == ["recorded_stress"]
     (curve,) = found
-    assert curve.beside == ("ptt_exponential",)
+    assert "ptt_exponential" in curve.beside
     assert curve.nearest == "clipped"
     # beyond its limit a clipped record lacks what the stress exceeds it by, and below it nothing
     limit = max(np.max(np.abs(run.stress)) for run in world.make(None).values())

@@ -1,4 +1,4 @@
-"""Least squares on problems from the literature, by both ways, against scipy's.
+"""Least squares on problems from the literature, against scipy's.
 
 Moré, Garbow & Hillstrom 1981, ACM Trans. Math. Softw. 7, 17: their functions and starts. In several
 of them derivatives change so much on the way that those of a few steps before mislead.
@@ -6,7 +6,6 @@ of them derivatives change so much on the way that those of a few steps before m
 
 from types import SimpleNamespace
 
-import jax
 import jax.numpy as jnp
 import jaxtyping
 import numpy as np
@@ -14,7 +13,6 @@ import pytest
 from scipy.optimize import least_squares
 
 from discover.inference.least_squares import fit_batch
-from discover.inference.least_squares.tangents import bounded, by_differentiation, descend
 
 _TIMES = 0.1 * np.arange(1, 11)
 _Y = np.array(
@@ -112,9 +110,8 @@ def model_of(function, size, bounds=None):
 
     low, high = np.array(bounds or [[-1e3] * size, [1e3] * size])
     return SimpleNamespace(
-        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked,
-        vectors_at_once=lambda batch: 1,
-    )  # fmt: skip
+        residuals=residuals, low=low, high=high, first_trial=np.full(size, 0.1), asked=asked
+    )
 
 
 @pytest.fixture(autouse=True)
@@ -129,40 +126,10 @@ def test_a_textbook_problem_ends_at_the_minimum_that_scipy_finds(function):
     exact = least_squares(function, start, method="lm", xtol=1e-14, ftol=1e-14)
     model = model_of(function, start.size)
     fit = fit_batch(model, None, [start], [range(start.size)])[0]
-    # the tolerance, a step's gain, is 1e-4; several such steps may be left
+    # the tolerance, a step's gain, is 1e-5; several such steps may be left
     assert fit.cost <= 2.0 * exact.cost * (1.0 + 1e-3) + 1e-9
-    # derivatives are differences and count; Wood's function takes most
-    assert sum(model.asked) < 250
-
-
-@pytest.mark.parametrize("function", PROBLEMS, ids=lambda function: function.__name__)
-def test_a_descent_by_tangents_ends_at_the_minimum_that_scipy_finds(function):
-    start = np.array(PROBLEMS[function])
-    exact = least_squares(function, start, method="lm", xtol=1e-14, ftol=1e-14)
-    linearise = by_differentiation(lambda x, _: function(x))
-    run = jax.jit(lambda x: descend(linearise, x, None, 1e-9, 300)[0])
-    found = np.sum(np.asarray(function(run(jnp.asarray(start)))) ** 2)
-    assert found <= 2.0 * exact.cost * (1.0 + 1e-6) + 1e-12
-
-
-def test_what_is_known_beside_the_residuals_is_told_where_a_descent_ends():
-    def linearise(x, factor):
-        return factor * (x - 2.0), factor * jnp.eye(2), {"twice": 2.0 * x}
-
-    found, beside = descend(linearise, jnp.zeros(2), jnp.asarray(3.0), 1e-9, 50)
-    np.testing.assert_allclose(found, 2.0, rtol=1e-8)
-    np.testing.assert_allclose(beside["twice"], 2.0 * found)
-
-
-def test_a_trial_that_runs_away_is_a_rejected_step():
-    def linearise(x, _):
-        # nothing finite beyond one, where a step from the start leads: the curve is flat there
-        residual = jnp.where(x > 1.0, jnp.inf, jnp.tanh(2.0 * x) - 0.9)
-        columns = jnp.diag(2.0 / jnp.cosh(2.0 * x) ** 2)
-        return *bounded(residual, columns)[:2], None
-
-    found, _ = descend(linearise, jnp.full(1, -0.9), None, 1e-10, 200)
-    np.testing.assert_allclose(found, np.arctanh(0.9) / 2.0, rtol=1e-6)
+    # two a step, and Wood's function takes most
+    assert len(model.asked) < 120
 
 
 @pytest.mark.parametrize("function", BOUNDS, ids=lambda function: function.__name__)
@@ -177,7 +144,7 @@ def test_within_bounds_it_ends_at_the_minimum_that_scipy_finds_there(function):
     assert fit.cost <= 2.0 * exact * (1.0 + 1e-3)
     assert np.any((fit.theta == low) | (fit.theta == high))  # or the bounds are none
     # a step that is only cut off takes 400 to 600 on six of the nine, and ends elsewhere on five
-    assert sum(model.asked) < 100
+    assert sum(model.asked) < 150
 
 
 def test_a_range_of_one_value_holds_a_parameter_and_lets_the_others_go():

@@ -1,13 +1,22 @@
-"""Every named law against its independent solution in four flows: `benchmarks/law_accuracy.py`."""
+"""Every named law against its independent material: at any state, and in four flows in time."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent.named import CONSTANTS, material
 from law_accuracy import FLOWS, measured
+from scipy.integrate import solve_ivp
 
-from discover.laws import registry
+from discover.laws import make_law, registry
 
 KINKED = ("saramito",)
+OF_STRESS = [law for law, constants in CONSTANTS.items() if not make_law(law, constants).variables]
+"""Those with variables beside it: `test_pom_pom.py`, `test_rolie_poly_blend.py`."""
+
+# all nine components, with a rotation about no axis of the strain; and those that four hold
+ANY = np.array([[0.4, 1.0, -0.3], [0.2, -0.7, 0.5], [0.6, -0.4, 0.3]])
+OF_FOUR = np.array([[0.4, 1.1, 0.0], [0.0, -0.3, 0.0], [0.0, 0.0, -0.1]])
+FOUR = [0, 1, 2, 0], [0, 1, 2, 1]
 
 
 def test_every_named_law_has_an_independent_material():
@@ -16,6 +25,29 @@ def test_every_named_law_has_an_independent_material():
     for law, constants in CONSTANTS.items():
         assert set(constants) == set(built_in[law].parameters)
         assert np.all(np.isfinite(material(law, constants).rest()))
+
+
+@pytest.mark.parametrize("law", OF_STRESS)
+def test_every_law_changes_as_its_independent_material_in_any_flow(law):
+    """That programs follow it in time: below, and `test_against_simulate.py`."""
+    made, its, step = make_law(law, CONSTANTS[law]), material(law, CONSTANTS[law]), 1e-5
+    for gradient in (ANY, OF_FOUR):
+        along = solve_ivp(
+            lambda _, y, gradient=gradient: its.change(y, gradient), (0, 2), its.rest(), "Radau",
+            [0.1, 0.6, 2.0],
+        )  # fmt: skip
+        for state in along.y.T:
+            stress, change = its.stress(state, gradient), its.change(state, gradient)
+            # dσ/dt by the chain rule
+            ahead, behind = (its.stress(state + d * change, gradient) for d in (step, -step))
+            wanted = (ahead - behind) / (2 * step)
+            found = np.asarray(made.stress_rate(jnp.asarray(stress), jnp.asarray(gradient)))
+            # the difference errs by the square of the step; at a steady state nothing changes
+            size = np.max(np.abs(wanted)) + np.max(np.abs(stress))
+            np.testing.assert_allclose(found, wanted, atol=1e-6 * size)
+            if gradient is OF_FOUR:
+                short = made.stress_rate(jnp.asarray(stress[FOUR]), jnp.asarray(gradient[FOUR]))
+                np.testing.assert_allclose(short, found[FOUR], rtol=1e-12, atol=1e-13 * size)
 
 
 @pytest.mark.slow

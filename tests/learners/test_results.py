@@ -5,7 +5,7 @@ import numpy as np
 import sympy
 
 from discover.laws.expansion import law_of_terms
-from discover.laws.textbook.giesekus import Giesekus
+from discover.laws.textbook.classical import Giesekus
 from discover.learners import LearnerResult, RecoveredTerm
 from tensor_library.law_terms import LawTerms
 from tensor_library.notation import STRESS, Trace

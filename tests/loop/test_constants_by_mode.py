@@ -21,7 +21,7 @@ from discover.report.plots.by_mode import by_mode_picture
 
 MODULI, TIMES = (30.0, 100.0, 300.0), (5.0, 0.5, 0.05)
 RATES = (0.3, 1.0, 4.0, 15.0, 60.0)
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 @cache
@@ -119,8 +119,14 @@ CONSTANTS = {
 }
 
 
-@pytest.mark.parametrize("name", CONSTANTS)
-@pytest.mark.parametrize("kind", ["shear", "uniaxial"])
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("shear", "giesekus_mobility"), ("uniaxial", "alpha"),
+        pytest.param("shear", "alpha", marks=pytest.mark.slow),
+        pytest.param("uniaxial", "giesekus_mobility", marks=pytest.mark.slow),
+    ],
+)  # fmt: skip
 def test_the_forward_model_gives_each_mode_its_constant(kind, name):
     mobilities = np.array([0.1, 0.3, 0.6])
     declared = CONSTANTS[name]()

@@ -8,6 +8,7 @@ import discover as dc
 from discover.dataset.run import Run
 from discover.protocols import in_flow, start_up
 
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 MODULUS, TIME, SOLVENT = (100.0, 20.0), (0.2, 3.0), 5.0
 RATES = (0.15, 0.3, 0.6, 1.2)
 

@@ -14,7 +14,7 @@ from discover.protocols import start_up as commanded
 
 MOBILITY, GAIN = 0.3, -0.1
 CANDIDATES = ["giesekus_mobility", "ptt_linear", "stress_gain"]
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from discover.report.loop.tables import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
 NOISE = 0.005
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 def runs(law, rates, seed=0, end=8.0):

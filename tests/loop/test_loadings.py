@@ -24,7 +24,7 @@ FLOWS = {
 }
 FACTORS = {"slow.csv": 1.03, "fast.csv": 0.97, "wave.csv": 1.01, "held.csv": 1.025}
 EFFECTS = ["giesekus_mobility", "ptt_linear", "non_affine_motion"]
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 def records(law):

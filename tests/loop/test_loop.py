@@ -57,7 +57,7 @@ def make_dataset(law, noise=0.01, rise=0.0, seed=0):
     return Dataset("made", tuple(runs))
 
 
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 def loop(dataset, **options):
@@ -149,6 +149,7 @@ def test_the_records_hold_what_pictures_need(planted_mobility):
     assert max(refitted, key=lambda name: refitted[name]) == "giesekus_mobility"
 
 
+@pytest.mark.slow  # of constants to the last bit: below
 def test_the_same_data_give_the_same_result(planted_mobility):
     again = loop(make_dataset(Giesekus(0.2)))
     first, second = planted_mobility.to_json(), again.to_json()

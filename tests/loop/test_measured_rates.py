@@ -17,7 +17,7 @@ from discover.simulate import simulate
 
 TIMES = np.linspace(0.05, 8.0, 80)
 EFFECTS = ("giesekus_mobility", "rate_rise_time", "rate_gain", "stress_offset")
-pytestmark = pytest.mark.usefixtures("without_curves")
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 
 
 def start_ups(alpha, rates=(0.5, 1.0, 2.0), noise=0.01):

@@ -11,6 +11,7 @@ from discover.loop import DeclaredModel, run_loop
 from discover.protocols import oscillatory_shear, start_up
 from discover.report.loop.tables import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 TIMES = np.linspace(0.1, 10.0, 100)
 FLOWS = {"slow": start_up(0.4), "fast": start_up(1.5), "wave": oscillatory_shear(1.5, 0.8)}
 RATES = {

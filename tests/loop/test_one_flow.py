@@ -9,6 +9,7 @@ from discover.dataset.records.repeats import count_flows
 from discover.protocols.control import steady_rates
 from discover.report.loop.tables import loop_verdict
 
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 TIMES = np.linspace(0.1, 6.0, 40)
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 

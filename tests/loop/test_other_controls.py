@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import discover as dc
 
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 MODULUS, TIME, SOLVENT, NOISE = 100.0, 1.0, 1.0, 0.01
 EFFECTS = ["giesekus_mobility", "ptt_linear", "stress_offset"]
 CREEP_TIMES = np.geomspace(0.02, 10.0, 60)

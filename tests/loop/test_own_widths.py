@@ -44,7 +44,17 @@ LAWS = {
 
 
 @pytest.mark.parametrize(
-    ("law", "before"), [*((name, BEFORE) for name in LAWS), ("giesekus", 50.0)]
+    # the two that take most of what steps choose: a law that thins fast, and a jump of a hundred
+    ("law", "before"),
+    [
+        ("ptt_linear", BEFORE),
+        ("giesekus", 50.0),
+        *(
+            pytest.param(name, BEFORE, marks=pytest.mark.slow)
+            for name in LAWS
+            if name != "ptt_linear"
+        ),
+    ],
 )
 def test_a_run_from_a_steady_flow_is_exact_in_a_third_of_the_steps(law, before, monkeypatch):
     parameters, independent = LAWS[law]

@@ -10,6 +10,7 @@ from discover.forward import DeclaredModel
 from discover.loop import run_loop
 from discover.protocols import oscillatory_shear, start_up, steady_rates
 
+pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 RATES = np.geomspace(0.01, 100.0, 25)
 FREQUENCIES = np.geomspace(0.1, 100.0, 25)
 
@@ -133,7 +134,7 @@ def maxwell(times, rate, amplitude):
     return 2.5 * amplitude * (np.cos(times) + np.sin(times) - np.exp(-times))
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.01])
+@pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 0.01])
 @pytest.mark.parametrize(
     ("stress", "law"),
     [(lambda t, rate, a: 3.0 * rate, "newtonian"), (thinned, "carreau_yasuda"), (maxwell, None)],

@@ -17,14 +17,18 @@ from discover.forward.grids.grid import stress_grid
 from discover.protocols import imposed_stress, start_up, steady_rates
 
 MODULUS, TIME = 100.0, 1.0
-MAXWELL = DeclaredModel.maxwell(MODULUS, TIME)
 TIMES = np.geomspace(0.01, 10.0, 60)
+# in every model, used or not, so that all share their code
+IN_SERIES = "wall_slip", "tool_compliance"
 
 
 def giesekus(mobility, solvent=0.0):
     return DeclaredModel.named(
         "giesekus", {"alpha": mobility}, MODULUS, TIME, solvent_viscosity=solvent
     )
+
+
+MAXWELL = giesekus(0.0)
 
 
 def flow_curve(rates, stress=None, **columns):
@@ -45,7 +49,8 @@ def with_strain(protocol, strain):
 
 
 def predicted(declared, *runs, effects=(), **values):
-    model = AugmentedModel(declared, [named_effects()[name] for name in effects])
+    names = dict.fromkeys([*IN_SERIES, *effects])
+    model = AugmentedModel(declared, [named_effects()[name] for name in names])
     theta = model.zero()
     for name, value in values.items():
         theta[model.positions(name)[0]] = value
@@ -64,22 +69,24 @@ def test_steady_states_are_those_of_the_closed_form_over_five_decades_of_rate():
 
 def test_a_flow_curve_with_slip_is_that_of_the_rate_which_is_left():
     rates, slip = np.geomspace(0.01, 100.0, 12), 0.01
-    stress = predicted(giesekus(0.3), flow_curve(rates), effects=["wall_slip"], wall_slip=slip)[0]
+    run = flow_curve(rates, first_normal_stress_difference=np.ones(12))
+    stress = predicted(giesekus(0.3), run, run.observing("N1"), wall_slip=slip)[0]
     law = Giesekus(0.3, MODULUS, TIME)
     left = [law.steady_shear(rate)[0] for rate in rates - slip * stress]
     np.testing.assert_allclose(stress, left, rtol=1e-9)
 
 
 def test_what_needs_time_or_strain_does_not_act_on_steady_states():
-    run = flow_curve(np.geomspace(0.1, 10.0, 9))
-    plain = predicted(giesekus(0.3), run)
+    run = flow_curve(np.geomspace(0.1, 10.0, 9), first_normal_stress_difference=np.ones(9))
+    runs = run, run.observing("N1")
+    plain = predicted(giesekus(0.3), *runs)
     values = {"stress_drift": 1.0, "edge_fracture": 0.5, "transducer_lag": 0.2,
               "rate_rise_time": 0.2}  # fmt: skip
     names = [*values, "stress_gain"]
-    together = predicted(giesekus(0.3), run, effects=names, **values)
+    together = predicted(giesekus(0.3), *runs, effects=names, **values)
     np.testing.assert_array_equal(together, plain)
-    gained = predicted(giesekus(0.3), run, effects=names, stress_gain=0.1, **values)
-    np.testing.assert_allclose(gained, 1.1 * plain, rtol=1e-12)
+    gained = predicted(giesekus(0.3), *runs, effects=names, stress_gain=0.1, **values)
+    np.testing.assert_allclose(gained[0], 1.1 * plain[0], rtol=1e-12)
 
 
 def test_a_maxwell_fluid_recovers_its_elastic_strain():
@@ -128,7 +135,7 @@ def test_a_spectrum_over_five_decades_creeps_by_its_closed_form():
     parts = 1.0 / (zeros**2 * slopes)
     compliance = 1.0 / np.sum(modulus) + times / np.sum(modulus * time)
     compliance = compliance + parts @ (1.0 - np.exp(np.outer(zeros, times)))
-    declared = DeclaredModel.maxwell(modulus, time)
+    declared = DeclaredModel.named("giesekus", {"alpha": 0.0}, modulus, time)
     strain = predicted(declared, at_stress(times, np.full(60, stress)))[0]
     # the jump takes a thousandth of the time to the first sample, in which it flows: 2e-4 there
     np.testing.assert_allclose(strain, stress * compliance, rtol=3e-4)

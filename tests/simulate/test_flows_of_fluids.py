@@ -13,7 +13,7 @@ from discover.errors import InputError
 from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
 from discover.forward.grids import lay_out
 from discover.laws.multimode import Fluid
-from discover.laws.textbook.giesekus import Giesekus
+from discover.laws.textbook.classical import Giesekus
 from discover.protocols import imposed_stress, oscillations, start_up, steady_rates
 from discover.protocols.protocol import recording
 from discover.simulate import SimulationError, observe, simulate

@@ -14,7 +14,7 @@ from discover.protocols import oscillations, start_up
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3
 STRAINS, FREQUENCIES = np.array([0.1, 1.0, 10.0, 2.0]), np.array([1.0, 1.0, 0.3, 30.0])
-MAXWELL = DeclaredModel.maxwell(MODULUS, TIME)
+MAXWELL = DeclaredModel.named("giesekus", {"alpha": 0.0}, MODULUS, TIME)
 GIESEKUS = DeclaredModel.named("giesekus", {"alpha": MOBILITY}, MODULUS, TIME)
 
 
@@ -26,8 +26,15 @@ def sweep(strain=STRAINS, frequency=FREQUENCIES):
     )  # fmt: skip
 
 
-def predicted(declared, run, effects=(), **values):
-    model = AugmentedModel(declared, [named_effects()[name] for name in effects])
+INSTRUMENT = (
+    "transducer_lag", "time_delay", "instrument_inertia", "stress_gain", "stress_offset",
+    "edge_fracture", "rate_rise_time", "bearing_friction", "tool_compliance", "wall_slip",
+)  # fmt: skip
+
+
+def predicted(declared, run, **values):
+    """Return the moduli with some effects, in a model that has all: one program serves."""
+    model = AugmentedModel(declared, [named_effects()[name] for name in INSTRUMENT])
     theta = model.zero()
     for name, value in values.items():
         theta[model.positions(name)[0]] = value
@@ -46,17 +53,6 @@ def test_moduli_of_modes_over_thirteen_decades_are_their_closed_form():
     np.testing.assert_allclose(predicted(giesekus, run), exact, rtol=1e-4)
 
 
-INSTRUMENT = (
-    "transducer_lag", "time_delay", "instrument_inertia", "stress_gain", "stress_offset",
-    "edge_fracture", "rate_rise_time", "bearing_friction", "tool_compliance", "wall_slip",
-)  # fmt: skip
-
-
-def distorted(declared, run, **values):
-    """Return the moduli with some effects of one model, which is compiled once."""
-    return predicted(declared, run, INSTRUMENT, **values)
-
-
 def test_lag_delay_inertia_and_gain_change_a_modulus_by_their_closed_forms():
     iw, plain = 1j * FREQUENCIES, predicted(GIESEKUS, sweep())
     for name, value, expected in (
@@ -68,19 +64,19 @@ def test_lag_delay_inertia_and_gain_change_a_modulus_by_their_closed_forms():
         ("edge_fracture", 0.5, plain),
         ("rate_rise_time", 0.5, plain),
     ):
-        found = distorted(GIESEKUS, sweep(), **{name: value})
+        found = predicted(GIESEKUS, sweep(), **{name: value})
         np.testing.assert_allclose(found, expected, rtol=1e-9, err_msg=name)
 
 
 def test_coulomb_friction_adds_to_the_loss_modulus_alone():
-    added = distorted(MAXWELL, sweep(), bearing_friction=2.0) - predicted(MAXWELL, sweep())
+    added = predicted(MAXWELL, sweep(), bearing_friction=2.0) - predicted(MAXWELL, sweep())
     # 4/π of a square wave; the trapezoidal rule meets its kink
     np.testing.assert_allclose(added, 4j * 2.0 / np.pi / STRAINS, rtol=1e-3, atol=1e-5)
 
 
 @pytest.mark.parametrize(("name", "value"), [("tool_compliance", 1e-3), ("wall_slip", 2e-3)])
 def test_what_gives_way_in_series_adds_to_the_compliance_of_a_linear_fluid(name, value):
-    found = distorted(MAXWELL, sweep(), **{name: value})
+    found = predicted(MAXWELL, sweep(), **{name: value})
     x = FREQUENCIES * TIME
     fluid = MODULUS * (x**2 + 1j * x) / (1.0 + x**2)
     taken = value if name == "tool_compliance" else value / (1j * FREQUENCIES)
@@ -89,7 +85,7 @@ def test_what_gives_way_in_series_adds_to_the_compliance_of_a_linear_fluid(name,
 
 def test_slip_of_a_giesekus_fluid_is_that_of_scipy_but_for_higher_harmonics():
     slip, plain = 2e-3, predicted(GIESEKUS, sweep())
-    found = distorted(GIESEKUS, sweep(), wall_slip=slip)
+    found = predicted(GIESEKUS, sweep(), wall_slip=slip)
     pairs = zip(STRAINS, FREQUENCIES, strict=True)
     exact = np.array([giesekus_modulus(MOBILITY, MODULUS, TIME, *pair, slip) for pair in pairs])
     # what the fluid feels of the higher harmonics of its slip is left out: 5e-3 was measured

@@ -15,7 +15,7 @@ from discover.forward.fluids import solve_batch, solve_on_grid
 from discover.forward.grids import lay_out, make_grid
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
-from discover.laws.textbook.giesekus import Giesekus
+from discover.laws.textbook.classical import Giesekus
 from discover.protocols import after_steady_flow, in_flow, start_up
 from discover.protocols.control import steady_rates
 from discover.simulate import SimulationError, simulate

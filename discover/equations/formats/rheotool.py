@@ -21,7 +21,7 @@ from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
 from discover.equations.parts import EXPONENTIAL, NamedPart, combined, law_parts
 from discover.errors import InputError
-from discover.laws.textbook.fene_p import fene_p_terms
+from discover.laws.textbook.classical import fene_p_terms
 from tensor_library.terms import parse_term
 
 TOLERANCE = 0.01

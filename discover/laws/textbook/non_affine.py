@@ -6,9 +6,7 @@ import equinox as eqx
 from jaxtyping import Array, Float
 
 from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
-from discover.laws.textbook.giesekus import NAMED as GIESEKUS
-from discover.laws.textbook.johnson_segalman import NAMED as JOHNSON_SEGALMAN
-from discover.laws.textbook.phan_thien_tanner import NAMED as PHAN_THIEN_TANNER
+from discover.laws.textbook.classical import NAMED as CLASSICAL
 from tensor_library.algebra import Symmetric, anticommutator
 from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.law_terms import LawTerm
@@ -34,8 +32,7 @@ class NonAffine(AbstractConstitutiveLaw):
 
 
 def _with_slip(name: str, named: NamedLaw) -> NamedLaw:
-    (ranges,) = (law.parameters for law in JOHNSON_SEGALMAN.values())
-    (slip,) = JOHNSON_SEGALMAN.values()
+    slip = CLASSICAL["johnson_segalman"]
 
     def build(constant, xi) -> NonAffine:
         return NonAffine(affine=named.build(constant), slip_parameter=xi)
@@ -50,18 +47,19 @@ def _with_slip(name: str, named: NamedLaw) -> NamedLaw:
     return NamedLaw(
         f"{named.title} with slip",
         made,
-        {**named.parameters, **ranges},
+        {**named.parameters, **slip.parameters},
         {**named.range_sources, **slip.range_sources},
         source=f"{named.source}; {slip.source}",
         written=written,
         contains={
-            name: dict.fromkeys(ranges, 0.0),
-            **{slipping: dict.fromkeys(named.parameters, 0.0) for slipping in JOHNSON_SEGALMAN},
+            name: dict.fromkeys(slip.parameters, 0.0),
+            "johnson_segalman": dict.fromkeys(named.parameters, 0.0),
         },
     )
 
 
 NAMED = {
     f"{name}_non_affine": _with_slip(name, law)
-    for name, law in (GIESEKUS | PHAN_THIEN_TANNER).items()
+    for name, law in CLASSICAL.items()
+    if name in ("giesekus", "ptt_linear", "ptt_exponential")
 }

@@ -1,15 +1,17 @@
 """Levenberg–Marquardt on trajectories and prior together, one step at a time."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from scipy.linalg import cho_factor, cho_solve
 
-from discover.inference.least_squares.tangents import Linearised, Steps
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.learners.tbnn_ude.variational import (
@@ -127,6 +129,72 @@ def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
     """
     every = strength * jnp.ones(N_COEFFICIENTS)
     return PriorWeights(1e-5 * every, every)
+
+
+# The first damping is one, which is to be small beside the curvature: that of weights is far below
+_OF_WEIGHTS = 30.0
+
+# Of what a step promised, the shares from which on it is taken, and from which on the damping falls
+_LEAST_KEPT, _MOST_KEPT = 0.01, 0.99
+_MORE_DAMPING, _LESS_DAMPING = 4.0, 1.0 / 3.5
+
+
+class Linearised(NamedTuple):
+    """An objective around some parameters: residuals (rows,), and derivatives (rows, p)."""
+
+    rows: Float[Array, " rows"]
+    matrix: Float[Array, "rows p"]
+
+
+class Steps:
+    """A descent step by step, each from a linearisation that is computed elsewhere.
+
+    Levenberg–Marquardt with the damping of a trust region   [Moré 1978, The Levenberg-Marquardt
+    algorithm; constants: Gould et al. 2005, 4OR 3, 227, as optimistix has them], in NumPy: for
+    every number of rows and parameters a program would take longer to compile than its steps take.
+
+    Attributes
+    ----------
+    best, norm
+        The best parameters so far, shape (p,), and the norm of the residuals there.
+    trial
+        The parameters where the objective is to be linearised next.
+    """
+
+    def __init__(self, start: Float[Array | np.ndarray, " p"]):
+        self.best = self.trial = np.asarray(start)
+        self.norm = np.nan
+        self._damping = 1.0
+        self._known: tuple[np.ndarray, ...] | None = None
+
+    def take(self, linearised: Linearised) -> None:
+        """Take the step to the trial if it is one down, and find the next trial.
+
+        A trial whose residuals are not finite is none down.
+        """
+        rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
+        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
+            if self._known is None or self._is_down(rows):
+                self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
+                self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
+        _, _, curvature, slope = self._known
+        damped = curvature + self._damping * np.eye(len(slope))
+        self.trial = np.full_like(self.best, np.nan)
+        if np.all(np.isfinite(damped)) and np.all(np.isfinite(slope)):
+            with suppress(np.linalg.LinAlgError):  # more damping is asked for
+                self.trial = self.best - cho_solve(cho_factor(damped), slope)
+
+    def _is_down(self, rows: np.ndarray) -> bool:
+        assert self._known is not None
+        before, matrix, *_ = self._known
+        promised = np.sum((before + matrix @ (self.trial - self.best)) ** 2) - np.sum(before**2)
+        found = np.sum(rows**2) - np.sum(before**2)
+        if not found <= _LEAST_KEPT * promised:
+            self._damping *= _MORE_DAMPING
+            return False
+        if found < _MOST_KEPT * promised:
+            self._damping *= _LESS_DAMPING
+        return True
 
 
 _PATIENCE = 4

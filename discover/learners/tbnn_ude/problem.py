@@ -17,7 +17,7 @@ from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.multimode import Fluid
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.laws.textbook.maxwell import UpperConvectedMaxwell
+from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.runs import laid_out
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from discover.inference.least_squares.tangents import Linearised, Steps
+from discover.learners.tbnn_ude.least_squares import Linearised, Steps
 
 START = np.array([-1.2, 1.0])
 

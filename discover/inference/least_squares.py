@@ -1,0 +1,148 @@
+"""Least squares of many small problems that share one compiled model, by Levenberg–Marquardt."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.optimize import lsq_linear
+
+from discover.forward import AugmentedModel, Batch, Linearised, Point, linearised
+
+_DAMPINGS = (0.1, 1.0, 10.0)
+"""Multiples of a problem's damping that are tried side by side."""
+
+_LARGEST_DAMPING, _LEAST_DAMPING = 1e7, 1e-8
+_FREE = 1.0
+"""Damping, relative to the curvature, below which a step is the problem's own."""
+
+
+@dataclass
+class Fit:
+    """A fitted parameter vector.
+
+    Attributes
+    ----------
+    free
+        Positions of the fitted ones.
+    residual
+        Weighted residuals, shape (runs, n).
+    jacobian
+        Their derivatives in the fitted parameters, shape (free, runs, n).
+    damping, done
+        Of the descent that leads here.
+    """
+
+    theta: Float[np.ndarray, " p"]
+    free: tuple[int, ...]
+    residual: Float[np.ndarray, "runs n"]
+    jacobian: Float[np.ndarray, "free runs n"]
+    damping: float = 1e-2
+    done: bool = False
+
+    @property
+    def cost(self) -> float:
+        """Sum over runs of the squared relative errors."""
+        with np.errstate(over="ignore", invalid="ignore"):  # of what ran away
+            return float(np.sum(self.residual**2))
+
+    @property
+    def usable(self) -> bool:
+        """Whether residuals and derivatives are all finite."""
+        return bool(np.all(np.isfinite(self.residual)) and np.all(np.isfinite(self.jacobian)))
+
+
+def best_of(fits: Iterable[Fit]) -> Fit | None:
+    """Return the usable fit of the least cost; None where none is usable."""
+    return min((fit for fit in fits if fit.usable), key=lambda fit: fit.cost, default=None)
+
+
+def fit_batch(
+    model: AugmentedModel,
+    batch: Batch,
+    starts: Sequence[np.ndarray],
+    free: Sequence[Sequence[int]],
+    max_steps: int = 100,
+    tolerance: float = 1e-5,
+) -> list[Fit]:
+    """Minimise the squared residuals from several starts, each in its own free parameters.
+
+    All problems advance together: one call predicts the steps of all with several dampings, and one
+    more the derivatives where they end, by differences. A residual costs so little beside a
+    compilation of its derivative that this is several times faster here. A trial that cannot be
+    integrated is a rejected step. A step is the best that the ranges of the parameters hold, so the
+    others go on where one is at its bound   [Kanzow, Yamashita & Fukushima 2004, J. Comput. Appl.
+    Math. 172, 375].
+
+    Parameters
+    ----------
+    model, batch
+        What is fitted, to what.
+    starts, free
+        A parameter vector and the positions of its free parameters, for each problem.
+    max_steps
+        Largest number of steps.
+    tolerance
+        A problem is finished when a step lowers its cost by less than this fraction.
+    """
+    given = [
+        Point(np.array(start, dtype=float), tuple(at))
+        for start, at in zip(starts, free, strict=True)
+    ]
+    fits = [
+        Fit(point.theta, tuple(point.positions), found.residual, found.jacobian)
+        for point, found in zip(given, linearised(model, given, batch), strict=True)
+    ]
+    going = [fit for fit in fits if fit.free and np.isfinite(fit.cost)]
+    for _ in range(max_steps):
+        if not going:
+            break
+        tried = [_trial(model, fit, multiple) for fit in going for multiple in _DAMPINGS]
+        found = linearised(model, tried, batch)
+        n = len(_DAMPINGS)
+        moved = [
+            fit
+            for i, fit in enumerate(going)
+            if _take(fit, tried[n * i : n * (i + 1)], found[n * i : n * (i + 1)], tolerance)
+        ]
+        points = [Point(fit.theta, fit.free, fit.residual) for fit in moved]
+        for fit, at in zip(moved, linearised(model, points, batch) if moved else (), strict=True):
+            fit.jacobian = at.jacobian
+        going = [fit for fit in going if not fit.done]
+    return fits
+
+
+def _trial(model: AugmentedModel, fit: Fit, multiple: float) -> Point:
+    """Return parameters after the best damped step that the ranges of what is free hold."""
+    at, theta = list(fit.free), fit.theta.copy()
+    design = fit.jacobian.reshape(len(at), -1).T
+    if np.all(np.isfinite(design)):
+        scale = np.linalg.norm(design, axis=0)
+        scale = np.where(scale > 0, scale, 1.0)
+        damping = np.sqrt(multiple * fit.damping) * np.eye(len(at))
+        padded = np.concatenate([design / scale, damping])
+        target = np.concatenate([-fit.residual.ravel(), np.zeros(len(at))])
+        step = np.linalg.lstsq(padded, target, rcond=None)[0]
+        low, high = scale * (model.low[at] - theta[at]), scale * (model.high[at] - theta[at])
+        if np.any((step < low) | (step > high)):
+            high = np.maximum(high, np.nextafter(low, np.inf))  # a range may be one value
+            step = lsq_linear(padded, target, (low, high), method="bvls").x
+        theta[at] = np.clip(theta[at] + step / scale, model.low[at], model.high[at])
+    return Point(theta, limit=fit.cost)
+
+
+def _take(fit: Fit, tried: Sequence[Point], found: Sequence[Linearised], tolerance: float) -> bool:
+    """Take the best of some trials, if one is better; return whether one was."""
+    before = fit.cost
+    with np.errstate(over="ignore", invalid="ignore"):  # of what ran away
+        costs = np.array([np.sum(one.residual**2) for one in found])
+    best = int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))
+    if not costs[best] < before:
+        fit.damping *= 1e2
+        fit.done = fit.damping > _LARGEST_DAMPING
+        return False
+    fit.theta, fit.residual = tried[best].theta, found[best].residual
+    fit.damping = max(_DAMPINGS[best] * fit.damping, _LEAST_DAMPING)
+    # a step that damping cut short gains little anywhere
+    fit.done = fit.damping < _FREE and 1.0 - costs[best] / before < tolerance
+    return True

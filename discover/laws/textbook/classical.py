@@ -1,0 +1,217 @@
+"""The classical laws: Maxwell, Johnson–Segalman, Giesekus, affine Phan-Thien–Tanner, FENE-P."""
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
+from tensor_library.algebra import Symmetric, anticommutator, identity_like, inner, square, trace
+from tensor_library.isotropic_function import IsotropicFunction, scalars
+from tensor_library.law_terms import LawTerm
+
+
+class UpperConvectedMaxwell(AbstractConstitutiveLaw):
+    """Upper convected Maxwell law: h = 0   [Oldroyd 1950, Proc. R. Soc. A 200, 523]."""
+
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = 0."""
+        del rate
+        return jnp.zeros_like(stress)
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        return ()
+
+
+class JohnsonSegalman(AbstractConstitutiveLaw):
+    """Johnson–Segalman law: h = (ξ/2)(σ·γ̇ + γ̇·σ)   [Johnson & Segalman 1977, JNNFM 2, 255]."""
+
+    slip_parameter: Float[Array, ""] = eqx.field(converter=as_parameter)  # ξ, 0 to 2
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = (ξ/2)(σ·γ̇ + γ̇·σ)."""
+        return 0.5 * self.slip_parameter * anticommutator(stress, rate)
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        return (LawTerm("sigma.gammadot+gammadot.sigma", 0.5 * float(self.slip_parameter)),)
+
+
+class Giesekus(AbstractConstitutiveLaw):
+    """Giesekus law: h = α σ·σ   [Giesekus 1982, JNNFM 11, 69]."""
+
+    mobility: Float[Array, ""] = eqx.field(converter=as_parameter)  # α, 0 to 1
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = α σ·σ."""
+        del rate  # this law has no explicit rate dependence
+        return self.mobility * square(stress)
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        return (LawTerm("sigma.sigma", float(self.mobility)),)
+
+
+class LinearPhanThienTanner(AbstractConstitutiveLaw):
+    """Linear PTT law: h = ε tr(σ) σ   [Phan-Thien & Tanner 1977, JNNFM 2, 353]."""
+
+    extensibility: Float[Array, ""] = eqx.field(converter=as_parameter)  # ε
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = ε tr(σ) σ."""
+        del rate
+        return self.extensibility * trace(stress) * stress
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        return (LawTerm("tr(sigma)*sigma", float(self.extensibility)),)
+
+
+class ExponentialPhanThienTanner(AbstractConstitutiveLaw):
+    """Exponential PTT law: h = (exp(ε tr σ) − 1) σ   [Phan-Thien 1978, J. Rheol. 22, 259]."""
+
+    extensibility: Float[Array, ""] = eqx.field(converter=as_parameter)  # ε
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = (exp(ε tr σ) − 1) σ."""
+        del rate
+        return jnp.expm1(self.extensibility * trace(stress)) * stress
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        inner = {"epsilon": float(self.extensibility)}
+        return (LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, inner),)
+
+
+def _written_linear() -> IsotropicFunction:
+    return IsotropicFunction({"sigma": scalars("epsilon") * scalars("tr(sigma)")})
+
+
+def _written_exponential() -> IsotropicFunction:
+    import sympy
+
+    return IsotropicFunction({"sigma": sympy.exp(scalars("epsilon") * scalars("tr(sigma)")) - 1})
+
+
+_RANGE = {"epsilon": (0.0, 10.0)}
+_RANGE_SOURCE = {
+    "epsilon": "Phan-Thien & Tanner 1977: fast extension of linear PTT ends at 2 Gλ/ε, which ten "
+    "puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1"
+}
+
+_CONTAINS = {"ucm": {"epsilon": 0.0}}
+
+
+class FenePeterlin(AbstractConstitutiveLaw):
+    """FENE-P law   [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
+
+    With the conformation A at equilibrium I, σ = f A − I and f = (L² − 3)/(L² − tr A). Eliminating
+    A gives f = 1 + tr(σ)/L² and, with the upper convected derivative of A equal to −σ,
+
+        h = (f − 1) σ − (ḟ/f)(σ + I),    ḟ = (tr(σ·γ̇) − f tr σ)/(L² − tr A),
+
+    so that the law is one of Maxwell type whose extra term depends on the rate. L² → ∞ is UCM.
+    """
+
+    maximum_extension_squared: Float[Array, ""] = eqx.field(converter=as_parameter)  # L², over 3
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ, γ̇) as above."""
+        limit = self.maximum_extension_squared
+        trace_of_stress = trace(stress)
+        factor = 1.0 + trace_of_stress / limit
+        trace_of_conformation = (trace_of_stress + 3.0) / factor
+        factor_rate = (inner(stress, rate) - factor * trace_of_stress) / (
+            limit - trace_of_conformation
+        )
+        return (factor - 1.0) * stress - factor_rate / factor * (stress + identity_like(stress))
+
+    def as_terms(self) -> tuple[LawTerm, ...]:
+        """Return h as a sum of library terms."""
+        return fene_p_terms(1.0 / float(self.maximum_extension_squared))
+
+
+def fene_p_terms(inverse: float) -> tuple[LawTerm, ...]:
+    """Return the extra term of FENE-P, with q = 1/L², multiplied out."""
+    growth = inverse / (1.0 - 3.0 * inverse)
+    return (
+        LawTerm("tr(sigma)*sigma", inverse + growth),
+        LawTerm("tr(sigma)^2*sigma", growth * inverse),
+        LawTerm("tr(sigma.gammadot)*sigma", -growth),
+        LawTerm("tr(sigma)*I", growth),
+        LawTerm("tr(sigma)^2*I", growth * inverse),
+        LawTerm("tr(sigma.gammadot)*I", -growth),
+    )
+
+
+def _written_fene_p() -> IsotropicFunction:
+    limit, trace, power, f, w = scalars("L2", "tr(sigma)", "tr(sigma.gammadot)", "f", "w")
+    # with L² − tr A = (L² − 3)/f
+    where = {"f": 1 + trace / limit, "w": (power - f * trace) / (limit - 3)}
+    return IsotropicFunction({"sigma": f - 1 - w, "I": -w}, where, {"L2": "L^{2}"})
+
+
+NAMED = {
+    "ucm": NamedLaw(
+        "upper convected Maxwell",
+        UpperConvectedMaxwell,
+        {},
+        source="Oldroyd 1950, Proc. R. Soc. London A 200, 523",
+        written=lambda: IsotropicFunction({}),
+    ),
+    "johnson_segalman": NamedLaw(
+        "Johnson–Segalman",
+        JohnsonSegalman,
+        {"xi": (0.0, 2.0)},
+        {"xi": "Johnson & Segalman 1977: from the upper (0) to the lower (2) convected derivative"},
+        source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
+        written=lambda: IsotropicFunction({"sigma.gammadot+gammadot.sigma": scalars("xi") / 2}),
+        contains={"ucm": {"xi": 0.0}},
+    ),
+    "giesekus": NamedLaw(
+        "Giesekus",
+        Giesekus,
+        {"alpha": (0.0, 1.0)},
+        {"alpha": "Giesekus 1982: a mobility that no stress can make negative"},
+        source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
+        written=lambda: IsotropicFunction({"sigma.sigma": scalars("alpha")}),
+        contains={"ucm": {"alpha": 0.0}},
+    ),
+    "ptt_linear": NamedLaw(
+        "linear PTT",
+        LinearPhanThienTanner,
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
+        written=_written_linear,
+        contains=_CONTAINS,
+    ),
+    "ptt_exponential": NamedLaw(
+        "exponential PTT",
+        ExponentialPhanThienTanner,
+        _RANGE,
+        _RANGE_SOURCE,
+        source="Phan-Thien 1978, J. Rheol. 22, 259",
+        written=_written_exponential,
+        contains=_CONTAINS,
+    ),
+    "fene_p": NamedLaw(
+        "FENE-P",
+        FenePeterlin,
+        {"L2": (3.0 + 1e-6, 1e6)},
+        {
+            "L2": "Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already; at a million, "
+            "longer than of any polymer, the springs are Hooke's"
+        },
+        source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213",
+        written=_written_fene_p,
+        contains={"ucm": {"L2": 1e6}},
+    ),
+}
