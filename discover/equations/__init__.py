@@ -3,7 +3,7 @@
 from discover.equations.equation import Box, Equation, HasEquation, Tested
 from discover.equations.files import FORMATS, write_equation
 from discover.equations.formats.json_format import equation_from_json, equation_to_json
-from discover.equations.formats.rheotool import read_rheotool
+from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.parts import (
     AugmentedLaw,
     NamedPart,
