@@ -34,6 +34,9 @@ _APART = 0.2
 _WORTH_SAYING = 0.05
 """Relative difference between laws that is told of a quantity that nothing tested."""
 
+_MUCH = 2.0
+"""Relative difference from which on its size says nothing."""
+
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
@@ -98,7 +101,13 @@ def loop_answer(result: Any) -> Answer:
     if equation is None:
         near = result.nearest_law
         classical = None if near is None else near.equation
-        return replace(answer, shown=_shown(result), classical=classical)
+        shown = _shown(result)
+        # what has no terms is typeset by itself, below the law that it is added to
+        added = [s.equation for s in result.stages if s.kind == "constitutive"]
+        written = {} if shown is not None else {"formula": "\n".join(added)}
+        return replace(
+            answer, shown=shown or result.declared_law, classical=classical, written=written
+        )
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
 
 
@@ -289,7 +298,7 @@ def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
             continue
         spread = result.spread_of_laws.get(kind)
         apart = None if spread is None else spread.inside
-        differ = "" if apart is None else f"laws differ by {percent_of(apart)}"
+        differ = "" if apart is None else f"laws differ by {_at_most(apart)}"
         if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
             beyond = None if spread is None else spread.beyond
             found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
@@ -305,6 +314,11 @@ def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
+
+
+def _at_most(apart: float) -> str:
+    """Return by how much laws differ; of laws that diverge only that it is much."""
+    return percent_of(apart) if apart <= _MUCH else f"more than {percent_of(_MUCH)}"
 
 
 def _only(result: Any, kind: str) -> bool:

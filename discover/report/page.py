@@ -169,7 +169,9 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     return found | {
         "law": _typeset(answer),
-        "constants": answer.constants,
+        "constants": [
+            (one.symbol, _in_cell(one.number), _in_cell(one.interval)) for one in answer.constants
+        ],
         "expected": [
             {
                 "symbol": symbol,
@@ -196,14 +198,19 @@ _TOGETHER = re.compile(
 
 def _unbroken(text: str) -> str:
     """Return text whose numbers keep to one line with their units and symbols."""
-    return _TOGETHER.sub("\N{NO-BREAK SPACE}", text)
+    return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
+
+
+def _in_cell(text: str) -> str:
+    """Return a number or an interval that breaks before a power of ten at most."""
+    return _unbroken(text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×"))
 
 
 def _typeset(answer: Answer) -> str:
-    if (equation := answer.equation or answer.shown) is not None:
-        return _law(equation)
-    written = answer.written.get("formula")
-    return f'<p class="scroll">{formula(written, "answer")}</p>' if written else ""
+    equation = answer.equation or answer.shown
+    law = "" if equation is None else _law(equation)
+    lines = answer.written.get("formula", "").splitlines()
+    return law + "".join(f'<p class="scroll">{formula(one, "answer")}</p>' for one in lines)
 
 
 def _law(equation: Equation) -> str:
