@@ -46,6 +46,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.protocols import start_up as start_up
     from discover.protocols import step_rates as step_rates
     from discover.simulate import synthetic_dataset as synthetic_dataset
+    from discover.simulate.solve import simulate as simulate
     from tensor_library import ClosedForm as ClosedForm
     from tensor_library import build_library as build_library
     from tensor_library import register_closed_form as register_closed_form
@@ -83,6 +84,7 @@ __all__ = [
     "register_law",
     "register_learner",
     "sampled_rate",
+    "simulate",
     "start_up",
     "step_rates",
     "synthetic_dataset",
@@ -120,6 +122,7 @@ _PLACES = {
 _PLACE = {name: place for place, names in _PLACES.items() for name in names}
 
 _PACKAGES = (
+    "batch",
     "loop",
     "comparison",
     "dataset",

@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any
 
 
-def answer_calls(package: str, answer: Callable[[], Any]) -> None:
+def answer_calls(package: str, answer: Callable[..., Any]) -> None:
     """Let a package be called.
 
     The name of a package is taken: once it is imported, it is what its parent holds under that
@@ -17,11 +17,11 @@ def answer_calls(package: str, answer: Callable[[], Any]) -> None:
     package
         Its full name; called from its ``__init__``.
     answer
-        What a call returns.
+        What a call calls.
     """
 
     class CallablePackage(ModuleType):
-        def __call__(self) -> Any:
-            return answer()
+        def __call__(self, *args: Any, **options: Any) -> Any:
+            return answer(*args, **options)
 
     sys.modules[package].__class__ = CallablePackage

@@ -193,7 +193,7 @@ def _place(location: tuple[Any, ...]) -> str:
 
 def _is_branch(part: object) -> bool:
     return isinstance(part, str) and (
-        "[" in part or part in ("float", "int", "constrained-float", "str")
+        "[" in part or part.removeprefix("constrained-") in ("float", "int", "str", "bool", "tuple")
     )
 
 

@@ -24,7 +24,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import pandas as pd
 
-from discover.batch.run import run_batch
+import discover as dc
 
 STUDY = """
 [data]
@@ -62,7 +62,7 @@ def stop_after_two(label, fraction):
 
 out = folder / "results"
 try:
-    run_batch(studies, out, progress=stop_after_two)
+    dc.batch.run_batch(studies, out, progress=stop_after_two)
 except KeyboardInterrupt:
     print("stopped")
 pd.read_csv(out / "table.csv")[["study", "outcome", "reason"]]
@@ -78,7 +78,7 @@ pd.read_csv(out / "table.csv")[["study", "outcome", "reason"]]
 
 # %%
 before = (out / "noise_01" / "loop.json").stat().st_mtime_ns
-result = run_batch(studies, out)
+result = dc.batch.run_batch(studies, out)
 assert (out / "noise_01" / "loop.json").stat().st_mtime_ns == before
 for study in result.studies:
     print(f"{study.status:<9}{study.name}: {study.text}")
@@ -118,15 +118,13 @@ plt.show()
 # tested. It can be read back and simulated.
 
 # %%
-from discover.equations.files import choose_law, read_result_laws
-
-law = choose_law(read_result_laws(out / "noise_10"))
+law = dc.equations.read_result_laws(out / "noise_10")["augmented"]
 law
 
 # %%
 law.sympy()
 
 # %% [markdown]
-# `run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
+# `dc.batch.run_batch(studies, out, workers=2)` runs two studies at a time, `scheduler="tcp://host:8786"` all
 # that a cluster has room for; `docs/batches.md` says how to set one up under SLURM. Nothing is lost
 # if a worker dies.

@@ -15,25 +15,19 @@
 #
 # A fluid is declared to be upper convected Maxwell. It is not: the data come from a Giesekus fluid.
 # The loop looks at the residual, scores the effects that the model may lack, in the fluid and in
-# the instrument, adds the best one, and judges it on runs that no fit saw. This notebook does that
+# the instrument, adds the best one, and tests it on runs that no fit saw. This notebook does that
 # first on data where the answer is known, then on a measured melt.
 
 # %%
 import matplotlib.pyplot as plt
 
-from discover.compilation_cache import enable_compilation_cache
-from discover.first_use import enable_x64
+import discover as dc
 
-enable_x64()
-enable_compilation_cache()
-
-from discover.loop import DeclaredModel, run_loop
-from discover.simulate import synthetic_dataset
-
-data = synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01)
-result = run_loop(
+data = dc.synthetic_dataset("giesekus", {"alpha": 0.3}, noise=0.01)
+base = dc.Fluid(modulus=1.0, relaxation_time=1.0)
+result = dc.close_loop(
     data,
-    DeclaredModel.maxwell(1.0, 1.0),
+    base,
     held_out=["laos_2_1", "laos_2_0.5"],
     effects=["giesekus_mobility", "non_affine_motion", "stress_gain", "stress_offset"],
     max_effects=1,
@@ -87,28 +81,21 @@ plt.show()
 # `docs/findings.md`.
 
 # %%
-from discover.dataset import load_dataset, relaxation_spectrum
-from discover.errors import InputError
-
 try:
-    melt = load_dataset("pi95k-startup", clock_factor="time_factor")
+    melt = dc.load_dataset("pi95k-startup", clock_factor="time_factor")
     # a few of the eleven runs, so that this takes seconds
     fast = ("Tm10_rate0p3", "Tm10_rate1", "Tm10_rate3", "Tm23_rate1", "Tm23_rate5")
     melt = melt.select([f"pi_{name}.csv" for name in fast])
-except InputError as error:
+except dc.InputError as error:
     melt = None
     print(f"Skipped: {error}")
 
 # %%
 found = None
 if melt is not None:
-    spectrum = relaxation_spectrum(melt.linear_sweep)
-    declared = DeclaredModel.maxwell(
-        spectrum.modulus, spectrum.relaxation_time, linear_error=spectrum.relative_error
-    )
-    found = run_loop(
+    found = dc.close_loop(
         melt,
-        declared,
+        dc.Fluid.from_sweep(melt.linear_sweep),
         held_out=[name for name in melt.names if "Tm23" in name],
         effects=["rate_rise_time", "transducer_lag", "stress_gain"],
         max_effects=1,

@@ -22,19 +22,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 
-from discover.compilation_cache import enable_compilation_cache
-from discover.first_use import enable_x64
+import discover as dc
 
-enable_x64()
-enable_compilation_cache()
-
-from discover.learners.tbnn_ude import TBNNUDE
-from discover.learners.tensor_sindy import TensorSINDy
-from discover.protocols import start_up
-from discover.simulate import simulate, synthetic_dataset
-
-data = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
-[run.name for run in data]
+data = dc.synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
+data
 
 # %% [markdown]
 # ## Sparse regression
@@ -42,8 +33,8 @@ data = synthetic_dataset("giesekus", {"alpha": 0.2}, noise=0.01, n_samples=51)
 # The candidate terms are the eight tensors of the integrity basis with constant coefficients.
 
 # %%
-sparse = TensorSINDy(max_terms=2).fit(data.runs)
-sparse.result_
+sparse = dc.TensorSINDy(max_terms=2).fit(data)
+sparse
 
 # %% [markdown]
 # ## A neural network inside the differential equation
@@ -51,17 +42,17 @@ sparse.result_
 # The quick setting: fewer steps than the default.
 
 # %%
-network = TBNNUDE(quick=True).fit(data.runs)
-network.result_
+network = dc.TBNNUDE(quick=True).fit(data)
+network
 
 # %% [markdown]
 # Projected onto the library, its law is an expression like the other one.
 
 # %%
-network.result_.sympy()
+network.equation_.sympy()
 
 # %%
-print(sparse.result_.latex())
+print(sparse.equation_.latex())
 
 # %% [markdown]
 # ## Start-up, which neither saw
@@ -71,7 +62,7 @@ print(sparse.result_.latex())
 # %%
 times = np.linspace(0.0, 10.0, 101)
 fluids = {"truth": data.truth, "sparse": sparse.fluid_, "network": network.fluid_}
-stresses = {name: simulate(fluid, start_up(2.0), times) for name, fluid in fluids.items()}
+stresses = {name: dc.simulate(fluid, dc.start_up(2.0), times) for name, fluid in fluids.items()}
 figure, axes = plt.subplots(1, 3, figsize=(10, 3), layout="constrained")
 for (name, s), line in zip(stresses.items(), ("-", "--", ":"), strict=True):
     axes[0].plot(times, s.shear_stress, line, label=name)
@@ -94,5 +85,5 @@ def relative_error(name, quantity):
 pd.DataFrame({n: {q: relative_error(n, q) for q in quantities} for n in ("sparse", "network")})
 
 # %% [markdown]
-# `discover compare study.toml` does all this for a study file, with rivals, twins and what to measure
-# next; `discover.comparison.compare` returns the same as an object that shows itself here.
+# `dc.compare([sparse, network], test)` does all this and says what is not determined and what to
+# measure next; `discover compare study.toml` writes it as a page.

@@ -29,6 +29,8 @@ import pysindy as ps
 from scipy.integrate import solve_ivp
 from scipy.linalg import null_space
 
+import discover as dc
+
 ALPHA = 0.3
 times = np.linspace(0.0, 12.0, 1201)
 rates = [lambda t: 2.0 * np.cos(t), lambda t: 4.0 * np.cos(2.0 * t), lambda t: 3.0 + 0.0 * t]
@@ -99,17 +101,15 @@ pd.Series(mobilities(free), name="should all be −0.3").round(3).to_frame()
 # needs cvxpy: `pip install "discover-rheology[cvxpy]"`.
 
 # %%
-from discover.first_use import enable_x64
-
-enable_x64()
-
 import jax
 import jax.numpy as jnp
 
-from tensor_library import build_library, rate_of_deformation, upper_convected_production
+jax.config.update("jax_enable_x64", True)
+
+from tensor_library import rate_of_deformation, upper_convected_production
 
 KEPT = ["sigma", "gammadot", "sigma.sigma", "sigma.gammadot+gammadot.sigma"]
-library = build_library(KEPT, degree=0)
+library = dc.build_library(KEPT, degree=0)
 
 
 def tensors(state):

@@ -24,29 +24,19 @@
 import matplotlib.pyplot as plt
 import pandas as pd
 
-from discover.compilation_cache import enable_compilation_cache
-from discover.first_use import enable_x64
+import discover as dc
 
-enable_x64()
-enable_compilation_cache()
-
-from discover.identify import analyse_structure
-from discover.learners.tensor_sindy import TensorSINDy
-from discover.protocols import oscillatory_shear
-from discover.simulate import synthetic_dataset
-from tensor_library import LawTerms, TermLibrary, build_library, parse_term
-
-flows = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1, 2) for de in (0.5, 1)}
+flows = {f"laos_{wi:g}_{de:g}": dc.oscillatory_shear(wi, de) for wi in (1, 2) for de in (0.5, 1)}
 
 
 def measure(noise):
-    return synthetic_dataset(
+    return dc.synthetic_dataset(
         "ptt_linear", {"epsilon": 0.2}, protocol=flows, noise=noise, n_samples=65, duration=8.0
     )
 
 
 extra = ("tr(sigma)*sigma", "tr(sigma)*gammadot", "tr(sigma.gammadot)*I")
-library = TermLibrary((*build_library().terms, *map(parse_term, extra)))
+library = dc.build_library(extra=extra)
 library.names
 
 # %% [markdown]
@@ -58,7 +48,7 @@ library.names
 
 # %%
 data = measure(0.05)
-model = TensorSINDy(library, max_terms=3).fit(data)
+model = dc.TensorSINDy(library, max_terms=3).fit(data)
 model.result_.path_table()
 
 # %%
@@ -77,7 +67,7 @@ plt.show()
 # %% [markdown]
 # ## Four rules
 #
-# `evidence` asks how probable the records are under a law, all its constants considered, `held_out`
+# `evidence` asks how probable the data are under a law, all its constants considered, `held_out`
 # how well it predicts other runs, `one_standard_error` for the simplest that predicts them nearly as
 # well. `pysindy` is the sparse optimiser on its own, at its default threshold. If they agree, the choice does not depend on the
 # rule. If they do not, trust none of them alone, and find out why they differ. Here `held_out`
@@ -121,7 +111,7 @@ model.result_.rivals_table()
 # %%
 lines = []
 for noise in (0.01, 0.05, 0.2, 0.5):
-    noisy = model if noise == 0.05 else TensorSINDy(library, max_terms=3).fit(measure(noise))
+    noisy = model if noise == 0.05 else dc.TensorSINDy(library, max_terms=3).fit(measure(noise))
     found = noisy.result_.table()
     laws = [rival["support"] for rival in noisy.result_.details["rivals"]]
     lines.append(
@@ -147,15 +137,14 @@ pd.DataFrame(lines)
 # they change the normal stresses.
 
 # %%
-law = LawTerms.of(model.terms_)
-structure = analyse_structure(list(data), library, nominal={"the law found": law})
+structure = dc.identify.analyse_structure(data, library, nominal={"the law found": model.terms_})
 structure
 
 # %%
 structure.laws[-1]
 
 # %% [markdown]
-# So the choice among laws that σ12 tells apart is a matter of noise, and the rules above settle it
+# Among laws that differ in σ12 the choice depends on the noise; the rules above settle it
 # or say that they cannot. The choice along an unseen combination is a matter of what was measured:
 # more σ12 will never settle it; one run with N2 may. The notebook `identifiability` goes on from
 # here.

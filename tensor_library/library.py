@@ -18,7 +18,7 @@ from tensor_library.algebra import (
     scalar_invariants,
 )
 from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm
-from tensor_library.terms import CandidateTerm
+from tensor_library.terms import CandidateTerm, parse_term
 
 N_INVARIANTS = len(INVARIANT_NAMES)
 
@@ -178,6 +178,7 @@ def build_library(
     closed_forms: Sequence[str] = (),
     invariants: Sequence[str] | None = None,
     closed_form_tensors: Sequence[str] = ("sigma",),
+    extra: Sequence[str] = (),
 ) -> TermLibrary:
     """Return the library of tensors × invariant monomials up to a degree, plus closed forms.
 
@@ -194,6 +195,8 @@ def build_library(
         simple shear (tr γ̇³ vanishes there, and no shear experiment can see it).
     closed_form_tensors
         Tensors that the closed forms multiply.
+    extra
+        Further terms in canonical spelling, such as ``tr(sigma)*sigma``.
 
     Raises
     ------
@@ -238,4 +241,5 @@ def build_library(
         for form in closed_forms
         for tensor in closed_form_tensors
     ]
+    terms += map(parse_term, extra)
     return TermLibrary(tuple(dict.fromkeys(terms)))

@@ -38,6 +38,8 @@ class Constant:
     @property
     def symbol(self) -> str:
         """Letter of the field, such as α."""
+        if "sigma" in self.name or "gammadot" in self.name:  # a term of the library
+            return readable(self.name)
         name = self.name.rpartition(".")[2]
         return readable(_SYMBOLS.get(name, name).replace("_", " "))
 
@@ -70,16 +72,21 @@ class Constant:
         return text.replace("-", _MINUS)
 
     @property
-    def text(self) -> str:
-        """Symbol, value and interval."""
-        if not self.determined:
-            return f"{self.symbol} not determined"
-        return f"{self.symbol} = {self.number}{self._ends}"
+    def has_interval(self) -> bool:
+        """Whether it was fitted, so that its value is uncertain."""
+        return self.determined and self.ci95 is not None and self.ci95[0] < self.ci95[1]
 
     @property
-    def _ends(self) -> str:
-        known = self.ci95 is not None and self.ci95[0] < self.ci95[1]
-        return f" (95 %: {self.interval})" if known else ""
+    def text(self) -> str:
+        """Symbol, value and interval."""
+        return self.with_interval("95 %: ")
+
+    def with_interval(self, level: str) -> str:
+        """Return symbol, value and interval, with what stands before the interval."""
+        if not self.determined:
+            return f"{self.symbol} not determined"
+        ends = f" ({level}{self.interval})" if self.has_interval else ""
+        return f"{self.symbol} = {self.number}{ends}"
 
 
 _MINUS = "−"
@@ -111,13 +118,17 @@ class Suspect:
     """Effect of the instrument or of the flow, which is no part of the fluid."""
 
     effect: str  # name as studies spell it
-    constants: tuple[Constant, ...] = ()  # its constants with their intervals
+    constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
 
     @property
     def text(self) -> str:
-        """Name and constants."""
-        constants = ", ".join(one.text for one in self.constants)
-        return f"{effect_title(self.effect)}{f', {constants}' if constants else ''}"
+        """Name and amplitude, with its interval."""
+        title = effect_title(self.effect)
+        if not self.constants:
+            return title
+        amplitude = self.constants[0]
+        size = amplitude.with_interval("95 %: ").removeprefix(f"{amplitude.symbol} ")
+        return f"{title} {size.removeprefix('= ')}"
 
 
 @dataclass(frozen=True)
@@ -187,6 +198,9 @@ class Answer:
     `discrepancy`: size of what it leaves beside noise; None where unknown.
     `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
     `equation`: law written out; None where it cannot be.
+    `shown`: law as a page shows it where it cannot be written out, constants that differ from mode
+        to mode at their mean.
+    `classical`: law of the field to take instead where the law cannot be written out.
     `written`: a law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX
         alone).
     `alternative`: what comes next to this law, one short sentence; empty where it is settled.
@@ -218,6 +232,8 @@ class Answer:
     next_test: str = ""  # what to measure next, one sentence without *Next:*
     suspects: tuple[Suspect, ...] = ()  # effects of the instrument that were found or are suspected
     equation: Equation | None = field(default=None, repr=False)
+    shown: Equation | None = field(default=None, repr=False)
+    classical: Equation | None = field(default=None, repr=False)
     written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""  # a test that the law failed, one short sentence; empty where none
     alternative: str = ""

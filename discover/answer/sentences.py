@@ -1,5 +1,6 @@
 """Sentences of an answer: at most sixty words on a first screen."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from discover.words import counted, listed, percent_of, significant
@@ -30,16 +31,23 @@ def law(answer: Any) -> str:
     title = answer.title[:1].upper() + answer.title[1:]
     # of a sum without a name the table has the constants
     own = answer.constants if answer.law is not None else ()
-    named = [one.text for one in own if one.name not in _OF_MODES][:_MOST_CONSTANTS]
-    if len(answer.modes) > 1:
+    several = len(answer.modes) > 1
+    own = [one for one in own if not several or one.name not in _OF_MODES]
+    own = sorted(own, key=lambda one: one.name in _OF_MODES)
+    named = constants(own[:_MOST_CONSTANTS])
+    if several:
         named.append(counted(len(answer.modes), "mode"))
-    elif len(named) < _MOST_CONSTANTS:
-        named += [one.text for one in own if one.name in _OF_MODES]
-    if len(answer.modes) == 1 and not named and not _is_plain(answer):
+    elif answer.modes and not named and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     return f"{', '.join([title, *named])}."
+
+
+def constants(several: Sequence[Any]) -> list[str]:
+    """Return constants in words; the first interval says that it is one of 95 %."""
+    first = next((one for one in several if one.has_interval), None)
+    return [one.with_interval("95 %: " if one is first else "") for one in several]
 
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
@@ -56,7 +64,8 @@ def description(answer: Any) -> str:
         return "" if answer.error is None else f"Misfit {percent_of(answer.error)}."
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
-    text = f"Describes {flows(answer)} to {size} (95 %: {low}–{high})"
+    ends = f" (95 %: {low}–{high})" if low != high else ""
+    text = f"Describes {flows(answer)} to {size}{ends}"
     return f"{text} plus {noise} noise." if noise else f"{text}."
 
 

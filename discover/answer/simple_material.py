@@ -19,6 +19,7 @@ from scipy.stats import t as student
 
 from discover.answer.answer import Constant
 from discover.dataset import Run
+from discover.equations.formats.rheotool import viscous_fluid
 from discover.inference.engine.inelastic import viscosity
 from discover.protocols.kinematics import MODULI
 from discover.statistics.noise.noise_model import rms
@@ -52,7 +53,7 @@ class SimpleMaterial:
     """Material without relaxation, as recognised.
 
     `kind`, `title`, `law`: what it is, the name for readers, and that in results.
-    `latex`, `python`: law written out.
+    `formula`, `latex`: law typeset, without and with its numbers.
     """
 
     kind: Kind
@@ -60,8 +61,35 @@ class SimpleMaterial:
     law: str
     constants: tuple[Constant, ...]  # with 95 % intervals
     error: float  # relative misfit of the fitted runs
+    formula: str
     latex: str
-    python: str
+
+    def written(self, comments: Sequence[str], slowest: float, density: float) -> dict[str, str]:
+        """Return the law as text by format, with lines of comment in front.
+
+        `slowest`: rate in 1/s below which nothing was measured. `density` in kg/m³.
+        """
+        numbers = [f"{one.value:.6g}" for one in self.constants]
+        found = {
+            "python": "".join(f"# {line}\n" for line in comments)
+            + f"\n{_PYTHON[self.law](numbers)}",
+            "latex": "".join(f"% {line}\n" for line in comments) + f"\\[{self.latex}\\]\n",
+        }
+        if self.law in _RHEOTOOL:
+            kind, names = _RHEOTOOL[self.law]
+            entries = {
+                name: (quantity, one.value)
+                for (name, quantity), one in zip(names, self.constants, strict=True)
+            }
+            if self.kind == "yield_stress":
+                # rheoTool wants a largest viscosity: that of a tenth of the slowest rate
+                at = 0.1 * slowest
+                yield_stress, consistency, index = (one.value for one in self.constants)
+                largest = (yield_stress + consistency * at**index) / at
+                entries["eta0"] = "viscosity", float(f"{largest:.3g}")
+                comments = [*comments, f"eta0 caps the viscosity below {at:.3g} 1/s."]
+            found["rheotool"] = viscous_fluid(kind, entries, comments, density)
+        return found
 
     def predict(self, run: Run) -> Float[np.ndarray, " n"] | None:
         """Return what it records in a run; None in a flow that it does not describe."""
@@ -329,6 +357,27 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
 }
 
 
+_RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
+    "newtonian": ("Newtonian", (("eta", "viscosity"),)),
+    # k has the dimensions of a viscosity there, its rate being counted in 1/s
+    "herschel_bulkley": (
+        "HerschelBulkley",
+        (("tau0", "stress"), ("k", "viscosity"), ("n", "number")),
+    ),
+    "carreau_yasuda": (
+        "CarreauYasuda",
+        (
+            ("eta0", "viscosity"),
+            ("etaInf", "viscosity"),
+            ("k", "time"),
+            ("n", "number"),
+            ("a", "number"),
+        ),
+    ),
+}
+"""rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]."""
+
+
 def _material(law: str, fit: _Fit) -> SimpleMaterial:
     spread = np.exp(np.outer(fit.quantile * fit.deviation, (-1.0, 1.0)))
     return material_of(law, fit.values, fit.values[:, None] * spread, fit.error)
@@ -343,7 +392,5 @@ def material_of(
         Constant(name, float(value), (float(low), float(high)), unit)
         for (name, unit), value, (low, high) in zip(names, values, ci95, strict=True)
     )
-    numbers = [f"{value:.6g}" for value in values]
-    return SimpleMaterial(
-        kind, title, law, constants, error, _LATEX[law](numbers), _PYTHON[law](numbers)
-    )
+    latex = _LATEX[law]([f"{value:.6g}" for value in values])
+    return SimpleMaterial(kind, title, law, constants, error, latex.partition(", ")[0], latex)

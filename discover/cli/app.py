@@ -64,6 +64,8 @@ def main() -> None:
     sys.stdout, sys.stderr = heard_or_not(sys.stdout), heard_or_not(sys.stderr)
     keep_out_of_the_working_directory()
     warnings.formatwarning = _one_line
+    # numbers that overflow in a trial: the search goes on, and a user cannot act on it
+    warnings.simplefilter("ignore", RuntimeWarning)
     use_one_thread_from_the_start()
     use_the_processor_from_the_start()
     with obeying_interrupts():

@@ -257,6 +257,6 @@ ToleranceOption = Annotated[
         "--tolerance",
         min=0.0,
         max=1.0,
-        help="Relative discrepancy that is good enough, in place of the study's; default: 0.05.",
+        help="Relative misfit that you accept; default: the study's, or 0.05.",
     ),
 ]

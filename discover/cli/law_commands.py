@@ -11,6 +11,7 @@ from discover.cli.console import (
     JsonOption,
     OverwriteOption,
     QuietOption,
+    ToleranceOption,
     guarded,
     progress_bar,
     say,
@@ -18,9 +19,24 @@ from discover.cli.console import (
 from discover.errors import InputError
 
 
+def _laws_like(incomplete: str) -> list[str]:
+    from discover.laws.registry import LAWS
+
+    return [name for name in LAWS if name.startswith(incomplete)]
+
+
+def _formats_like(incomplete: str) -> list[str]:
+    from discover.equations.files import FORMATS
+
+    return [name for name in FORMATS if name.startswith(incomplete)]
+
+
 @guarded
 def fit(
-    law: Annotated[str, typer.Argument(help="Name of the law; see: discover laws.")],
+    law: Annotated[
+        str,
+        typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like),
+    ],
     data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
     held_out: Annotated[
         list[str] | None, typer.Option("--held-out", help="Run that only tests the fit.")
@@ -43,6 +59,7 @@ def fit(
     quiet: QuietOption = False,
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
+    tolerance: ToleranceOption = None,
 ) -> None:
     """Fit one named law: constants, intervals, correlation, and how well it describes the runs."""
     from discover.compilation_cache import enable_compilation_cache
@@ -66,6 +83,7 @@ def fit(
         fixed=numbers[1],
         effects={"solvent_viscosity": "fit"} if solvent else None,
         held_out=held_out or (),
+        **({} if tolerance is None else {"tolerance": tolerance}),
     )
     if out is not None:
         _write(found, out, overwrite)
@@ -124,11 +142,17 @@ def export(
         ),
     ],
     form: Annotated[
-        str, typer.Option("--format", "-f", help="python, sympy, latex, json, rheotool or ufl.")
+        str,
+        typer.Option(
+            "--format",
+            "-f",
+            help="python, sympy, latex, json, rheotool or ufl.",
+            autocompletion=_formats_like,
+        ),
     ] = "python",
     law: Annotated[
         str | None,
-        typer.Option("--law", help="Learner whose law to write; default: the sparse one."),
+        typer.Option("--law", help="Learner whose law to write; default: the law of the answer."),
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="File to write; default: standard output.")
@@ -149,6 +173,7 @@ def export(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file.")] = False,
 ) -> None:
     """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
+    from discover.answer.exported import simple_material_text
     from discover.equations.files import choose_law, read_result_laws, write_equation
     from discover.errors import InputError
     from discover.first_use import enable_x64
@@ -159,8 +184,10 @@ def export(
     if tolerance is not None and math.isnan(tolerance):
         raise InputError("--tolerance must be a number from 0 to 0.5; got nan. Try 0.01.")
     enable_x64()
-    equation = choose_law(read_result_laws(results), law)
-    text = write_equation(equation, form, density, tolerance)
+    text = None if law is not None else simple_material_text(results, form, density)
+    if text is None:
+        equation = choose_law(read_result_laws(results), law)
+        text = write_equation(equation, form, density, tolerance)
     if out is None:
         # half a character in a title, which no terminal can show
         typer.echo(text.encode("utf-8", "backslashreplace").decode("utf-8"), nl=False)

@@ -306,6 +306,7 @@ class Comparison(PageView, SummaryView):
                 "law": None if self.known is None else equation_to_json(self.equation(name)),
                 "details": outcome.details,
             }
+        law = self.answer.equation or self.answer.classical
         posterior, content = (
             self.posterior,
             {
@@ -337,7 +338,9 @@ class Comparison(PageView, SummaryView):
                 },
             },
             "discrepancy": posterior.discrepancy,
+            "nearest_law": posterior.nearest_law,
             **posterior.answer.to_json(),
+            "answer_law": None if law is None else equation_to_json(law),
             "known_effects": [effect.text for effect in self.known_effects],
             "pipkin": {
                 who: [{"Wi": wi, "De": de, **row} for (wi, de), row in self.error_map(who).items()]

@@ -79,8 +79,8 @@ def _with_effect(
     terms = effect.as_terms([float(value) for value in values])
     if terms is None:
         raise InputError(
-            f"compare cannot take {known.name} as known: what it adds to the law is no sum of "
-            f"library terms. {ONLY_LOOP}"
+            f"compare cannot take {known.name} as known: what it adds to the law is not a sum "
+            f"of library terms. {ONLY_LOOP}"
         )
     law = declared.law
     for term in terms:
@@ -178,7 +178,7 @@ def corrected(
         if np.max(row) > _POINTWISE:
             raise InputError(
                 f"compare cannot take {known.name} as known: it mixes the stress of earlier times "
-                f"into the record, which cannot be undone in noise. {ONLY_LOOP}"
+                f"into the signal, and noise prevents undoing that. {ONLY_LOOP}"
             )
     found, made = {}, {}
     moves = any(isinstance(known.effect, KinematicEffect) for known in effects)

@@ -61,7 +61,7 @@ def _table(raw: bytes, name: str) -> tuple[dict[str, str], np.ndarray]:
     try:
         return {key: value for key, _, value in parts}, np.array(rows[data:], dtype=float)
     except ValueError:
-        raise InputError(f"{name} is no table of numbers, though its hash is right.") from None
+        raise InputError(f"{name} is not a table of numbers, though its hash is right.") from None
 
 
 def _number(header: Mapping[str, str], key: str, name: str) -> float:

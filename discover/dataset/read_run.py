@@ -314,7 +314,7 @@ def _begun(run: Run, test: DeclaredTest, where: str) -> Run:
     if missing > _NEXT_SAMPLE * np.max(np.diff(run.time)):
         raise InputError(
             f"{where} declares a periodic start, but {run.name} lasts {np.ptp(run.time):.3g} s, "
-            f"less than one period ({period:.3g} s), so nobody can say what came before. Give a "
+            f"less than one period ({period:.3g} s), so the state before it is unknown. Give a "
             "whole cycle."
         )
     protocol = run.protocol

@@ -27,7 +27,7 @@ def run_line(run: Run) -> dict[str, Any]:
     flow = _flow(run)
     wave = oscillation(run) if flow in (_VARYING, "given stress") else None
     if wave and flow == _VARYING:
-        flow = "oscillation" if run.from_rest else "steady alternation"
+        flow = "oscillation" if run.from_rest else "periodic steady state"
     normal = (run.first_normal_stress_difference, run.second_normal_stress_difference)
     return {
         "run": run.name,
@@ -117,6 +117,8 @@ def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
         values = (run.metadata.get(key) for key in _TEMPERATURE)
         temperatures += [round(v, 0) for v in values if isinstance(v, int | float)][:1]
     parts = [material] if material else list(dict.fromkeys(names))
+    if len(parts) > 2:  # names of fillings or files, which say nothing in a title
+        parts = [f"{len(parts)} samples"]
     spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(set(temperatures))]
     if len(spelled) > 2:
         spelled = [f"{spelled[0]} to {spelled[-1]}"]

@@ -1,9 +1,9 @@
 """Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool; and back."""
 
 from discover.equations.equation import Box, Equation, HasEquation, Tested
-from discover.equations.files import FORMATS, write_equation
+from discover.equations.files import FORMATS, read_result_laws, write_equation
 from discover.equations.formats.json_format import equation_from_json, equation_to_json
-from discover.equations.formats.rheotool import read_rheotool
+from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.parts import (
     AugmentedLaw,
     NamedPart,
@@ -29,6 +29,7 @@ __all__ = [
     "equation_to_json",
     "law_parts",
     "law_terms",
+    "read_result_laws",
     "read_rheotool",
     "write_equation",
 ]

@@ -252,8 +252,10 @@ def flow_numbers(
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:
         flowing = np.abs(shear_rate) > 0
-        turned = np.flatnonzero(np.diff(np.sign(shear_rate[flowing])))
-        at = times[flowing][turned]
+        rate, time = shear_rate[flowing], times[flowing]
+        turned = np.flatnonzero(np.diff(np.sign(rate)))
+        share = rate[turned] / (rate[turned] - rate[turned + 1])  # of the step, up to the zero
+        at = time[turned] + share * (time[turned + 1] - time[turned])
         frequency = 1.0 / length
         if at.size >= 2:
             frequency = np.pi * (at.size - 1) / float(at[-1] - at[0])

@@ -19,8 +19,8 @@ from discover.plain_numbers import json_text, parse_json
 from discover.words import unknown_name
 
 COMPARISON, LOOP, BATCH = "comparison.json", "loop.json", "batch.json"
-AUGMENTED = "augmented"
-"""Name of the law of a closed loop."""
+AUGMENTED, NEAREST, ANSWER = "augmented", "nearest_law", "answer"
+"""Names of the law of a closed loop, of a classical one in its place, of a comparison's answer."""
 
 
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
@@ -29,12 +29,20 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     `folder`: what ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
     Raises InputError if there is no result, it is damaged, or its law cannot be written out.
     """
+    return _laws(*read_result(folder))
+
+
+def read_result(folder: str | Path) -> tuple[Any, str]:
+    """Return what the JSON file in a folder of results holds, and the name of the file.
+
+    `folder`: as for `read_result_laws`. Raises InputError if there is none, or it is no JSON.
+    """
     path = Path(folder)
     if path.suffix == ".json":
-        return _laws(read_json(path), path.name)
+        return read_json(path), path.name
     for name in (COMPARISON, LOOP):
         if os.path.isfile(path / name):  # Path.is_file raises where a name is too long
-            return _laws(read_json(path / name), name)
+            return read_json(path / name), name
     if os.path.isfile(path / BATCH):
         raise InputError(
             f"{path} holds a batch. Give the folder of one study in it, such as {path / 'STUDY'}."
@@ -46,9 +54,9 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
 
 
 def choose_law(laws: dict[str, Equation], name: str | None = None) -> Equation:
-    """Return the law of this name; without one the sparse learner's, or the only one."""
+    """Return the law of this name; without one that of the answer, or of the sparse learner."""
     if name is None:
-        return laws.get("tensor_sindy") or next(iter(laws.values()))
+        return laws.get(ANSWER) or laws.get("tensor_sindy") or next(iter(laws.values()))
     if name not in laws:
         raise InputError(f"There is no law {name!r} in these results; write {' or '.join(laws)}.")
     return laws[name]
@@ -57,8 +65,11 @@ def choose_law(laws: dict[str, Equation], name: str | None = None) -> Equation:
 def _laws(content: Any, where: str) -> dict[str, Equation]:
     old = f"{where} holds no law: it was written before laws were kept. Run again with --overwrite."
     if not isinstance(content, dict):
-        raise InputError(f"{where} is no result of discover. Run again with --overwrite.")
+        raise InputError(f"{where} is not a result of discover. Run again with --overwrite.")
     if "law" in content or "law_missing" in content:
+        near = content.get("nearest_law")
+        if content.get("law") is None and isinstance(near, dict) and near.get("equation"):
+            return {NEAREST: equation_from_json(near["equation"], f"{where}: nearest_law")}
         if content.get("law") is None:
             raise InputError(" ".join(str(content.get("law_missing") or old).split())[:500])
         return {AUGMENTED: equation_from_json(content["law"], f"{where}: law")}
@@ -72,6 +83,8 @@ def _laws(content: Any, where: str) -> dict[str, Equation]:
     }
     if not laws:
         raise InputError(old)
+    if content.get("answer_law") is not None:
+        laws[ANSWER] = equation_from_json(content["answer_law"], f"{where}: answer_law")
     return laws
 
 

@@ -87,7 +87,7 @@ class NamedPart:
         written = LAWS[self.law].written
         if written is None:
             raise InputError(
-                f"Nobody said how the law {self.law!r} is written, so it cannot be exported in "
+                f"The law {self.law!r} has no written form, so it cannot be exported in "
                 "this format. Give register_law its `written`, or use --format json."
             )
         return written()
@@ -129,7 +129,7 @@ class StatePart:
         written = self.own.written()
         if written is None:
             raise InputError(
-                f"Nobody said how the state of the effect {self.effect!r} is written, so the law "
+                f"The state of the effect {self.effect!r} has no written form, so the law "
                 "cannot be written out. Give its class the method `written`."
             )
         return written
@@ -168,7 +168,7 @@ def law_terms(law: AbstractConstitutiveLaw) -> tuple[LawTerm, ...]:
     terms = law.as_terms()
     if terms is None:
         raise InputError(
-            f"A law of the kind {type(law).__name__} is no sum of library terms, so it cannot be "
+            f"A law of the kind {type(law).__name__} is not a sum of library terms and cannot be "
             "written out. Register it under a name with dc.register_law, or give the class the "
             "method as_terms if it is such a sum."
         )
@@ -183,7 +183,7 @@ def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[LawTer
     terms = effect.as_terms([float(value) for value in values])
     if terms is None:
         raise InputError(
-            f"What the effect {effect.name!r} adds is no sum of library terms, so the law cannot "
+            f"What the effect {effect.name!r} adds is not a sum of library terms, so it cannot "
             "be written out. Its equation and parameters are in loop.json and equations.tex."
         )
     return terms
@@ -234,7 +234,7 @@ class AugmentedLaw(AbstractExtendedLaw):
     def split(self) -> tuple[AbstractConstitutiveLaw, tuple[LawTerm, ...]]:
         """Return the declared law, and the terms of the effects.
 
-        Raises InputError if what an effect adds is no sum of library terms.
+        Raises InputError if what an effect adds is not a sum of library terms.
         """
         core, terms = self.base.split()
         return core, terms + self._added_terms()

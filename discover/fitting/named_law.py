@@ -1,12 +1,14 @@
 """Least-squares fit of one named law, within bounds, from several starts."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import qmc
 
+from discover.answer import TOLERANCE
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
@@ -24,6 +26,8 @@ from discover.plain_numbers import as_number, as_whole_number
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
+from discover.study.schema import Verdict
+from discover.validation import validated
 from discover.words import did_you_mean, unknown_name
 
 _STARTS = 8
@@ -48,6 +52,7 @@ def fit(
     held_out: HeldOut = (),
     noise: float | None = None,
     most_samples: int = MOST_SAMPLES,
+    tolerance: float = TOLERANCE,
 ) -> NamedLawFit:
     """Fit one named law to runs.
 
@@ -78,6 +83,8 @@ def fit(
         Relative noise of the runs, where known.
     most_samples
         Samples of a run that are used, at most.
+    tolerance
+        Relative discrepancy that is good enough.
 
     Returns
     -------
@@ -98,6 +105,7 @@ def fit(
         raise InputError(unknown_name("law", law, LAWS))
     if held_out == "each":
         raise InputError("fit has no held_out='each'. Name runs, or use close_loop.")
+    tolerance = validated(Verdict, {"tolerance": tolerance}, "fit()").tolerance
     bounds, start, fixed = (
         _numbers(name, given, count)
         for name, given, count in (("bounds", bounds, 2), ("start", start, 1), ("fixed", fixed, 1))
@@ -147,6 +155,7 @@ def fit(
         best.theta,
         declared_law(forward, best.theta, {}),
         data.name,
+        tolerance,
     )
 
 
@@ -203,6 +212,11 @@ def _declared(
         fluid = Fluid(built, *((estimate | start | fixed)[name] for name in MODE_CONSTANTS))
     else:
         fluid = Fluid.from_sweep(data.linear_sweep, built)
+    if (effects or {}).get("solvent_viscosity") == "fit":
+        # the effect is added to the fluid's own, and what is fitted is the whole
+        errors = fluid.modulus_covariance
+        own = None if errors is None else errors[: fluid.n_modes, : fluid.n_modes]
+        fluid = replace(fluid, solvent_viscosity=0.0, modulus_covariance=own)
     asked = [name for name in MODE_CONSTANTS if one_mode or name in bounds or name in start]
     if not one_mode and fixed.keys() & set(MODE_CONSTANTS):
         raise InputError("Modes come from base or the linear sweep; they cannot be fixed here.")

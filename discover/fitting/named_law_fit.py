@@ -10,19 +10,19 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.stats import t as student
 
+from discover.answer import QUANTITIES, TOLERANCE, Answer, Discrepancy, Mode
+from discover.answer import Constant as Fitted
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
-from discover.equations.equation import mean_relaxation_time
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
+from discover.loop.answering import measured, range_of
 from discover.loop.run_record import RunRecord
 from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
-
-_LABELS = {"modulus_Pa": "G", "relaxation_time_s": "λ"}
 
 
 @dataclass(frozen=True)
@@ -49,17 +49,6 @@ class Constant:
         """Whether it lies at an end of its range, so that the range and not the data set it."""
         margin = 1e-6 * (self.high - self.low if np.isfinite(self.high - self.low) else 1.0)
         return self.value - self.low <= margin or self.high - self.value <= margin
-
-    def estimate(self, low: float, high: float) -> str:
-        """Return name, value and interval in words, to as many digits as the interval has."""
-        digits = 3 if high <= low else max(0, 1 - int(np.floor(np.log10(0.5 * (high - low)))))
-        label = _LABELS.get(self.name, self.name.rpartition(".")[2].replace("_", " "))
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        value, *ends = (
-            f"{number:.{digits}f}" if digits < 6 and abs(number) < 1e6 else f"{number:.4g}"
-            for number in (self.value, low, high)
-        )
-        return f"{label} = {value}{unit} (95 %: {ends[0]} to {ends[1]})"
 
     def interval(self, quantile: float) -> tuple[float, float]:
         """Return the ends of an interval of so many standard errors, inside the range."""
@@ -100,6 +89,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
         The law as an equation; None where it cannot be written out.
     title
         Name of the data.
+    tolerance
+        Relative discrepancy that is good enough.
     """
 
     law: str
@@ -114,6 +105,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
     theta: Float[np.ndarray, " all"]
     written: Equation | None = None
     title: str = ""
+    tolerance: float = TOLERANCE
 
     _page: ClassVar[str] = "discover.report.in_memory:fit_page"
 
@@ -186,43 +178,63 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
             raise InputError(f"{LAWS[self.law].title} cannot be written out as an equation.")
         return replace(self.written, solvent_viscosity=float(self.fluid.solvent_viscosity))
 
-    @property
-    def use(self) -> dict[str, Any]:
-        """What a simulation needs: the law, its constants, modes, range and expected error."""
-        rates = [float(np.max(np.abs(one.rate))) for one in self.records]
-        strains = [float(np.nanmax(np.abs(one.strain))) for one in self.records]
+    @cached_property
+    def answer(self) -> Answer:
+        """The law with its constants, how well it describes the runs, and where."""
+        equation = self.written and self.equation()
+        law = LAWS[self.law]
+        size = self.misfit.misfit
+        by_run = {one.name: float(one.errors[0]) for one in self.records if not one.held_out}
+        exact = self.fits_to_the_noise or not np.isfinite(size)
+        expected = {name: measured(self.records, name) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
-        ends = self.conf_int()
-        return {
-            "law": self.law,
-            "constants": {
-                constant.name: {
-                    "value": constant.value,
-                    "ci95": [float(end) for end in ends.loc[constant.name]],
-                    "unit": constant.unit,
-                }
-                for constant in self.constants
-            },
-            "modes": [
-                {"modulus_Pa": float(modulus), "relaxation_time_s": float(time)}
-                for modulus, time in zip(*modes, strict=True)
-            ],
-            "solvent_viscosity_Pa_s": float(self.fluid.solvent_viscosity),
-            "range": {
-                "weissenberg": max(rates) * mean_relaxation_time(*modes),
-                "strain": max(strains) if np.isfinite(strains).all() else None,
-                "rate_1_s": max(rates),
-            },
-            "expected_error": {
-                "sigma12": self.error if self.held_out_error is None else self.held_out_error
-            },
-        }
+        answer = Answer(
+            law.title,
+            self.law,
+            tuple(
+                Fitted(one.name, one.value, (float(low), float(high)), one.unit)
+                for one, (low, high) in zip(self.constants, self.conf_int().to_numpy(), strict=True)
+            ),
+            tuple(Mode(float(modulus), float(time)) for modulus, time in zip(*modes, strict=True)),
+            float(self.fluid.solvent_viscosity),
+            self.error,
+            self.misfit.noise,
+            self.fits_to_the_noise,
+            None if exact else Discrepancy(size, (size, size), by_run),
+            range_of(self.records, equation),
+            {name: one for name, one in expected.items() if one is not None},
+            failed=self._caveats(),
+            tolerance=self.tolerance,
+        )
+        if equation is None:
+            return answer
+        return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+    def _caveats(self) -> str:
+        """Return what a reader of the intervals has to know."""
+        said = []
+        if not self.fits_to_the_noise:
+            said.append("The misfit is systematic; the intervals hold the noise only.")
+        bound = [one.name for one in self.constants if one.at_bound]
+        if bound:
+            said.append(f"At an end of its range: {', '.join(bound)}.")
+        return " ".join(said)
+
+    @property
+    def use(self) -> dict[str, Any] | None:
+        """What a simulation needs: the law, its constants, modes, range and expected error."""
+        return self.answer.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance."""
+        return self.answer.adequate
 
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``fit.json`` holds it."""
         return {
             "law": self.law,
-            "use": self.use,
+            **self.answer.to_json(),
             "adequate_to_the_noise": self.fits_to_the_noise,
             "error": {"fit": self.error, "held_out": self.held_out_error},
             "noise": self.misfit.noise,
@@ -234,21 +246,10 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
     @cached_property
     def text(self) -> str:
         """The fit in a few sentences."""
-        ends = self.conf_int()
-        constants = [
-            one.estimate(*map(float, interval))
-            for one, interval in zip(self.constants, ends.to_numpy(), strict=True)
-        ]
-        said = [f"{', '.join([LAWS[self.law].title, *constants])}."]
-        said.append(self.misfit.described)
-        if not self.fits_to_the_noise:
-            said.append("Intervals hold the noise only.")
+        said = [self.answer.headline, self.answer.failed]
         if self.held_out_error is not None:
-            said.append(f"Held-out runs: {percent_of(self.held_out_error)}.")
-        bound = [one.name for one in self.constants if one.at_bound]
-        if bound:
-            said.append(f"At an end of its range: {', '.join(bound)}.")
-        return " ".join(said)
+            said.insert(1, f"Held-out runs: {percent_of(self.held_out_error)}.")
+        return " ".join(filter(None, said))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.text}>"

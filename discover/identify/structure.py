@@ -41,7 +41,7 @@ from discover.learners.runs import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerms
+from tensor_library.law_terms import LawTerm, LawTerms
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -201,7 +201,7 @@ def analyse_structure(
     runs: Sequence[Run],
     library: TermLibrary,
     base: AbstractConstitutiveLaw | None = None,
-    nominal: Mapping[str, LawTerms] | None = None,
+    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
     modulus: Any = 1.0,
     relaxation_time: Any = 1.0,
     solvent_viscosity: float = 0.0,
@@ -220,7 +220,8 @@ def analyse_structure(
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:
         nominal = {k: v for k, v in NOMINAL.items() if set(v.coefficients) <= set(library.names)}
-    library = joint_library(library, list(nominal.values()))
+    laws = {k: v if isinstance(v, LawTerms) else LawTerms.of(v) for k, v in nominal.items()}
+    library = joint_library(library, list(laws.values()))
     modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
     runs = as_runs(runs, modes[1], base.linear_relaxation)
     known = Fluid(base, *modes, solvent_viscosity)
@@ -242,7 +243,7 @@ def analyse_structure(
     longest = max(map(len, runs))
     samples = np.arange(longest) < np.array([[len(run)] for run in runs])
     found = []
-    for name, law in {"the known part alone": LawTerms({}), **nominal}.items():
+    for name, law in {"the known part alone": LawTerms({}), **laws}.items():
         one = _at(known, flows, samples, library, name, law, ["sigma12", *also])
         if one is not None:
             found.append(one)

@@ -44,7 +44,7 @@ from discover.programs import compiled
 from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerms, spell
+from tensor_library.law_terms import LawTerm, LawTerms, spell
 from tensor_library.library import TermLibrary
 from tensor_library.terms import parse_term
 
@@ -114,7 +114,9 @@ class Twin(NotebookView):
 
 
 def find_twins(
-    library: TermLibrary, law: LawTerms, base: AbstractConstitutiveLaw | None = None
+    library: TermLibrary,
+    law: LawTerms | Sequence[LawTerm],
+    base: AbstractConstitutiveLaw | None = None,
 ) -> list[Twin]:
     """Return the twins of a law, simplest first, checked by simulation.
 
@@ -122,10 +124,12 @@ def find_twins(
     polynomial law on UCM), every exchange along a relation that vanishes in shear, and
     every combination that lives on σ33 only (where nothing in the law feels σ33).
 
-    `library`: candidate terms. `law`: the law, beyond the known part. `base`: the known part; by
+    `library`: candidate terms. `law`: the law, beyond the known part, such
+    as ``TensorSINDy.terms_``. `base`: the known part; by
     default UCM.
     """
     base = UpperConvectedMaxwell() if base is None else base
+    law = law if isinstance(law, LawTerms) else LawTerms.of(law)
     library = joint_library(library, [law])
     found: list[_Candidate] = []
     if isinstance(base, UpperConvectedMaxwell):

@@ -125,7 +125,7 @@ class EstimatorFile:
 
     def _other(self) -> InputError:
         return InputError(
-            f"{self._path} is no whole estimator of discover. Give a file that "
+            f"{self._path} is not a complete estimator file. Give a file that "
             "estimator.save(path) wrote; a law by itself is read elsewhere."
         )
 

@@ -118,7 +118,7 @@ def require_known_rate(known: KnownPart, runs: Sequence[Run]) -> None:
     for run in runs:
         if run.protocol.control not in FOLLOWED:
             raise InputError(
-                f"The run {run.name!r} has no rate that is known beforehand, and a learner does "
-                f"not solve for it beside {type(known.law).__name__}, which has more than a "
+                f"The run {run.name!r} has no known shear rate, and a learner cannot solve for "
+                f"it with {type(known.law).__name__}, which has variables besides the "
                 "stress. Leave the run out, or use close_loop, which takes it."
             )

@@ -119,7 +119,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
             intervals=[sampling_interval(run.time, run.protocol, run.quantity) for run in runs],
         )
         if found.verdict == "unexplained" and found.misfit <= ARITHMETIC:
-            return replace(found, verdict="explained", reason="what is left is arithmetic")
+            return replace(found, verdict="explained", reason="the rest is arithmetic")
         return found
 
     @property

@@ -14,23 +14,28 @@ from discover.answer import (
     Mode,
     Range,
     Suspect,
+    sentences,
 )
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
-from discover.equations import Equation
+from discover.equations import Equation, law_parts
+from discover.equations.formats.rheotool import DENSITY
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
-from discover.words import effect_title, effects_title, listed, percent_of, readable
+from discover.words import effect_title, effects_title, listed, percent_of
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
 
 _WORTH_SAYING = 0.05
 """Relative difference between laws that is told of a quantity that nothing tested."""
+
+_MUCH = 2.0
+"""Relative difference from which on its size says nothing."""
 
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
@@ -81,7 +86,7 @@ def loop_answer(result: Any) -> Answer:
         result.noise_floor,
         result.verdict in EXPLAINED,
         None if result.discrepancy is None else Discrepancy(**result.discrepancy),
-        _range(result, equation),
+        range_of(result.records, equation),
         _expected(result, title.partition(" with ")[0] if law else "this law"),
         following,
         tuple(
@@ -94,13 +99,38 @@ def loop_answer(result: Any) -> Answer:
         tolerance=result.tolerance,
     )
     if equation is None:
-        return answer
+        near = result.nearest_law
+        classical = None if near is None else near.equation
+        shown = _shown(result)
+        # what has no terms is typeset by itself, below the law that it is added to
+        added = [s.equation for s in result.stages if s.kind == "constitutive"]
+        written = {} if shown is not None else {"formula": "\n".join(added)}
+        return replace(
+            answer, shown=shown or result.declared_law, classical=classical, written=written
+        )
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+
+def _shown(result: Any) -> Equation | None:
+    """Return a law that cannot be written out as a page shows it: constants at the mean mode."""
+    fluid = result.fluid_at_mean if result.fluid is None else result.fluid
+    if fluid is None:
+        return None
+    try:
+        named, terms = law_parts(fluid.law)
+    except InputError:
+        return None
+    modulus, time = (tuple(map(float, one)) for one in (fluid.modulus, fluid.relaxation_time))
+    solvent = float(fluid.solvent_viscosity)
+    relaxes = fluid.law.linear_relaxation
+    return Equation(
+        terms, modulus, time, relaxes, solvent, named=named, states=tuple(result.states)
+    )
 
 
 def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
-    found = _range(result, None)
+    found = range_of(result.records)
     inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
     size = result.error_after.fit
@@ -119,11 +149,9 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         failed=_failed(result),
         tolerance=result.tolerance,
     )
-    head = "".join(f"# {line}\n" for line in answer.lines)
-    tex = "".join(f"% {line}\n" for line in answer.lines)
-    written = {"python": f"{head}\n{material.python}", "latex": f"{tex}\\[{material.latex}\\]\n"}
-    written["formula"] = material.latex.partition(", ")[0]
-    return replace(answer, written=written)
+    slowest = 0.0 if found.rate_1_s is None else found.rate_1_s[0]
+    written = material.written(answer.lines, slowest, DENSITY)
+    return replace(answer, written=written | {"formula": material.formula})
 
 
 def _failed(result: Any) -> str:
@@ -150,20 +178,21 @@ def _alternative(result: Any) -> str:
         return f"Probability {percent_of(own.probability)}{after}."
     if result.nearest_law is None:
         return ""
-    (name, values), size = result.nearest_law
-    rounded = {key: float(f"{value:.2g}") for key, value in values.items()}
-    return f"Best classical law: {readable(LAWS[name].described(rounded))}, to {percent_of(size)}."
+    near = result.nearest_law
+    constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
+    said = [LAWS[near.law].title, *sentences.constants(constants)]
+    return f"Best classical law: {', '.join(said)}, to {percent_of(near.size)}."
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
     """Return name, title and constants of the law."""
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
-    found: list[Constant] = list(_constants(result.declared_parameters))
+    found = list(_constants(result.declared_parameters))
     for stage in in_fluid:
-        found += _constants(stage.parameters, stage.left_open)
+        found += _renamed(stage.effect, _constants(stage.parameters, stage.left_open), found)
     for known in result.declared_effects:
         if known.kind == "constitutive":
-            found += _constants(known.parameters)
+            found += _renamed(known.effect, _constants(known.parameters), found)
     named = None if equation is None else named_law(equation)
     solvent = equation is not None and equation.solvent_viscosity > 0.0
     if named is None:
@@ -212,12 +241,25 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
     )
 
 
-def _range(result: Any, equation: Equation | None) -> Range:
-    """Return the flows of the fitted runs.
+def _renamed(
+    effect: str, constants: Sequence[Constant], taken: Sequence[Constant]
+) -> list[Constant]:
+    """Return constants of an effect: that of a library term has its name, and none has two."""
+    if "sigma" in effect or "gammadot" in effect:
+        first, *inner = constants
+        constants = [replace(first, name=effect), *inner]
+    names = [one.name for one in taken]
+    return [
+        replace(one, name=f"{effect}.{one.name}") if one.name in names else one for one in constants
+    ]
+
+
+def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> Range:
+    """Return the flows of the fitted runs, in numbers without units if the equation has them.
 
     Of a flow curve each sample has a rate of its own, of other runs the largest counts.
     """
-    fitted = [record for record in result.records if not record.held_out]
+    fitted = [record for record in records if not record.held_out]
     flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
     strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
     strain = (0.0, max(strains)) if strains else None
@@ -250,13 +292,13 @@ def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": _of_stress(result)}
     for kind in ("N1", "N2", "uniaxial"):
-        measured = _measured(result, kind)
-        if measured is not None:
-            found[kind] = measured
+        own = measured(result.records, kind)
+        if own is not None:
+            found[kind] = own
             continue
         spread = result.spread_of_laws.get(kind)
         apart = None if spread is None else spread.inside
-        differ = "" if apart is None else f"laws differ by {percent_of(apart)}"
+        differ = "" if apart is None else f"laws differ by {_at_most(apart)}"
         if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
             beyond = None if spread is None else spread.beyond
             found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
@@ -272,6 +314,11 @@ def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
+
+
+def _at_most(apart: float) -> str:
+    """Return by how much laws differ; of laws that diverge only that it is much."""
+    return percent_of(apart) if apart <= _MUCH else f"more than {percent_of(_MUCH)}"
 
 
 def _only(result: Any, kind: str) -> bool:
@@ -297,16 +344,16 @@ def _of_stress(result: Any) -> ExpectedError:
     return ExpectedError(inside, beyond, note="unseen runs" if held else "")
 
 
-def _measured(result: Any, kind: str) -> ExpectedError | None:
-    """Return the error of what was measured, unseen runs before fitted ones."""
-    own = [record for record in result.records if _is(record, kind)]
+def measured(records: Sequence[RunRecord], kind: str) -> ExpectedError | None:
+    """Return the error of what was measured, of unseen runs if there are any; None without."""
+    own = [record for record in records if _is(record, kind)]
     if not own:
         return None
     held = [record for record in own if record.held_out]
-    fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
+    fastest = max((_fastest(r) for r in records if not r.held_out), default=0.0)
     fast = [record for record in held if _fastest(record) > _FASTER * fastest]
     slow = [record for record in (held or own) if _fastest(record) <= _FASTER * fastest]
-    return ExpectedError(_mean(slow), _mean(fast), note="unseen runs" if held else "fitted")
+    return ExpectedError(_mean(slow), _mean(fast), note="unseen runs" if held else "fitted runs")
 
 
 def _is(record: RunRecord, kind: str) -> bool:

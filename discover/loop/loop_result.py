@@ -37,6 +37,7 @@ from discover.loop.parts import (
     Fold,
     FreeForm,
     LawFit,
+    NearestLaw,
     Stage,
     Verdict,
 )
@@ -103,8 +104,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     left_out_error
         Root-mean-square relative error of fitted runs that are left out of the fit in turn.
     nearest_law
-        Where the law has no name of the field: the best that has one, its constants, and its
-        root-mean-square error of runs left out.
+        Where the law has no name of the field: the best that has one.
     material
         The simple material that the runs show, recognised before any search; None where none is.
     tolerance
@@ -139,7 +139,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     discrepancy: Mapping[str, Any] | None = None
     spread_of_laws: Mapping[str, Spread] = field(default_factory=dict)
     left_out_error: float | None = None
-    nearest_law: tuple[tuple[str, dict[str, float]], float] | None = None
+    nearest_law: NearestLaw | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
     folds: tuple[Fold, ...] = ()
@@ -209,15 +209,14 @@ class LoopResult(PageView, HasEquation, SummaryView):
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if self.material is not None:
             raise InputError(
-                f"A {self.material.title} is no viscoelastic law. Take its constants from `use`, "
-                "or its text from `answer.written`."
+                f"A {self.material.title} is not a viscoelastic law. Take its constants from "
+                "`use`, or its text from `answer.written`."
             )
         if fluid is None:
             states = [s.effect for s in self.stages if s.kind == "constitutive"]
             raise InputError(
                 f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
-                "state of which nobody said how it is written, so it cannot be written out. Give "
-                "the effect's class the method `written`."
+                "state without a written form. Give the effect's class the method `written`."
             )
         modulus = tuple(float(g) for g in fluid.modulus)
         relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
@@ -229,7 +228,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
         added = len(outside) < len(self.stages)
         if outside:
             notes.append(
-                f"The record also holds {', '.join(outside)}, which is no part of the fluid and is "
+                f"The runs also show {', '.join(outside)}, which is not part of the fluid and is "
                 "not in this equation."
             )
         held_out = self.error_after.held_out
@@ -402,6 +401,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
             "free_form": self.free_form,
             "discrepancy": self.discrepancy,
             "spread_of_laws": self.spread_of_laws,
+            "nearest_law": self.nearest_law,
             **self.answer.to_json(),
             "folds": self.folds,
             "seconds": self.seconds,

@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 from jaxtyping import Float
 
+from discover.equations import Equation, equation_to_json
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS
 
@@ -199,6 +200,41 @@ class LawFit:
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``loop.json`` holds it."""
         return {**asdict(self), "title": LAWS[self.law].title}
+
+
+@dataclass(frozen=True)
+class NearestLaw:
+    """The best law with a name, where the answer is a sum of terms that has none.
+
+    Attributes
+    ----------
+    law
+        Name of the law, as in `discover.laws`.
+    constants
+        By name, with their 95 % intervals by the fitted runs.
+    size
+        Root-mean-square relative error of fitted runs that are left out in turn.
+    equation
+        The law with its modes, for exports.
+    """
+
+    law: str
+    constants: Mapping[str, StageParameter]
+    size: float
+    equation: Equation
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the law as ``loop.json`` holds it."""
+        constants = {
+            name: {"value": one.value, "ci95": one.ci95, "unit": one.unit}
+            for name, one in self.constants.items()
+        }
+        return {
+            "law": self.law,
+            "constants": constants,
+            "size": self.size,
+            "equation": equation_to_json(self.equation),
+        }
 
 
 @dataclass(frozen=True)

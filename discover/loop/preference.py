@@ -11,18 +11,23 @@ from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import norm
 
 from discover.answer.naming import named_law
 from discover.equations import Equation, law_parts
 from discover.errors import InputError
+from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
+from discover.laws import Fluid
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, states_of
+from discover.loop.parts import NearestLaw
 from discover.statistics.noise.noise_model import rms
+from discover.words import percent_of
 
 _MOST = 8
 """Laws with a name, the likeliest, that are fitted without each run."""
@@ -30,13 +35,15 @@ _MOST = 8
 _AS_WELL = float(np.log(0.05))
 """Log of odds against the best down to which runs left out do not exclude a law."""
 
+_HALF_95 = float(norm.ppf(0.975))
+
 
 @in_one_thread
 def with_named_law_first(posterior: Posterior) -> Posterior:
     """Return the posterior with a law of the field ahead, where it predicts runs left out as well.
 
     Probabilities and the verdict stay. The discrepancy is that of the law that comes first. Where
-    none predicts as well, the best of them stands in `memory["named"]`, with what it misses.
+    none predicts as well, the best of them stands in `memory["named"]` as a `NearestLaw`.
     """
     fitter = posterior.search.fitter
     few = len(posterior.problem.fitted.runs) < FEWEST_RUNS
@@ -57,7 +64,7 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if some[at] not in named:
         if named:
             best = max(named, key=lambda fit: weights[some.index(fit)])
-            posterior.memory["named"] = law_of(posterior, best), rms(posterior.missed(best))
+            posterior.memory["named"] = _nearest(posterior, best)
         return posterior
     chosen = some[at]
     order = [at, *(i for i in np.argsort(-weights, kind="stable") if i != at)]
@@ -66,6 +73,35 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
         left=Discrepancy(fitter, chosen, smallest(posterior.search, chosen)),
         by_left_out=tuple((some[i], float(weights[i])) for i in order),
     )
+
+
+def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
+    """Return a hypothesis whose fluid is a law of the field, with intervals by its own fit."""
+    found, fluid = law_of(posterior, fit), _fluid(posterior, fit)
+    assert found is not None
+    name, values = found
+    size = rms(posterior.missed(fit))
+    named, terms = law_parts(fluid.law)
+    equation = Equation(
+        terms,
+        tuple(map(float, fluid.modulus)),
+        tuple(map(float, fluid.relaxation_time)),
+        fluid.law.linear_relaxation,
+        float(fluid.solvent_viscosity),
+        title=f"Best classical law of a closed loop: misses runs left out by {percent_of(size)}.",
+        named=named,
+    )
+    constants = {}
+    for key, value in values.items():
+        ends = value, value  # one that was declared
+        for i, at in enumerate(fit.free):
+            if fit.covariance is not None and np.isclose(fit.theta[at], value, rtol=1e-6, atol=0.0):
+                half = _HALF_95 * np.sqrt(fit.covariance[i, i])
+                prior = fit.priors[at]
+                low, high = np.clip(fit.coordinates[i] + half * np.array([-1.0, 1.0]), *prior.ends)
+                ends = prior.to_value(low), prior.to_value(high)
+        constants[key] = StageParameter(value, ends, "1")
+    return NearestLaw(name, constants, size, equation)
 
 
 def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
@@ -78,10 +114,8 @@ def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
 
 def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
     """Return the law of the field that the fluid of a hypothesis is, with its constants."""
-    model = posterior.problem.model
-    present = [*fit.names, *(known.name for known in model.declared.effects)]
-    fluid = augmented_fluid(model, fit.theta, present)
-    if states_of(model, fit.theta, present) != ():
+    model, fluid = posterior.problem.model, _fluid(posterior, fit)
+    if states_of(model, fit.theta, _present(posterior, fit)) != ():
         return None
     try:
         named, terms = law_parts(fluid.law)
@@ -89,3 +123,12 @@ def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | Non
         return None
     relaxes = fluid.law.linear_relaxation
     return named_law(Equation(terms, linear_relaxation=relaxes, named=named))
+
+
+def _present(posterior: Posterior, fit: Fit) -> list[str]:
+    known = posterior.problem.model.declared.effects
+    return [*fit.names, *(effect.name for effect in known)]
+
+
+def _fluid(posterior: Posterior, fit: Fit) -> Fluid:
+    return augmented_fluid(posterior.problem.model, fit.theta, _present(posterior, fit))

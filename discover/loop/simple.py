@@ -98,7 +98,7 @@ def _result(
     effect = _EFFECT.get(material.law, material.law)
     stage = Stage(
         effect, "constitutive", parameters, (), after, 0.0, material.latex,
-        "least squares, held against laws that relax by Schwarz's criterion", CHECKS[material.kind],
+        "least squares, compared with laws that relax by BIC", CHECKS[material.kind],
     )  # fmt: skip
     values = {one.name: one.value for one in material.constants}
     explanation = Explanation((effect,), probability, after, {effect: values})

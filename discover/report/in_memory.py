@@ -11,13 +11,13 @@ from discover.equations import write_equation
 from discover.errors import InputError
 from discover.fitting import NamedLawFit
 from discover.loop.loop_result import LoopResult
+from discover.plain_numbers import json_text
 from discover.report.comparison.report import write_comparison
 from discover.report.curves import curves_of, draw_curves
 from discover.report.loop.report import write_loop
-from discover.report.page import made_by, render
+from discover.report.page import answer_screen, made_by, render
 from discover.report.plots.style import Picture, panels_of, picture
 from discover.study.run_folder import RunFolder
-from discover.words import significant
 
 _PAGE = "report.html"
 
@@ -58,42 +58,15 @@ def _fingerprint(content: dict[str, Any]) -> str:
 
 
 def fit_page(fit: NamedLawFit) -> str:
-    """Return the page on a fit: the law, its constants, their correlation, every run drawn."""
-    ends = fit.conf_int()
-    rows = [
-        (
-            one.name,
-            significant(one.value, 4),
-            f"{significant(low, 4)} to {significant(high, 4)}",
-            significant(one.standard_error, 2),
-            one.unit,
-        )
-        for one, (low, high) in zip(fit.constants, ends.to_numpy(), strict=True)
-    ]
-    modes = [
-        (significant(mode["modulus_Pa"], 4), significant(mode["relaxation_time_s"], 4))
-        for mode in fit.use["modes"]
-    ]
+    """Return the page on a fit: its answer, every run drawn, standard errors, correlation."""
     return render(
         "fit.html",
         name=fit.title or fit.law,
-        fit=fit,
-        law=_law_element(fit),
-        rows=rows,
-        modes=modes,
-        correlation=fit.correlation.round(3),
+        screen=answer_screen(fit.answer),
+        summary=fit.summary() if fit.constants else None,
+        correlation=fit.correlation,
         picture=fit_picture(fit),
     )
-
-
-def _law_element(fit: NamedLawFit) -> str:
-    try:
-        equation = fit.equation()
-    except InputError:
-        return ""
-    from discover.equations.spelling.markup import law_element
-
-    return law_element(equation.terms, equation.linear_relaxation, equation.named)
 
 
 def fit_picture(fit: NamedLawFit) -> Picture:
@@ -108,8 +81,6 @@ def fit_picture(fit: NamedLawFit) -> Picture:
 
 def fit_files(fit: NamedLawFit) -> dict[str, str]:
     """Return what a fit writes besides its page, text by name of file."""
-    from discover.plain_numbers import json_text
-
     files = {"fit.json": json_text(fit.to_json()), "figures/runs.svg": fit_picture(fit).svg}
     with suppress(InputError):  # the page and fit.json hold its constants all the same
         files["equations.tex"] = write_equation(fit.equation(), "latex", None, None)

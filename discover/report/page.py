@@ -3,6 +3,7 @@
 import logging
 import os
 import platform
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -155,19 +156,22 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if answer is None:
         return None
     found: dict[str, Any] = {
-        "headline": law(answer),
-        "quality": " ".join(filter(None, [description(answer), where(answer)])),
+        "headline": _unbroken(law(answer)),
+        "quality": _unbroken(" ".join(filter(None, [description(answer), where(answer)]))),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "expected": (), "modes": (), "solvent": "", "copies": (),
-        "lines": further(answer),
-        "next_test": answer.next_test,
+        "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
+        "lines": list(map(_unbroken, further(answer))),
+        "next_test": _unbroken(answer.next_test),
     }  # fmt: skip
     if not answer.title:
         return found
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     return found | {
         "law": _typeset(answer),
-        "constants": answer.constants,
+        "constants": [
+            (one.symbol, _in_cell(one.number), _in_cell(one.interval)) for one in answer.constants
+        ],
         "expected": [
             {
                 "symbol": symbol,
@@ -187,24 +191,40 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     }
 
 
+_TOGETHER = re.compile(
+    r" (?=[=≤] )|(?<=[=≤]) |(?<=\d) (?=(?:%|Pa|1/s|s|rad/s|modes?)\b|%)|(?<=Pa) (?=s)"
+)
+
+
+def _unbroken(text: str) -> str:
+    """Return text whose numbers keep to one line with their units and symbols."""
+    return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
+
+
+def _in_cell(text: str) -> str:
+    """Return a number or an interval that breaks before a power of ten at most."""
+    return _unbroken(text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×"))
+
+
 def _typeset(answer: Answer) -> str:
-    if answer.equation is not None:
-        return _law(answer.equation)
-    written = answer.written.get("formula")
-    return f'<p class="scroll">{formula(written, "answer")}</p>' if written else ""
+    equation = answer.equation or answer.shown
+    law = "" if equation is None else _law(equation)
+    lines = answer.written.get("formula", "").splitlines()
+    return law + "".join(f'<p class="scroll">{formula(one, "answer")}</p>' for one in lines)
 
 
 def _law(equation: Equation) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    if equation.states:
-        return ""
     plain = (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
     modes = 0 if plain else len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
-        return law_element(
+        law = law_element(
             equation.terms, equation.linear_relaxation, equation.named, modes, solvent
         )
+        # what a state of the whole fluid does stands below the law of a mode
+        states = [formula(part.own.equation, part.effect) for part in equation.states]
+        return law + "".join(f'<p class="scroll">{one}</p>' for one in states)
     except InputError:  # nobody said how a law of their own is written
         return ""
 
@@ -214,9 +234,9 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
     found = []
     for name, form in _COPIED.items():
         text, reason = answer.written.get(form, ""), "This law cannot be written in this format."
-        if answer.equation is not None:
+        if (equation := answer.equation or answer.classical) is not None:
             try:
-                text = FORMATS[form](answer.equation)
+                text = FORMATS[form](equation)
             except InputError as error:
                 reason = str(error)
         found.append({"name": name, "text": text, "reason": reason})

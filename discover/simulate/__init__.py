@@ -1,6 +1,7 @@
 """From a fluid and a protocol to stresses, to a tolerance, and to data sets made of them."""
 
 from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
+from discover.callable_package import answer_calls
 from discover.simulate.solve import SimulationError, observe, simulate, simulate_homogeneous_flow
 from discover.simulate.synthetic import synthetic_dataset
 
@@ -11,3 +12,5 @@ __all__ = [
     "simulate_homogeneous_flow",
     "synthetic_dataset",
 ]
+
+answer_calls(__name__, simulate)

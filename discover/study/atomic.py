@@ -93,7 +93,7 @@ def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
     there = next((name for name in names if os.path.lexists(folder / name)), None)
     if there is not None:
         raise InputError(
-            f"{folder} holds a {there} that is no result of this command. Use --overwrite to "
+            f"{folder} holds a {there} that is not a result of this command. Use --overwrite to "
             "replace it, or another --out."
         )
 
@@ -110,7 +110,7 @@ def make_folder(path: str | Path) -> Path:
             f"The folder {path} cannot be made: {error.strerror}. Choose another with --out."
         ) from None
     except ValueError:
-        raise InputError(f"{str(path)!r} is no name that a folder can have. Correct it.") from None
+        raise InputError(f"{str(path)!r} is not a valid folder name.") from None
     if not os.access(path, os.W_OK | os.X_OK):
         raise InputError(f"The folder {path} cannot be written to. Choose another with --out.")
     return path
@@ -196,8 +196,8 @@ def _open(path: Path) -> int:
 
 def _no_lock(path: Path) -> str:
     return (
-        f"{path} is no plain file with one name, so the folder cannot be locked. Remove it, or use "
-        "another --out."
+        f"{path} is not a plain file with one name, so the folder cannot be locked. Remove it, or "
+        "use another --out."
     )
 
 

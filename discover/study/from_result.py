@@ -97,7 +97,7 @@ def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
     file = result_file(written, study_file)
     content = read_json(file)
     if not isinstance(content, dict):
-        raise InputError(f"[model] from: {file} is no result of discover. {_AGAIN}")
+        raise InputError(f"[model] from: {file} is not a result of discover. {_AGAIN}")
     if content.get("verdict") == "no_signal":
         raise InputError(
             f"[model] from: the data behind {file} hold no signal, so it found nothing that "

@@ -21,7 +21,7 @@ from discover.equations import (
 )
 from discover.equations import Tested as Where
 from discover.equations.files import read_result_laws
-from discover.equations.formats.rheotool import read_rheotool
+from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
@@ -273,7 +273,7 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     assert read_result_laws(tmp_path)["augmented"].states == (part,)
     refused = invoke("export", tmp_path, "--format", "rheotool")
     assert refused.exit_code == 2
-    assert "rheoTool has it not" in refused.stderr
+    assert "rheoTool has no such state" in refused.stderr
 
 
 def test_an_export_does_not_write_over_the_result_that_it_reads(results):

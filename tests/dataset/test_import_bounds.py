@@ -206,13 +206,13 @@ def test_what_may_be_a_molar_mass_or_a_ramp_is_no_temperature(tmp_path):
 @pytest.mark.parametrize("line", ["Temperature: 1e999 °C", "T = -300 °C"])
 def test_a_temperature_that_cannot_be_is_named_and_not_used(tmp_path, line):
     out, result = imported(tmp_path, "a.csv", [line, *START])
-    assert result.stdout.count("is no temperature") == 1
+    assert result.stdout.count("is not a temperature") == 1
     assert "--temperature a.csv=25" in result.stdout
     assert "temperature_C" not in (out / "runs.csv").read_text()
     head, *rows = START
     made = [f"{head},Temperature [°C]", *(f"{row},9999" for row in rows)]
     _, result = imported(tmp_path, "a.csv", made, "--overwrite")
-    assert "9999 is no temperature" in result.stdout
+    assert "9999 is not a temperature" in result.stdout
     _, result = imported(tmp_path, "a.csv", START, "--temperature", "a.csv=-300", code=2)
     assert "-273.15" in result.stderr
 

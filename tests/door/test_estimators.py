@@ -198,13 +198,13 @@ def header_with(**changes):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda parts: parts.pop("estimator.json"), "no whole estimator"),
+        (lambda parts: parts.pop("estimator.json"), "not a complete estimator"),
         (lambda parts: parts.update({"estimator.json": b"{"}), "is damaged"),
-        (lambda parts: parts.update({"estimator.json": b"[1]"}), "no whole estimator"),
+        (lambda parts: parts.update({"estimator.json": b"[1]"}), "not a complete estimator"),
         (lambda parts: parts.pop("array0.npy"), "is damaged"),
         (lambda parts: parts.update({"array0.npy": b"nonsense"}), "is damaged"),
         (header_with(version=2), "reads the form 1"),
-        (header_with(format="other"), "no whole estimator"),
+        (header_with(format="other"), "not a complete estimator"),
         (header_with(learner="magic"), "of the kind 'magic'"),
         (header_with(fitted={}), "is damaged"),
         (header_with(parameters={"gremlins": 1}), "is damaged"),
@@ -228,7 +228,7 @@ def test_files_of_other_kinds_are_refused(sindy, tmp_path):
     flipped[200] ^= 0xFF  # in what the first member holds; of its own header zip reads little
     for content in (b"", b"time_s\n", pickle.dumps({}), whole[: len(whole) // 2], bytes(flipped)):
         (tmp_path / "other").write_bytes(content)
-        with pytest.raises(dc.InputError, match=r"no whole estimator|is damaged"):
+        with pytest.raises(dc.InputError, match=r"not a complete estimator|is damaged"):
             dc.load(tmp_path / "other")
 
 

@@ -177,5 +177,5 @@ def test_latex_says_how_the_variable_changes(name):
 
 
 def test_rheotool_says_that_it_has_no_such_law():
-    with pytest.raises(InputError, match="the law pom_pom: rheoTool has it not"):
+    with pytest.raises(InputError, match="the law pom_pom: rheoTool has no such law"):
         text("pom_pom", "rheotool")

@@ -284,7 +284,7 @@ _NO_TERM = {
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),
         ("loop.json", _NOTHING, "there is nothing to take"),
-        ("loop.json", [1, 2], "is no result of discover"),
+        ("loop.json", [1, 2], "is not a result of discover"),
         ("comparison.json", _NO_TERM, "there is nothing to take"),
         ("comparison.json", {"learners": {}}, "holds no law of sparse regression"),
     ],

@@ -119,7 +119,7 @@ def test_results_of_ones_own_are_replaced_within_a_command(tmp_path):
 @pytest.mark.parametrize("name", ["report.html", "loop.json"])
 def test_a_page_that_nobody_of_ours_wrote_is_replaced_only_where_it_is_asked_for(tmp_path, name):
     (tmp_path / name).write_text("written by hand")
-    with pytest.raises(InputError, match=rf"{name} that is no result.*--overwrite"):
+    with pytest.raises(InputError, match=rf"{name} that is not a result.*--overwrite"):
         RunFolder(tmp_path, "fingerprint")
     assert os.listdir(tmp_path) in ([name], [name, ".discover-lock"], [".discover-lock", name])
     RunFolder(tmp_path, "fingerprint", overwrite=True)
@@ -129,7 +129,7 @@ def test_a_page_that_nobody_of_ours_wrote_is_replaced_only_where_it_is_asked_for
 @pytest.mark.parametrize("name", ["index.html", "table.csv"])
 def test_the_page_over_a_batch_replaces_none_of_somebody_elses(tmp_path, name):
     (tmp_path / name).write_text("written by hand")
-    with pytest.raises(InputError, match=f"{name} that is no result"):
+    with pytest.raises(InputError, match=f"{name} that is not a result"):
         run_batch([], tmp_path)
     assert (tmp_path / name).read_text() == "written by hand"
     run_batch([], tmp_path, overwrite=True)

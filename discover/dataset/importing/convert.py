@@ -335,7 +335,7 @@ _WORDS = {
     "flow_curve": "a flow curve, of steady states",
     "relaxation": "relaxation after a step of strain",
     "creep": "a test at a given stress",
-    "run": "a record in time at a given rate",
+    "run": "a transient at a given rate, such as start-up",
 }
 
 

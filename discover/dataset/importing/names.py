@@ -184,7 +184,7 @@ def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
         for name in listed:
             if not isinstance(name, str) or not plain(name):
                 raise InputError(
-                    f"{where}: {key} holds {str(name)[:40]!r}, which is no name. Write text in "
+                    f"{where}: {key} holds {str(name)[:40]!r}, which is not a name. Write text in "
                     "quotes, with a letter in it."
                 )
 

@@ -165,7 +165,7 @@ def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
     factor = units.factor_to(found, quantity)
     if factor is None:
         raise InputError(
-            f"{name}: {shown(column)} is in {shown(unit)}, which is no unit of {key}. Name "
+            f"{name}: {shown(column)} is in {shown(unit)}, which is not a unit of {key}. Name "
             f"another column for {key}, or correct the unit with --unit {key}=…."
         )
     return factor

@@ -145,7 +145,7 @@ class Readings:
 
     def _no_temperature(self, said: str) -> None:
         self.notes["temperature"] = (
-            f"{said} is no temperature (-273.15 to 2000 °C) and not used; give it, as in "
+            f"{said} is not a temperature (-273.15 to 2000 °C) and not used; give it, as in "
             f"--temperature {shown(self.name)}=25"
         )
 

@@ -115,7 +115,7 @@ def _in_time(readings: Readings, said: Said | None) -> tuple[TestName, str]:
     moved = [key for key in ("shear_rate", "strain") if readings.has(key)]
     kept = readings.whole("time", "stress", moved[0])
     if np.sum(kept) < _FEWEST:
-        return "run", "a record in time"
+        return "run", "a transient"
     strain = _of(readings, "strain", kept) if "strain" in moved else None
     if strain is not None and not np.all(np.isfinite(strain)):
         strain = None
@@ -135,9 +135,9 @@ def _without_time(readings: Readings) -> tuple[TestName, str]:
     if alternates(rate) or alternates(stress):
         why = "an oscillation, as rate or stress swing to and fro"
     elif not np.any(rate) or np.ptp(np.percentile(rate, [5.0, 95.0])) < 0.1 * np.max(np.abs(rate)):
-        why = "a record at one rate, and no flow curve"
+        why = "samples at one rate, not a flow curve"
     elif _waits(rate, stress):
-        why = "records at one rate after the other, and no flow curve"
+        why = "steps of the rate held in turn, not a flow curve"
     elif ways is not None and ways.apart:
         why = f"a loop whose ways up and down are {ways.described} at the same rates, so no flow "
         why += "curve of steady states"

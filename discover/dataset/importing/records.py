@@ -242,7 +242,7 @@ def _after(made: Record, before: Record) -> Record:
     fastest = float(np.median(np.abs(made.table.get("shear_rate", np.zeros(1)))))
     if declared is not None:
         if made.kind == "run" and fastest < AT_REST * abs(float(declared)):
-            made.kind, made.notes = "none", ["a rest: it goes on from the relaxation before it"]
+            made.kind, made.notes = "none", ["a rest, which continues the relaxation before it"]
         return made
     if before.conditions or rate_before is None or not np.median(rate_before):
         return made

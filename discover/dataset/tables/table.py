@@ -162,9 +162,7 @@ def read_bytes(
     except InputError:
         raise
     except IsADirectoryError:
-        raise InputError(
-            f"{name} is a folder; a file is wanted there. Name the file itself."
-        ) from None
+        raise InputError(f"{name} is a folder, not a file.{_file_in(path)}") from None
     except (FileNotFoundError, NotADirectoryError):
         folder = path.parent.name
         place = f" in {folder}" if folder and str(path) != name else ""
@@ -176,7 +174,17 @@ def read_bytes(
             f"{name} cannot be read: {error.strerror or error}. Check the file and who may read it."
         ) from None
     except ValueError:
-        raise InputError(f"{name!r} is no name that a file can have. Correct it.") from None
+        raise InputError(f"{name!r} is not a valid file name.") from None
+
+
+def _file_in(folder: Path) -> str:
+    """Return which study to name in place of a folder; which file, if it holds none."""
+    studies = sorted(folder.glob("*.toml"))
+    if studies:
+        return f" Did you mean {str(studies[0])!r}?"
+    data = any(folder.glob("*.csv"))
+    remedy = "Give a study file (TOML) whose [data] folder it is." if data else "Name a file in it."
+    return f" {remedy}"
 
 
 def did_you_mean_file(path: Path) -> str:

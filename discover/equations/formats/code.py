@@ -319,7 +319,7 @@ def filled(
                 **structure,
             )
     return template.format(
-        header="\n".join(header_lines(equation)) or "No record of where it was tested.",
+        header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "",
         modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),

@@ -11,18 +11,19 @@ rheoTool's FENE-P relaxes the conformation by (f A − a I)/λ with a = L²/(L²
 form of this package that is a relaxation time λ/a at the same zero-shear viscosity.
 """
 
-import math
-import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from discover.equations.parts import EXPONENTIAL, NamedPart, combined, law_parts
+from discover.equations.parts import EXPONENTIAL, combined
 from discover.errors import InputError
 from discover.laws.textbook.classical import fene_p_terms
 from tensor_library.terms import parse_term
+
+DENSITY = 1000.0
+"""Density in kg/m³ where nobody gives one: shear rheometry does not measure it."""
 
 TOLERANCE = 0.01
 """Relative deviation from a form that rheoTool has which is passed over, with a word."""
@@ -31,10 +32,19 @@ _SLIP = "sigma.gammadot+gammadot.sigma"
 _LINEAR = "tr(sigma)*sigma"
 _PLAIN, _STRESS, _TIME = "[0 0 0 0 0 0 0]", "[1 -1 -2 0 0 0 0]", "[0 0 1 0 0 0 0]"
 _TIMES = ("lambda", "lambdaB", "lambdaS", "lambdaD", "lambdaR", "K", "L")
+QUANTITIES = {
+    "density": "[1 -3 0 0 0 0 0]",
+    "viscosity": "[1 -1 -1 0 0 0 0]",
+    "stress": _STRESS,
+    "time": _TIME,
+    "number": _PLAIN,
+}
+"""Dimensions as OpenFOAM writes them."""
+
 _DIMENSIONS = {
-    "rho": "[1 -3 0 0 0 0 0]",
-    "etaS": "[1 -1 -1 0 0 0 0]",
-    "etaP": "[1 -1 -1 0 0 0 0]",
+    "rho": QUANTITIES["density"],
+    "etaS": QUANTITIES["viscosity"],
+    "etaP": QUANTITIES["viscosity"],
     "tau0": _STRESS,
     **dict.fromkeys(_TIMES, _TIME),
 }
@@ -59,7 +69,7 @@ class RheoToolModel:
 
 
 _ROLIE_POLY = {"stretch_time_ratio": "lambdaR", "beta": "beta", "maximum_stretch": "chiMax"}
-_OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mapping[str, str]]] = {
+OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mapping[str, str]]] = {
     # rheoTool's δ is the power of Λ²; up to 1, a greatest stretch is none
     "rolie_poly": ("Rolie-Poly", _ROLIE_POLY, {"lambdaD": 1.0, "delta": -0.5, "chiMax": 0.0}, {}),
     "rolie_poly_fene": ("Rolie-Poly", _ROLIE_POLY, {"lambdaD": 1.0, "delta": -0.5}, {}),
@@ -80,33 +90,6 @@ _OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mappin
     ),
 }
 """By law: rheoTool's type, its names of our constants, what is fixed, and what is a word."""
-
-
-def rheotool_law(kind: str, value: Callable[[str], float]) -> tuple[str, dict[str, float]] | None:
-    """Return the law with a name that a type of rheoTool's is, with its constants.
-
-    `value`: returns an entry, times over the relaxation time and stresses over the modulus. Raises
-    InputError if an entry that is fixed here has another value.
-    """
-    for law, (name, renamed, fixed, _) in _OF_NAME.items():
-        if name != kind or (law == "rolie_poly" and value("chiMax") > 1.0):
-            continue
-        for key, wanted in fixed.items():
-            if key != "chiMax" and abs(value(key) - wanted) > 1e-9:
-                raise InputError(
-                    f"{key} of {kind} must be {wanted:g} (times over the relaxation time); got "
-                    f"{value(key):g}, which is another law than {law}."
-                )
-        constants = {}
-        for ours, theirs in renamed.items():
-            if theirs in fixed:
-                continue
-            values = {value(key) for key in theirs.split()}
-            if max(values) - min(values) > 1e-9 * abs(max(values)):
-                raise InputError(f"{theirs.replace(' ', ' and ')} of {kind} must be the same.")
-            constants[ours] = values.pop()
-        return law, constants
-    return None
 
 
 def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoToolModel:
@@ -172,7 +155,7 @@ def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoTool
 
 
 def rheotool_text(
-    equation: Equation, density_kg_m3: float = 1000.0, tolerance: float = TOLERANCE
+    equation: Equation, density_kg_m3: float = DENSITY, tolerance: float = TOLERANCE
 ) -> str:
     """Return the file ``constant/constitutiveProperties``.
 
@@ -181,34 +164,56 @@ def rheotool_text(
     if equation.states:
         raise InputError(
             f"{', '.join(part.effect for part in equation.states)} gives the whole fluid a state: "
-            "rheoTool has it not. Write --format python or --format ufl, which have its equation."
+            "rheoTool has no such state. Write --format python or ufl, which have its equation."
         )
     models = [rheotool_model(equation.mode(k), tolerance) for k in range(len(equation.modulus))]
-    lines = [f"// {line}" for line in ("Written by discover.", *header_lines(equation))]
-    lines += [f"// {note}" for note in dict.fromkeys(n for model in models for n in model.notes)]
-    lines.append(f"// Nobody measured the density, {density_kg_m3:g} kg/m3: set it to the fluid's.")
-    lines += ["FoamFile", "{", "    version     2.0;", "    format      ascii;"]
-    lines += ["    class       dictionary;", "    object      constitutiveProperties;", "}", ""]
-    lines += ["parameters", "{"]
+    notes = dict.fromkeys(note for model in models for note in model.notes)
     modes = list(zip(equation.modulus, equation.relaxation_time, strict=True))
-    single = len(modes) == 1
-    if not single:
-        lines += ["    type             multiMode;", "", "    models", "    ("]
+    lines = []
     for k, ((g, time), model) in enumerate(zip(modes, models, strict=True)):
         # rheoTool adds the solvents of the modes up
         solvent = equation.solvent_viscosity if k == 0 else 0.0
         entries = _entries(model, g, time, solvent, density_kg_m3)
-        if single:
-            lines += [f"    {line}" for line in entries]
+        if len(modes) == 1:
+            lines += entries
         else:
-            lines += [f"        M{k + 1}", "        {"]
-            lines += [f"            {line}" for line in entries]
-            lines += ["        }"]
-    if not single:
-        lines.append("    );")
-    lines += ["}", "", "passiveScalarProperties", "{", "    solvePassiveScalar no;"]
-    lines += ["    D                D [0 2 -1 0 0 0 0] 1e-9;", "}", ""]
-    return "\n".join(lines)
+            lines += [f"    M{k + 1}", "    {", *(f"        {line}" for line in entries), "    }"]
+    if len(modes) > 1:
+        lines = ["type             multiMode;", "", "models", "(", *lines, ");"]
+    return properties_file([*header_lines(equation), *notes], lines, density_kg_m3)
+
+
+def viscous_fluid(
+    kind: str,
+    entries: Mapping[str, tuple[str, float]],
+    comments: Sequence[str],
+    density_kg_m3: float = DENSITY,
+) -> str:
+    """Return the file of a fluid without elasticity.
+
+    `kind`: rheoTool's type. `entries`: by name, a quantity of `QUANTITIES` and its value.
+    """
+    density = {"rho": ("density", density_kg_m3)}
+    lines = [f"{'type':<17}{kind};"]
+    for name, (quantity, value) in (density | dict(entries)).items():
+        lines.append(_entry(name, QUANTITIES[quantity], value))
+    if kind == "HerschelBulkley":
+        lines.append("PapanastasiouRegularization no;")
+    return properties_file(comments, lines, density_kg_m3)
+
+
+def properties_file(comments: Sequence[str], lines: Sequence[str], density_kg_m3: float) -> str:
+    """Return ``constitutiveProperties`` with these lines in its dictionary ``parameters``."""
+    density = f"Density not given; {density_kg_m3:g} kg/m3 assumed. Replace it."
+    if density_kg_m3 != DENSITY:
+        density = f"Density {density_kg_m3:g} kg/m3, as given."
+    found = [f"// {line}" for line in ("Written by discover.", *comments, density)]
+    found += ["FoamFile", "{", "    version     2.0;", "    format      ascii;"]
+    found += ["    class       dictionary;", "    object      constitutiveProperties;", "}", ""]
+    found += ["parameters", "{", *(f"    {line}" if line else "" for line in lines), "}", ""]
+    found += ["passiveScalarProperties", "{", "    solvePassiveScalar no;"]
+    found += ["    D                D [0 2 -1 0 0 0 0] 1e-9;", "}", ""]
+    return "\n".join(found)
 
 
 def _entries(model: RheoToolModel, g: float, time: float, solvent: float, density: float):
@@ -223,11 +228,14 @@ def _entries(model: RheoToolModel, g: float, time: float, solvent: float, densit
     for name, value in model.parameters.items():
         values[name] = value * unit_of(name, modulus, relaxation_time)
     for name, value in values.items():
-        dimensions = _DIMENSIONS.get(name, _PLAIN)
-        yield f"{name:<17}{name} {dimensions} {float(value)!r};"
+        yield _entry(name, _DIMENSIONS.get(name, _PLAIN), float(value))
     for name, word in model.options.items():
         yield f"{name:<24} {word};"
     yield f"{'stabilization':<17}coupling;"
+
+
+def _entry(name: str, dimensions: str, value: float) -> str:
+    return f"{name:<17}{name} {dimensions} {value!r};"
 
 
 def unit_of(name: str, modulus: float, relaxation_time: float) -> float:
@@ -244,13 +252,13 @@ def extension_factor(limit: float | None) -> float:
 def _of_name(equation: Equation) -> RheoToolModel:
     named = equation.named
     assert named is not None
-    if named.law not in _OF_NAME:
-        raise _unknown([f"the law {named.law}"], "rheoTool has it not")
+    if named.law not in OF_NAME:
+        raise _unknown([f"the law {named.law}"], "rheoTool has no such law")
     if equation.terms:
         raise _unknown(
             [t.term for t in equation.terms], f"rheoTool cannot add terms to {named.law}"
         )
-    kind, renamed, fixed, words = _OF_NAME[named.law]
+    kind, renamed, fixed, words = OF_NAME[named.law]
     parameters = dict(fixed)
     for ours, value in named.constants[0].items():
         parameters |= dict.fromkeys(renamed[ours].split(), value)
@@ -301,132 +309,3 @@ def _unknown(terms: list[str], why: str) -> InputError:
         "Giesekus, PTT (linear and exponential, with slip), FENE-P, Rolie-Poly, XPomPom, "
         "White-Metzner and Saramito. Use --format python, sympy, ufl, latex or json."
     )
-
-
-_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
-_TOKEN = re.compile(r"[{}()\[\];]|[^\s{}()\[\];]+")
-_DEEPEST = 20
-
-
-def read_rheotool(text: str) -> Equation:
-    """Return the law of a ``constitutiveProperties`` dictionary.
-
-    `text`: the file. Of macros, includes and code streams nothing is carried out. Raises InputError
-    if the text is no such dictionary, or its law is not one that `rheotool_text` writes.
-    """
-    tokens = _TOKEN.findall(_COMMENT.sub(" ", text))
-    content, _ = _dictionary(tokens, 0, 0)
-    parameters = content.get("parameters")
-    if not isinstance(parameters, dict):
-        raise InputError("A constitutiveProperties file needs a dictionary parameters { ... }.")
-    if parameters.get("type") == ["multiMode"]:
-        models = parameters.get("models")
-        modes = list(models.values()) if isinstance(models, dict) else []
-        if not modes or not all(isinstance(mode, dict) for mode in modes):
-            raise InputError("multiMode needs models ( NAME { ... } ... );.")
-    else:
-        modes = [parameters]
-    laws, constants, moduli, times, solvents = zip(*map(_mode, modes), strict=True)
-    if len(set(laws)) > 1:
-        raise InputError("The modes have different laws; this package takes one law for all.")
-    named, terms = NamedPart(laws[0], constants), ()
-    if not named.differing:
-        # what is a sum of terms is written as one
-        named, found = law_parts(named.built())
-        terms = tuple(t for t in found if t.coefficient and t.inner.get("epsilon") != 0.0)
-    return Equation(
-        terms,
-        moduli,
-        times,
-        solvent_viscosity=sum(solvents),
-        title="rheoTool constitutiveProperties",
-        named=named,
-    )
-
-
-def _mode(entries: dict[str, Any]) -> tuple[str, dict[str, float], float, float, float]:
-    """Return law, constants, modulus, relaxation time and solvent viscosity of a mode."""
-    kind = " ".join(_words(entries, "type"))
-    limit = _number(entries, "L2") if kind == "FENE-P" else None
-    if limit is not None and limit <= 3.0:
-        raise InputError(f"L2 must be larger than 3; got {limit:g}.")
-    viscosity, time = _number(entries, "etaP"), _number(entries, "lambda")
-    time = time / extension_factor(limit)
-    if viscosity <= 0 or time <= 0:
-        raise InputError("etaP and lambda must be positive.")
-    modulus = viscosity / time
-
-    def value(name: str) -> float:
-        # without the last digits, so that what was the same in all modes still is
-        return float(f"{_number(entries, name) / unit_of(name, modulus, time):.14g}")
-
-    found: tuple[str, dict[str, float]] | None
-    if kind == "Oldroyd-B":
-        found = "ucm", {}
-    elif kind == "Giesekus":
-        found = "giesekus", {"alpha": value("alpha")}
-    elif kind == "PTT":
-        found = _ptt_read(entries)
-    elif limit is not None:
-        found = "fene_p", {"L2": limit}
-    else:
-        found = rheotool_law(kind, value)
-    if found is None:
-        raise InputError(
-            f"The type {kind[:60]!r} is not one of Oldroyd-B, Giesekus, PTT, FENE-P, Rolie-Poly, "
-            "XPomPom, WhiteMetznerCY, Saramito, multiMode."
-        )
-    law, constants = found
-    return law, constants, modulus, time, _number(entries, "etaS")
-
-
-def _ptt_read(entries: dict[str, Any]) -> tuple[str, dict[str, float]]:
-    function = " ".join(_words(entries, "destructionFunctionType"))
-    if function not in ("linear", "exponential"):
-        raise InputError(f"destructionFunctionType {function[:60]!r} is not linear or exponential.")
-    constants = {"epsilon": _number(entries, "epsilon"), "xi": _number(entries, "zeta")}
-    return f"ptt_{function}_non_affine", constants
-
-
-def _words(entries: dict[str, Any], key: str) -> list[str]:
-    value = entries.get(key)
-    if not isinstance(value, list) or not value:
-        raise InputError(f"The entry {key!r} is missing.")
-    return value
-
-
-def _number(entries: dict[str, Any], key: str) -> float:
-    last = _words(entries, key)[-1]
-    try:
-        value = float(last)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise InputError(f"The entry {key!r} must end in a number; got {last[:60]!r}.")
-    return value
-
-
-def _dictionary(tokens: list[str], at: int, depth: int) -> tuple[dict[str, Any], int]:
-    """Return entries up to the closing bracket; values are lists of words, or dictionaries."""
-    if depth > _DEEPEST:
-        raise InputError("The dictionary is nested too deeply to be constitutiveProperties.")
-    content: dict[str, Any] = {}
-    words: list[str] = []
-    while at < len(tokens):
-        token = tokens[at]
-        at += 1
-        if token in "{(":
-            inner, at = _dictionary(tokens, at, depth + 1)
-            content[words[0] if words else ""] = inner
-            words = []
-        elif token in "})":
-            return content, at
-        elif token == ";":
-            if words:
-                content[words[0]] = words[1:]
-            words = []
-        else:
-            words.append(token)
-    if depth:
-        raise InputError("A bracket of the dictionary is never closed.")
-    return content, at

@@ -339,7 +339,7 @@ def _rougher(
         share = problem.flows.n_steps / rough.flows.n_steps
         if share >= _WORTH_TRAINING_ON:
             problem = rough
-            said.append(f"it was trained in {share:.2g} times fewer steps than it is judged in")
+            said.append(f"it was trained in {share:.2g} times fewer steps than it is tested in")
     return problem, ", and ".join(said)
 
 

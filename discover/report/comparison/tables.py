@@ -143,7 +143,7 @@ def law(outcome: LearnerOutcome, linear_relaxation: bool, known: Equation) -> di
         message += f"; the terms above miss {percent(missed)} of what the network adds"
     named = known.named
     if named is not None and not named.is_written:
-        message += f". The h of the known law {named.law} is to be added: nobody wrote it out"
+        message += f". Add the h of the known law {named.law}, which has no written form"
         named = None
     return {
         "title": learner_title(outcome.learner),

@@ -277,7 +277,7 @@ def free_form_picture(result: LoopResult) -> Picture | None:
         return picture(
             drawing,
             "free_form",
-            f"What nobody wrote down: {said}. The bands take it that it is of this variable alone.",
+            f"Effect without a name: {said}. The bands assume that it depends on this alone.",
         )
 
 
