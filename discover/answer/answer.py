@@ -164,6 +164,7 @@ class ExpectedError:
     beyond: float | None = None
     missing: Literal["untested", "not determined"] = "untested"
     note: str = ""
+    is_measured: bool = True  # whether records of this quantity tell it, or only the law does
 
     @property
     def is_known(self) -> bool:

@@ -92,8 +92,12 @@ def where(answer: Any) -> str:
         found.append(f"{span(one.rate_1_s)} 1/s")
     elif one.frequency_rad_s is not None:
         found.append(f"{span(one.frequency_rad_s)} rad/s")
-    verb = "Fitted" if answer.adequate is False else "Use"
-    return f"{verb} in {', '.join([flows(answer), *found])}." if found else ""
+    if not found:
+        return ""
+    place = ", ".join([flows(answer), *found])
+    if answer.adequate is False:
+        return f"Do not use to predict within {percent_of(answer.tolerance)}; fitted in {place}."
+    return f"Use in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -111,12 +115,29 @@ def _short(value: float) -> str:
     return significant(value, 2)
 
 
+def linear_part(answer: Any) -> str:
+    """Return moduli, times and solvent of a law, as far as they fit on a line."""
+    times = [mode.relaxation_time_s for mode in answer.modes]
+    if len(times) == 1:
+        modulus = f"G = {significant(answer.modes[0].modulus_Pa, 3)} Pa"
+        found = [modulus, f"λ = {significant(times[0], 3)} s"]
+    else:
+        found = ["G", f"λ = {span((min(times), max(times)))} s"] if times else []
+    if answer.solvent_viscosity_Pa_s:
+        found.append(f"ηs = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
+    return ", ".join(found)
+
+
 def tolerance(answer: Any) -> str:
     """Return whether the tolerance is met, where, and for which quantities."""
     if answer.adequate is None:
         return ""
     asked = percent_of(answer.tolerance)
-    met = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name)]
+    met = [
+        SYMBOLS[name] if answer.expected(name).is_measured else f"{SYMBOLS[name]} (not measured)"
+        for name in SYMBOLS
+        if answer.within_tolerance(name)
+    ]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:

@@ -301,7 +301,8 @@ def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
         differ = "" if apart is None else f"laws differ by {_at_most(apart)}"
         if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
             beyond = None if spread is None else spread.beyond
-            found[kind] = ExpectedError(apart, beyond, note=f"if {name}; not measured")
+            note = f"if {name}; not measured"
+            found[kind] = ExpectedError(apart, beyond, note=note, is_measured=False)
         elif kind == "N1":
             found[kind] = ExpectedError(missing="not determined", note=differ)
         elif kind == "N2":
@@ -340,8 +341,8 @@ def _of_stress(result: Any) -> ExpectedError:
     if inside is None and result.material is not None:
         return ExpectedError(result.error_after.fit, beyond, note="fitted runs, noise included")
     if inside is None and result.left_out_error is not None:
-        return ExpectedError(result.left_out_error, beyond, note="runs left out in turn")
-    return ExpectedError(inside, beyond, note="unseen runs" if held else "")
+        return ExpectedError(result.left_out_error, beyond, note="runs left out, beside noise")
+    return ExpectedError(inside, beyond, note="unseen runs, noise included" if held else "")
 
 
 def measured(records: Sequence[RunRecord], kind: str) -> ExpectedError | None:

@@ -16,7 +16,15 @@ from markupsafe import Markup
 
 from discover._version import __version__
 from discover.answer import Answer
-from discover.answer.sentences import SYMBOLS, description, expected, further, law, where
+from discover.answer.sentences import (
+    SYMBOLS,
+    description,
+    expected,
+    further,
+    law,
+    linear_part,
+    where,
+)
 from discover.equations import Equation
 from discover.equations.files import FORMATS
 from discover.equations.spelling.markup import law_element
@@ -159,7 +167,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "headline": _unbroken(law(answer)),
         "quality": _unbroken(" ".join(filter(None, [description(answer), where(answer)]))),
         "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "expected": (), "modes": (), "solvent": "", "copies": (),
+        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": "",
+        "copies": (),
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
         "next_test": _unbroken(answer.next_test),
@@ -186,6 +195,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             (significant(mode.modulus_Pa), significant(mode.relaxation_time_s))
             for mode in answer.modes
         ],
+        "linear": _unbroken(linear_part(answer)),
         "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
         "copies": _copies(answer),
     }

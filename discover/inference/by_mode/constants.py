@@ -9,6 +9,9 @@ _OPEN = 100.0
 """Factor above the value from which on an interval tells nothing: two decades, beyond which records
 tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."""
 
+_DECADE = 10.0
+"""The same on both sides."""
+
 _ROUNDING = 1e-9
 
 _POLYNOMIAL = 2  # highest degree in log λ
@@ -37,8 +40,10 @@ class StageParameter:
 
     @property
     def is_open(self) -> bool:
-        """Whether these data leave it open: the interval goes on for two decades above it."""
-        return self.ci95[1] > _OPEN * abs(self.value)
+        """Whether these data leave it open: two decades above it, or a decade on both sides."""
+        low, high = self.ci95
+        both = 0.0 < low < abs(self.value) / _DECADE and high > _DECADE * abs(self.value)
+        return both or high > _OPEN * abs(self.value)
 
     def is_open_up_to(self, end: float) -> bool:
         """Whether it is open in a range: from two decades below its upper end, to that end."""
