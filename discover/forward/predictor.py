@@ -117,7 +117,7 @@ class Predictor:
     def _of_piece(
         self, trials: Trials, piece: _Piece, normal: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
-        program, (part, *judging) = self.program, piece
+        program, (part, judging, runs) = self.program, piece
         judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         kernel = self.side_by_side(part)
@@ -133,7 +133,8 @@ class Predictor:
         if np.all(alone):
             return self._one_by_one(trials, part, normal)
         some = beside.taken(~alone)
-        found = kernel.predict(Asked(self._numbers, *some, part, *judging, normal))
+        asked = Asked(self._numbers, *some, part=part, judging=judging, runs=runs, normal=normal)
+        found = kernel.predict(asked)
         if not np.any(alone):
             return found
         out = np.empty((len(alone), *found.shape[1:]))

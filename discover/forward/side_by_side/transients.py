@@ -156,6 +156,7 @@ class SideBySide(LanePredictor):
         times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
+        assert asked.judging is not None  # of transients there always is
         laid_out = self._runs(asked.part, asked.judging)
 
         def eight(lanes: np.ndarray, different: np.ndarray, used: np.ndarray) -> np.ndarray:
