@@ -17,7 +17,7 @@ _FREE = 1.0
 _GROWTH = 5.0  # of the damping where a step is rejected, twice that at the next and so on
 
 _FORETOLD = 0.25
-"""Of the gain that derivatives foretell, below which they are taken anew."""
+"""Of the gain that derivatives predict, below which they are taken anew."""
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Fit:
     @property
     def cost(self) -> float:
         """Sum over runs of the squared relative errors."""
-        with np.errstate(over="ignore", invalid="ignore"):  # of what ran away
+        with np.errstate(over="ignore", invalid="ignore"):  # of what diverged
             return float(np.sum(self.residual**2))
 
     @property
@@ -220,7 +220,7 @@ class _Descent:
         # a step that damping cut short gains little anywhere
         self.done = self.damping < _FREE and short and self.fresh
         step, change = theta[self.free] - self.theta[self.free], residual - self.residual
-        # at most all of it: a model that foretells nothing says nothing
+        # at most all of it: a model that predicts nothing says nothing
         share = min((self.cost - cost) / max(self._foretold(step), 1e-300), 1.0)
         less = max(1.0 / _GROWTH, 1.0 - (2.0 * share - 1.0) ** 3)
         self.damping, self.growth = max(self.damping * less, _LEAST_DAMPING), _GROWTH
@@ -234,7 +234,7 @@ class _Descent:
 
 
 def _cost(residual: Float[np.ndarray, "runs n"]) -> float:
-    """Return the sum of squares; infinite for a trial that ran away."""
+    """Return the sum of squares; infinite for a trial that diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
         cost = float(np.sum(residual**2))
     return cost if np.isfinite(cost) else np.inf

@@ -144,7 +144,7 @@ class Steps:
         A trial whose residuals are not finite is none down.
         """
         rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
-        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
+        with np.errstate(over="ignore", invalid="ignore"):  # of a trial that diverges
             if self._known is None or self._is_down(rows):
                 self.best, self.norm = self.trial, float(np.linalg.norm(rows)) / _OF_WEIGHTS
                 self._known = rows, matrix, matrix.T @ matrix, matrix.T @ rows
