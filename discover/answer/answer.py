@@ -12,7 +12,7 @@ from discover.summary_view import Estimate
 from discover.words import effect_title, estimate, interval, readable
 
 TOLERANCE = 0.05
-"""Relative discrepancy that is good enough where nobody says otherwise."""
+"""Relative discrepancy that is accepted where nobody says otherwise."""
 
 QUANTITIES = ("sigma12", "N1", "N2", "uniaxial")
 """Quantities of which an expected error is given, in the order of the table."""

@@ -29,7 +29,7 @@ _RUNS_AWAY = 1e3
 """Times the largest stress recorded or predicted by the known part, which no sound law exceeds."""
 
 _LOST = 0.5
-"""Weight of hypotheses that may run away in a flow in which the others still make a band."""
+"""Weight of hypotheses that may diverge in a flow in which the others still make a band."""
 
 _RATIO = -2.0 / 7.0
 """Least N2/N1 of a simple fluid   [Doi & Edwards 1986, The Theory of Polymer Dynamics, ch. 7: −2/7
@@ -88,7 +88,7 @@ class _Part:
 
 @in_one_thread
 def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
-    """Return the band of each flow, by its key; those in which most hypotheses run away have none.
+    """Return the band of each flow, by its key; those in which most hypotheses diverge have none.
 
     Hypotheses are weighed by their evidence, their constants drawn. Where none is all there is, all
     that describe the runs as well count, N1 and N2 may differ as these do, every stress is missed

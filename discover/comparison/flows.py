@@ -294,7 +294,7 @@ def columns_of(observed: Float[np.ndarray, "n 3"]) -> dict[str, np.ndarray]:
 
 
 def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
-    """Return what a fluid does in a flow, or None if it runs away."""
+    """Return what a fluid does in a flow, or None if it diverges."""
     try:
         return columns_of(observe(fluid, flow.protocol, flow.times))
     except SimulationError:

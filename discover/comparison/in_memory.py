@@ -81,7 +81,7 @@ def compare(
         For a data set: what of the base is also fitted: ``"modulus_Pa"``,
         ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
     tolerance
-        Relative discrepancy that is good enough.
+        Relative discrepancy that is accepted.
     seed
         Of the learners, and of draws within intervals.
     progress

@@ -23,10 +23,10 @@ class LearnerOutcome(TermTables):
 
     `loss_history`: iterations and losses, both of shape (m,).
     `details`: what else the learner says; JSON-able.
-    `predictions`: by the key of the flow; None where the law runs away.
+    `predictions`: by the key of the flow; None where the law diverges.
     `physics`: checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
     `bands`: by the key of the flow: lowest and highest prediction of each quantity over the members
-        of an ensemble. None for a flow in which one of them runs away; empty where there is one
+        of an ensemble. None for a flow in which one of them diverges; empty where there is one
         law.
     """
 

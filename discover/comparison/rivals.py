@@ -207,7 +207,7 @@ def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | N
 
 
 def law_structure(structure: Structure | None) -> LawStructure | None:
-    """Return the structure at the law found, or at the known part where that law runs away."""
+    """Return the structure at the law found, or at the known part where that law diverges."""
     if structure is None or not structure.laws:
         return None
     return next((law for law in structure.laws if law.name == FOUND), structure.laws[0])

@@ -45,7 +45,7 @@ class Box:
 
 @dataclass(frozen=True)
 class Tested:
-    """Where a law was learned and where it was judged.
+    """Where a law was learned and where it was tested.
 
     Attributes
     ----------
@@ -89,7 +89,7 @@ class Equation(NotebookView):
     title, notes
         Where the law comes from, and what its user has to know.
     tested
-        Where it was learned and judged; None where unknown.
+        Where it was learned and tested; None where unknown.
     named
         A law that is no sum of terms, to whose h the terms are added; its constants may differ from
         mode to mode. None for UCM.

@@ -29,7 +29,7 @@ class Trajectories:
     """What happens to each mode along a set of flows.
 
     `smallest_conformation`: smallest eigenvalue of I + σ/G over modes and samples, shape (runs,);
-        nan where the law runs away.
+        nan where the law diverges.
     `dissipation`: least σ:d − dF/dt over modes and samples, in units of G/λ of the mode, with F the
         energy that Hookean dumbbells store; nan where undefined.
     """
@@ -93,7 +93,7 @@ class Cycles:
     """Oscillations over a grid of Weissenberg and Deborah numbers.
 
     `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
-        where the law runs away.
+        where the law diverges.
     """
 
     names: tuple[str, ...]  # of the flows, Weissenberg number first

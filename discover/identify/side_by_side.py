@@ -64,7 +64,7 @@ def stresses_of_laws(
 
     `library`: holds every term of the laws. `protocols`, `grids`: from `stack_protocols` and
     `make_grids`. `base`: the known part; by default UCM. Returns σ11, σ22, σ33,
-    σ12, not finite where a law runs away.
+    σ12, not finite where a law diverges.
     """
     base = UpperConvectedMaxwell() if base is None else base
     parts = [
@@ -181,7 +181,7 @@ class Difference:
 
     `sigma12`, `N1`, `N2`: largest over the histories of the root-mean-square difference over the
         root-mean-square of the reference; N2's is relative to the reference's N1. Infinite where
-        the law runs away.
+        the law diverges.
     """
 
     sigma12: float

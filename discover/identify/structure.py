@@ -52,7 +52,7 @@ def with_sensitivities(
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
     """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients.
 
-    `law`: what it makes is not finite where it runs away. `known`: a fluid with its modes and
+    `law`: what it makes is not finite where it diverges. `known`: a fluid with its modes and
     solvent. `flows`: the runs and their grids.
     """
 
@@ -259,7 +259,7 @@ def _at(
     law: LawTerms,
     observed: Sequence[str],
 ) -> LawStructure | None:
-    """Return the structure at one law, or None where it runs away in these flows."""
+    """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
     coefficients, inner = law.over(library)
     whole = LibraryExpansion(

@@ -291,7 +291,7 @@ class HiddenStresses:
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random shear histories.
 
-    `law`: any dimensionless law. Histories in which it runs away are left out.
+    `law`: any dimensionless law. Histories in which it diverges are left out.
     """
     flows = histories_for(law)
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
@@ -350,7 +350,7 @@ themselves, in exact arithmetic."""
 
 @dataclass(frozen=True)
 class OneTermMore:
-    """The term that leaves a quantity most open if it is fitted along.
+    """The term that leaves a quantity most open if it is fitted jointly.
 
     `per_noise`: half of the 95 % interval of the quantity, root-mean-square over N1's, over the
         relative noise of the records, white and of one size.

@@ -120,7 +120,7 @@ class _Lesson(eqx.Module):
         solve = partial(solve_on_grid, taught)
         stress = jax.vmap(solve)(self.protocols, self.grids)[..., 3] / jnp.sum(self.modulus)
         difference = (stress - self.target) / jnp.sqrt(1.0 * self.target.shape[1])
-        # a trial that runs away is an increase, which the solver rejects
+        # a trial that diverges is an increase, which the solver rejects
         difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, _RUNAWAY)
         return difference, jnp.sqrt(kappa) * jnp.sqrt(jnp.abs(parameters))
 
@@ -240,8 +240,8 @@ def compare_fluids(
 
     N2's error is relative to N1's norm, since N2 may vanish.
 
-    `truth`, `other`: the reference, and the fluid to judge. The keys are ``sigma12``, ``N1`` and
-    ``N2``, in extension ``tensile_stress``. None where a fluid runs away in this flow.
+    `truth`, `other`: the reference, and the fluid to compare. The keys are ``sigma12``, ``N1`` and
+    ``N2``, in extension ``tensile_stress``. None where a fluid diverges in this flow.
     """
     times = np.linspace(0.0, duration, 401)
     try:

@@ -265,7 +265,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         root-mean-square of the measurement, so that 1 is perfect, predicting nothing scores 0, and
         noise of 2 % leaves 0.98 to the true law. It is not R²: a relative error is what rheologists
         quote, and it does not depend on the mean of a signal that oscillates about zero. A law that
-        runs away scores minus infinity.
+        diverges scores minus infinity.
 
         Parameters
         ----------

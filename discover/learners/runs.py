@@ -112,7 +112,7 @@ def rough_limits(
 
     Steps grow after a change of the rate, up to a strain of one. Where the fine grid follows the
     fastest relaxation, and else where it follows the slowest, so does the rough one: in steps of
-    many relaxation times a law that relaxes faster than the known one runs away.
+    many relaxation times a law that relaxes faster than the known one diverges.
     """
     controls = {protocols.control for protocols, _ in flows.parts}
     if not controls <= {"rate", *STATES}:
@@ -196,7 +196,7 @@ def shortened_rightly(
             [np.sqrt(np.mean((a - b) ** 2) / np.mean(a**2)) for a, b in zip(*recorded, strict=True)]
         )
     )
-    if not off <= max(_SAME, _OF_MISFIT * misfit):  # nor where the law runs away
+    if not off <= max(_SAME, _OF_MISFIT * misfit):  # nor where the law diverges
         return ""
     share = whole.flows.n_steps / shorter.flows.n_steps
     return (

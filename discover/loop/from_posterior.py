@@ -268,7 +268,7 @@ class Ended(Path):
         return text
 
     def _bench(self) -> dict[str, float]:
-        """Return by how much a sound bench is off here, as fitted along: its nuisances."""
+        """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""
         problem, fit = self.posterior.problem, self.fit
         found = {"stress_gain": float(fit.linear[0])}
         if 1 not in problem.declared.free_positions:

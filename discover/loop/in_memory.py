@@ -59,7 +59,7 @@ def close_loop(
         ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``. They are part of the declared
         model and not proposed again.
     tolerance
-        Relative discrepancy that is good enough.
+        Relative discrepancy that is accepted.
     progress
         Called now and then with a line of text and about what fraction is done.
     **options

@@ -108,7 +108,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
     material
         The simple material that the runs show, recognised before any search; None where none is.
     tolerance
-        Relative discrepancy that is good enough.
+        Relative discrepancy that is accepted.
     folds
         The loops that left each run out in turn, where they were asked for; the held-out errors
         are then their means.

@@ -30,7 +30,7 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     Of runs that no fit saw, with what all runs share: zero, drift and loading are of each run.
     """
     problem, linear, fitter = search.problem, fit.linear, search.fitter
-    with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may run away
+    with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may diverge
         found = problem.model.predictions([fit.theta], rows.batch)[0]
     if held_out:
         fitter = Fitter(problem, rows)

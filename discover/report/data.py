@@ -22,7 +22,7 @@ from discover.report.wording import percent
 from discover.statistics import HALF_BAND
 from discover.words import counted, significant
 
-# From so many runs on one can be spared to judge
+# From so many runs on one can be spared as a test
 _ENOUGH_TO_HOLD_OUT = 3
 
 

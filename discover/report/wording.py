@@ -65,7 +65,7 @@ def percent(value: float | None) -> str:
 def percent_range(values: Sequence[float | None] | None) -> str:
     """Return the range of several fractions in brackets, to stand behind their mean.
 
-    Those that are None, where a law runs away, are counted.
+    Those that are None, where a law diverges, are counted.
     """
     if values is None or len(values) < 2:
         return ""

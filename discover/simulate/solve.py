@@ -29,7 +29,7 @@ _BUCKET = 401
 
 
 class SimulationError(RuntimeError):
-    """The law could not be integrated through the flow: its stress runs away or is too stiff."""
+    """The law could not be integrated through the flow: its stress diverges or is too stiff."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +214,7 @@ def simulate_homogeneous_flow(
 
     `velocity_gradient`: function of time that returns L, shape (3, 3). Flows that differ in the
     arrays of a `jax.tree_util.Partial` alone share a program. `times`: dimensionless sampling
-    times, shape (n,), increasing, from 0 on. Raises SimulationError if the stress runs away, as it
+    times, shape (n,), increasing, from 0 on. Raises SimulationError if the stress diverges, as it
     does in UCM beyond a critical extension rate.
     """
     found, successful = _solve_in_any_flow(

@@ -27,7 +27,7 @@ from discover.words import unknown_name
 class StudyData:
     """The data of a study, split.
 
-    `fit`, `held_out`: runs that fits may see, and runs that only judge.
+    `fit`, `held_out`: runs that fits may see, and runs that only test.
     """
 
     dataset: Dataset
@@ -101,19 +101,19 @@ def _with_tables(
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...] | None]:
     """Return the data with the tables beside the runs among them, those held out, and those fitted.
 
-    A table judges, unless the study says that it is fitted or there is nothing else to fit.
+    A table tests, unless the study says that it is fitted or there is nothing else to fit.
     """
     data = study.data
     kinds = (*TABLES, "lve")
     asked = {kind: getattr(data, kind) for kind in kinds if getattr(data, kind) is not None}
     dataset.with_material_functions(list(asked))  # those that are not there are refused
     there = list(dataset.material_functions)
-    # the linear sweep gives the modes, and is no judge unless it is asked for
+    # the linear sweep gives the modes, and is no test unless it is asked for
     if "lve" in asked or (dataset.linear_sweep is not None and not there and not len(dataset)):
         there.append("lve")
     roles = {kind: asked.get(kind, "judge" if len(dataset) else "fit") for kind in there}
     if data.held_out == "each":
-        # each run judges in turn, and nothing beside them
+        # each run tests in turn, and nothing beside them
         roles = {kind: role for kind, role in roles.items() if role == "fit" or kind in asked}
     if not roles:
         return dataset, held_out, data.fit
@@ -135,7 +135,7 @@ def _observed(
 ) -> tuple[Dataset, tuple[str, ...], tuple[str, ...]]:
     """Return the data with every quantity as a record, those held out, and those fitted.
 
-    What is recorded and not observed only judges.
+    What is recorded and not observed only tests.
     """
     dataset.select([*held_out, *(fit or ())])  # names that do not exist are refused
     whole = dataset.quantity_by_quantity()

@@ -20,7 +20,7 @@ from discover.study.data import StudyData
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
-"""What only judges: a data set of its own, or names of runs of the data set."""
+"""What only tests: a data set of its own, or names of runs of the data set."""
 
 
 _OF_EACH_MODE = "a law with constants of its own in each mode"
@@ -31,7 +31,7 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
 
     `data`: the runs to fit, and the held-out ones too where they are given by name. Of a data set
     without runs its tables are fitted, or its linear sweep where there is no other. `held_out`: A
-    data set of runs that only judge, names of runs of `data`, or ``"each"``. Raises InputError if
+    data set of runs that only test, names of runs of `data`, or ``"each"``. Raises InputError if
     no data set is given, a run is both fitted and held out, by name or by its samples, none is left
     to fit, or those to fit hold no signal.
     """

@@ -71,7 +71,7 @@ class NextExperiment(Section):
 
 
 class Compare(Section):
-    """Which learners, which candidate terms, which flows they are judged on."""
+    """Which learners, which candidate terms, which flows they are tested on."""
 
     learners: tuple[LearnerName, ...] = ("tensor_sindy", "tbnn_ude")
     """Learners to compare."""
@@ -120,7 +120,7 @@ class Compare(Section):
 
 
 Role = Literal["fit", "judge"] | None
-"""What a table beside the runs is for; by default it judges, unless there is no run to fit."""
+"""What a table next to the runs is for; by default it tests, unless there is no run to fit."""
 
 
 class Synthetic(Section):
@@ -380,7 +380,7 @@ class Verdict(Section):
     """Size of the discrepancy that the user accepts."""
 
     tolerance: Annotated[float, Field(gt=0, le=1)] = TOLERANCE
-    """Relative discrepancy that is good enough; 0.05 means 5 %."""
+    """Relative discrepancy that is accepted; 0.05 means 5 %."""
 
 
 class Study(Section):
@@ -397,7 +397,7 @@ class Study(Section):
     report: Report = Report()
     """What the page shows besides."""
     verdict: Verdict = Verdict()
-    """What is good enough."""
+    """What is accepted."""
     _path: Path | None = PrivateAttr(default=None)
     _text: str = PrivateAttr(default="")
 

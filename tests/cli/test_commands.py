@@ -351,6 +351,8 @@ def test_completion_knows_commands_and_options():
 
     assert completed("discover close") == ["close-loop"]
     assert "--held-out" in completed("discover fit --held")
+    assert "giesekus" in completed("discover fit giese")
+    assert completed("discover export results --format rheo") == ["rheotool"]
     assert completed("discover zzz") == []  # control: nothing begins so
 
 
@@ -364,3 +366,14 @@ def test_help_loads_no_more_than_it_shows():
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert "--show-completion" in done.stdout
     assert done.stdout.strip().endswith("[]")
+
+
+def test_a_folder_in_place_of_a_study_is_answered_with_a_study(tmp_path):
+    (tmp_path / "a.csv").write_text("time_s\n")
+    bare = CliRunner().invoke(app, ["close-loop", str(tmp_path)])
+    assert bare.exit_code == 2
+    assert "Give a study file" in bare.stderr
+    (tmp_path / "melt.toml").write_text("")
+    meant = CliRunner().invoke(app, ["close-loop", str(tmp_path)])
+    assert "Did you mean" in meant.stderr
+    assert "melt.toml" in meant.stderr

@@ -31,7 +31,7 @@ def giesekus_start_up(rate, times):
     return found.y[2]
 
 
-def data_of(stress_of, rates, seed=0):
+def data_of(stress_of, rates, seed=0, sweep=None):
     generator = np.random.default_rng(seed)
     times = np.linspace(0.05, 8.0, 80)
     frames = []
@@ -48,7 +48,8 @@ def data_of(stress_of, rates, seed=0):
                 }
             )
         )
-    return dc.from_dataframe(pd.concat(frames))
+    tables = None if sweep is None else {"lve": sweep}
+    return dc.from_dataframe(pd.concat(frames), tables=tables)
 
 
 @pytest.fixture(scope="module")
@@ -165,3 +166,38 @@ def test_the_command_writes_page_json_and_equation(data, tmp_path):
     assert "Fits to the noise" in (out / "report.html").read_text()
     assert (out / "equations.tex").exists()
     assert (out / "figures" / "runs.svg").exists()
+
+
+def test_a_fit_has_the_answer_of_the_other_commands(fitted):
+    use = fitted.use
+    # start-ups of 0.5, 1.5 and 3 were fitted, that of 6 was held out
+    assert use["range"]["rate_1_s"] == [0.5, 3.0]
+    # twice as fast as any that was fitted
+    assert use["expected_error_beyond"]["sigma12"] == pytest.approx(fitted.held_out_error)
+    assert use["expected_error"]["N2"] is None
+    assert fitted.adequate
+    assert fitted.answer.headline.startswith("Giesekus, α = 0.3")
+    assert any("Fits to the noise" in note for note in fitted.answer.equation.notes)
+
+
+def test_a_solvent_that_is_fitted_is_the_whole_one():
+    viscosity, modulus, time = 12.0, 50.0, 1.2
+
+    def oldroyd_b(rate, times):  # closed form of the upper convected Maxwell start-up
+        return rate * (modulus * time * (1.0 - np.exp(-times / time)) + viscosity)
+
+    omega = np.geomspace(0.01, 100.0, 25)
+    x = omega * time
+    sweep = pd.DataFrame(
+        {
+            "omega_rad_s": omega,
+            "Gp_Pa": modulus * x**2 / (1 + x**2),
+            "Gpp_Pa": modulus * x / (1 + x**2) + viscosity * omega,
+        }
+    )
+    data = data_of(oldroyd_b, (0.3, 1.0), sweep=sweep)
+    assert dc.Fluid.from_sweep(data.linear_sweep).solvent_viscosity == pytest.approx(12.0, rel=0.1)
+    found = dc.fit("ucm", data, effects={"solvent_viscosity": "fit"})
+    name = next(name for name in found.summary().index if name.startswith("solvent_viscosity"))
+    low, high = found.conf_int(0.999).loc[name]
+    assert low < viscosity < high  # and not zero, beside the solvent of the sweep

@@ -85,3 +85,34 @@ def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
 def test_a_loop_page_begins_with_its_answer(tmp_path, few_pictures):  # noqa: F811
     page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
     assert page.index('id="answer"') < page.index('id="verdict"')
+
+
+def test_the_level_of_the_intervals_is_said_once():
+    sums = Constant("consistency_Pa_sn", 4.0, (3.9, 4.1), "Pa sⁿ")
+    fluid = Answer(
+        "yield-stress fluid", "herschel_bulkley",
+        (Constant("yield_stress_Pa", 12.0, (11.9, 12.1), "Pa"), sums),
+    )  # fmt: skip
+    assert fluid.headline.count("95 %") == 1
+    assert "K = 4.00 Pa sⁿ (3.90–4.10)" in fluid.headline
+    declared = replace(fluid, constants=(Constant("alpha", 0.2), sums))
+    assert declared.headline.count("(95 %: 3.90–4.10)") == 1  # α has no interval that could say it
+
+
+def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy():
+    law, classical = Equation((LawTerm("tr(sigma)*sigma", 0.82),)), MELT.equation
+    answer = replace(MELT, equation=None, shown=law, classical=classical)
+    screen = answer_screen(answer)
+    assert "0.82" in screen["law"]
+    assert screen["copied"] == "Copy the best classical law as"
+    assert all(one["text"] for one in screen["copies"])
+    bare = answer_screen(replace(answer, classical=None))
+    assert bare["copied"] == "Copy as"
+    assert not any(one["text"] for one in bare["copies"] if one["name"] != "JSON")
+
+
+def test_numbers_keep_to_a_line_with_their_units():
+    exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
+    (row,) = answer_screen(exact)["constants"]
+    assert " " not in row[1].replace(" ×", "")  # a break at most before the power of ten
+    assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]

@@ -243,3 +243,13 @@ def test_a_title_with_half_characters_is_written(tmp_path):
     name = os.fsdecode(b"m\xe9lange")  # latin-1, as old disks have it
     RunFolder(tmp_path, "abc").write("report.html", f"<title>{name}</title>")
     assert (tmp_path / "report.html").read_text("utf-8") == "<title>m\\udce9lange</title>"
+
+
+@pytest.mark.parametrize("modes", ["lvee", True, 1.5])
+def test_a_value_of_several_kinds_is_refused_in_one_line(modes):
+    content = {"data": {"folder": "x"}, "model": {"modes": modes}}
+    with pytest.raises(InputError) as refused:
+        parse_study(content)
+    assert "constrained" not in str(refused.value)
+    assert str(refused.value).count("model.modes") == 1
+    assert parse_study({**content, "model": {"modes": 3}}).model.modes == 3

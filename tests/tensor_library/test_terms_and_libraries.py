@@ -126,3 +126,8 @@ def test_complexity_orders_simple_before_involved():
 def test_a_wrong_description_is_refused_with_what_was_wanted(arguments, message):
     with pytest.raises(ValueError, match=message):
         tl.build_library(**arguments)
+
+
+def test_a_library_takes_further_terms_once():
+    names = tl.build_library(extra=["tr(sigma)*sigma", "sigma"]).names
+    assert list(names) == [*tl.build_library().names, "tr(sigma)*sigma"]

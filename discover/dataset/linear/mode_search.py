@@ -81,7 +81,7 @@ class ModeSearch:
     """Search for modes with free relaxation times in one sweep.
 
     Non-negative least squares on a fine grid of times finds the most modes that the sweep supports
-    [Lawson & Hanson 1974]. Their times are then fitted along, and modes merged or left out one by
+    [Lawson & Hanson 1974]. Their times are then fitted jointly, and modes merged or left out one by
     one, the least missed first, down to one. Solvent and elastic constant are with and without.
     """
 
@@ -124,7 +124,7 @@ class ModeSearch:
     def elastic_time(self, fit: ModeFit) -> float:
         """Return the shortest time in s of a mode that the sweep cannot tell from the constant.
 
-        It raises the misfit by one standard deviation at most, the other amounts fitted along.
+        It raises the misfit by one standard deviation at most, the other amounts fitted jointly.
         """
         solvent, target = fit.kinds[0], self._target
         if not isinstance(self.elastic_modulus, str) and self.elastic_modulus is not None:
@@ -197,7 +197,7 @@ class ModeSearch:
         return replace(fit, criterion=self._criterion(fit))
 
     def _fitted(self, fit: ModeFit, limits: tuple[float, int]) -> ModeFit:
-        """Return the fit with the relaxation times fitted along, in logarithms."""
+        """Return the fit with the relaxation times fitted jointly, in logarithms."""
         tolerance, evaluations = limits
         k, kinds = len(fit.modulus), fit.kinds
         if not k:

@@ -162,7 +162,7 @@ def is_copy(one: Run, other: Run) -> bool:
 
 
 def require_no_copies(fitted: Sequence[Run], held_out: Sequence[Run]) -> None:
-    """Refuse to judge by a record that is fitted under another name; InputError names both.
+    """Refuse to test on a record that is fitted under another name; InputError names both.
 
     Among fitted runs a copy makes intervals a little too narrow: a check of the folder warns of it.
     """

@@ -22,7 +22,7 @@ class InASolver:
     """The extremes over the edge of a law's box.
 
     `smallest_eigenvalue`, `of_mode`: of the conformation, dimensionless (I + σ_k/G_k; of chains
-        that end, I + σ_k/(k G_k)), and its mode counted from 1; NaN where the law ran away.
+        that end, I + σ_k/(k G_k)), and its mode counted from 1; NaN where the law diverged.
     `largest_step`, `limiting_mode`: longest stable step of explicit Euler for the stress of a mode,
         in s; infinite where nothing decays.
     """
@@ -127,7 +127,7 @@ _jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(N
 def _extremes(
     law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float, budget: _Budget
 ) -> tuple[float, float]:
-    """Return the smallest eigenvalue of A and the longest step; NaN if σ runs away."""
+    """Return the smallest eigenvalue of A and the longest step; NaN if σ diverges."""
     times = np.linspace(0.0, end, _SAMPLES)
 
     def rate_at(t):

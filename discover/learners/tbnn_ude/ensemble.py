@@ -128,7 +128,7 @@ def choose_member(
 def member_misfits(
     laws: Sequence[TensorBasisNetwork], problem: TrainingProblem
 ) -> Float[np.ndarray, " members"]:
-    """Return the relative misfit of every law; infinite where it runs away."""
+    """Return the relative misfit of every law; infinite where it diverges."""
     misfits = np.array([np.linalg.norm(np.asarray(law_misfit(law, problem))) for law in laws])
     return np.where(np.isfinite(misfits), misfits, np.inf)
 
@@ -137,7 +137,7 @@ def member_misfits(
 class MemberPredictions:
     """What every member of an ensemble predicts in one flow.
 
-    `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that runs away.
+    `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that diverges.
     """
 
     times: Float[np.ndarray, " n"]  # in s, shape (n,)
@@ -146,7 +146,7 @@ class MemberPredictions:
     N2: Float[np.ndarray, "members n"]
 
     def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Return the lowest and the highest prediction at each time; nan where all ran away.
+        """Return the lowest and the highest prediction at each time; nan where all diverged.
 
         `quantity`: ``"sigma12"``, ``"N1"`` or ``"N2"``.
         """
@@ -169,7 +169,7 @@ def member_predictions(
         try:
             rows[:, i] = observe(fluid, protocol, times).T
         except SimulationError:
-            continue  # that it ran away is the answer
+            continue  # that it diverged is the answer
     return MemberPredictions(np.asarray(times, dtype=float), *rows)
 
 

@@ -321,7 +321,7 @@ def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> Training
 
 
 _WORTH_TRAINING_ON = 1.5
-"""Times fewer steps from which a rough grid pays; a law is judged on a grid of its own."""
+"""Times fewer steps from which a rough grid pays; a law is tested on a grid of its own."""
 
 
 def _rougher(

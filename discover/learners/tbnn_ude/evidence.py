@@ -34,7 +34,7 @@ def surprises(
 ) -> Float[np.ndarray, " laws"]:
     """Return −2 ln E of every law; the least is the likeliest.
 
-    It is infinite for a law that runs away, if there is one that does not: in the training flows,
+    It is infinite for a law that diverges, if there is one that does not: in the training flows,
     or in the same flows at twice the rate, in which every fluid has a finite stress.
 
     The noise is what the best of them leaves. Where that is correlated, so that no law of these is

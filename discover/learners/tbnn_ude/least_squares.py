@@ -249,7 +249,7 @@ class Stopping:
     A rejected step is no sign of an end: it teaches the damping. Only steps taken count, unless
     one rejection follows another. Of two descents that compete, the one far behind is given up.
 
-    `target`: misfit that is good enough. `pace`: misfits of a rival after each of its steps, or
+    `target`: misfit that is accepted. `pace`: misfits of a rival after each of its steps, or
     None.
     """
 
@@ -301,7 +301,7 @@ def minimise(
 ) -> Float[Array, " p"]:
     """Return better weights after at most `steps` Levenberg–Marquardt steps.
 
-    A step to weights whose trajectories run away has a misfit that is not finite; it is rejected
+    A step to weights whose trajectories diverge has a misfit that is not finite; it is rejected
     and the damping grows.
 
     `weights`: where to start. `steps`: largest number of steps. `callback`: called after every step

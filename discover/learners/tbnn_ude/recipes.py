@@ -161,7 +161,7 @@ _CHUNK = 50
 
 _INITIAL_OUTPUT = 0.01
 """Factor on the last layer's initial weights. A network of full size at the start makes some
-trajectories run away; the paper does not say how its network started."""
+trajectories diverge; the paper does not say how its network started."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ def make_network(key: PRNGKeyArray, width: int, linear_relaxation: bool) -> Tens
 
 
 def _with_series(problem: TrainingProblem, active: Bool[Array, " runs"]) -> TrainingProblem:
-    """Return the problem with the other series at rest, where they cannot run away."""
+    """Return the problem with the other series at rest, where they cannot diverge."""
     quiet = problem.flows.faster(active.astype(float))
     return eqx.tree_at(lambda p: p.flows, problem, quiet)
 
@@ -233,7 +233,7 @@ def _iterate(network, state, law, problem, active, penalty, rate):
         finite = jnp.isfinite(loss) & jnp.all(
             jnp.stack([jnp.all(jnp.isfinite(g)) for g in jax.tree.leaves(gradient)])
         )
-        # A trial that runs away is a rejected step: weights and moments stay as they were
+        # A trial that diverges is a rejected step: weights and moments stay as they were
         keep = jax.tree.map(lambda new, old: jnp.where(finite, new, old), updated, dynamic)
         kept_state = jax.tree.map(lambda new, old: jnp.where(finite, new, old), new_state, state)
         return (keep, kept_state), loss

@@ -152,7 +152,7 @@ class Session:
         return np.asarray(relative_misses(self.along(law), self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
-        """Return the relative misfit of a law; infinite where it runs away."""
+        """Return the relative misfit of a law; infinite where it diverges."""
         misfit = float(np.sqrt(np.sum(self.residual(law) ** 2)))
         return misfit if np.isfinite(misfit) else np.inf
 
@@ -175,7 +175,7 @@ class Session:
         target = 0.1 * self.recipe.exact
         weights = minimise(rebuild.start, objective, steps, self.record, target, pace)
         trained = rebuilt(rebuild, weights)
-        # a law that runs away in some run is no progress
+        # a law that diverges in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
 
     def white(self, law: TensorBasisNetwork) -> bool:
@@ -235,7 +235,7 @@ PRIOR_SHARE = 1e-6
 
 _POLISHED = 2
 _CLOSE = 1.5  # what lies further behind the best of a race is not polished
-_MORE_ROUNDS = 4  # with the least penalty, while they pay: near laws that run away steps are short
+_MORE_ROUNDS = 4  # with the least penalty, while they pay: near laws that diverge steps are short
 _STILL_GAINS = 0.95  # white or not, a residual that still falls so much holds more than noise
 
 

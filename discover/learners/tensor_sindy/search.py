@@ -144,7 +144,7 @@ class LinearModel:
         steps = np.where(fit.theta[at] + steps > problem.model.high[at], -steps, steps)
         thetas = np.tile(fit.theta, (len(at), 1))
         thetas[np.arange(len(at)), at] += steps
-        with np.errstate(over="ignore", invalid="ignore"):  # a term that runs away
+        with np.errstate(over="ignore", invalid="ignore"):  # a term that diverges
             columns = (fitter.predict(list(thetas)) - fit.predicted).T / steps
         columns = np.where(np.all(np.isfinite(columns), axis=0), columns, 0.0)
         record = fitter.record(fit)
@@ -259,7 +259,7 @@ class SupportSearch(Search):
                     if key not in self.found:
                         starts.setdefault(key, (start, centre))
             fits = self.add(start for start, _ in starts.values())
-            # what runs away where the linear model puts it begins at the law it was made at
+            # what diverges where the linear model puts it begins at the law it was made at
             lost = [
                 self.fitter.start(fit.names, centre.theta, centre.linear)
                 for fit, (_, centre) in zip(fits, starts.values(), strict=True)

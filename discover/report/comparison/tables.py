@@ -39,7 +39,7 @@ from discover.words import (
 def selection(comparison: Comparison) -> dict[str, Any] | None:
     """Return the sparse learner's path, or None where there is none.
 
-    A misfit is None where a law runs away in a run left out.
+    A misfit is None where a law diverges in a run left out.
     """
     sparse = comparison.outcomes.get("tensor_sindy")
     path = [] if sparse is None else sparse.details.get("path") or []

@@ -92,7 +92,6 @@ def write_loop(
         declared_effects=tables.declared_effects(result),
         rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
         folds=[tables.fold_row(fold) for fold in result.folds],
-        law=tables.law(result),
         remaining=tables.remaining_rows(result),
         loadings=tables.loadings(result),
         small_faults=SMALL_FAULTS,

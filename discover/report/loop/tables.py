@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from discover.effects import make_effect
-from discover.equations.spelling.markup import law_element
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
@@ -326,20 +325,6 @@ def declared_effects(result: LoopResult) -> list[dict[str, Any]]:
         for one in result.declared_effects
         for name, parameter in one.parameters.items()
     ]
-
-
-def law(result: LoopResult) -> str:
-    """Return the augmented law typeset; empty where it cannot be written out in one equation.
-
-    What a state of the whole fluid does is typeset with the stage that added it.
-    """
-    try:
-        equation = result.equation()
-    except InputError:
-        return ""
-    if equation.states:
-        return ""
-    return law_element(equation.terms, equation.linear_relaxation, equation.named)
 
 
 def fold_row(fold: Fold) -> dict[str, Any]:

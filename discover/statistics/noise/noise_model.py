@@ -164,7 +164,7 @@ def least_squares_covariance(
     `noise_model` takes them.
     """
     if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
-        # of a law that runs away beside its fit: nothing is known of its constants
+        # of a law that diverges beside its fit: nothing is known of its constants
         told = [np.nan_to_num(residual[rows], posinf=0.0, neginf=0.0) for rows in sequences]
         nothing = np.full((columns.shape[1],) * 2, np.inf)
         return nothing, nothing, noise_model(told, columns.shape[1], sizes)
@@ -244,7 +244,7 @@ def squared_distance(
 ) -> float:
     """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
 
-    By singular values: draws that nearly run away spread so far that the k × k matrix of Woodbury's
+    By singular values: draws that nearly diverge spread so far that the k × k matrix of Woodbury's
     identity is singular to rounding.
     """
     _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
