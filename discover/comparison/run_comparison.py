@@ -227,6 +227,7 @@ def compare(
     progress("weighing what was found", 0.95)
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
+    found = found.with_curves()
     silent_ = found.ended().verdict == "no_signal"
     outcomes = {
         name: _told(replace(one, terms=proposed[name].terms), silent_)
