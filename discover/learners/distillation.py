@@ -146,9 +146,14 @@ def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: float):
         return np.asarray(found), np.asarray(columns).T
 
     ended = least_squares(
-        lambda moved: at(tuple(moved))[0], np.asarray(free), lambda moved: at(tuple(moved))[1],
-        ftol=_TOLERANCE, xtol=_TOLERANCE, gtol=_TOLERANCE, max_nfev=_MOST_STEPS,
-    )  # fmt: skip
+        lambda moved: at(tuple(moved))[0],
+        np.asarray(free),
+        jac=lambda moved: at(tuple(moved))[1],  # pyright: ignore[reportArgumentType]
+        ftol=_TOLERANCE,
+        xtol=_TOLERANCE,
+        gtol=_TOLERANCE,
+        max_nfev=_MOST_STEPS,
+    )
     return jnp.asarray(ended.x), 2.0 * ended.cost
 
 
