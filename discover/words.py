@@ -150,6 +150,9 @@ _EFFECTS = {
     "non_affine_motion": "non-affine motion",
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",
+    "thixotropic_modulus_by_stress": "stress-driven thixotropic modulus",
+    "thixotropic_relaxation_by_stress": "stress-driven thixotropic relaxation",
+    "thixotropic_relaxation_two_times": "thixotropic relaxation with two times",
 }
 
 

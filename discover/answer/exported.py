@@ -38,7 +38,7 @@ def simple_material_text(folder: str | Path, form: str, density_kg_m3: float | N
 
 
 def _written(use: dict[str, Any], density: float) -> tuple[Answer, dict[str, str]]:
-    constants = use["constants"].values() if isinstance(use.get("constants"), dict) else ()
+    constants: list[Any] = list(dict(use["constants"]).values())
     values = [float(one["value"]) for one in constants]
     ends = [[float(end) for end in one["ci95"] or (value, value)]
             for one, value in zip(constants, values, strict=True)]  # fmt: skip

@@ -30,9 +30,11 @@ def law(answer: Any) -> str:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
     # of a sum without a name the table has the constants
-    own = answer.constants if answer.law is not None else ()
     several = len(answer.modes) > 1
-    own = [one for one in own if not several or one.name not in _OF_MODES]
+    own = [
+        one for one in answer.constants
+        if (not several if one.name in _OF_MODES else answer.law is not None)
+    ]  # fmt: skip
     own = sorted(own, key=lambda one: one.name in _OF_MODES)
     named = constants(own[:_MOST_CONSTANTS])
     if several:
@@ -141,7 +143,7 @@ def tolerance(answer: Any) -> str:
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        said = f"missed{lost}{f', met{kept}' if met else ''}"
+        said = f"missed{lost or ' by the fitted runs'}{f', met{kept}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
         said = f"met by the fitted runs, missed{lost}"
     else:

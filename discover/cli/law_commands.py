@@ -62,6 +62,7 @@ def fit(
     tolerance: ToleranceOption = None,
 ) -> None:
     """Fit one named law: constants, intervals, correlation, and how well it describes the runs."""
+    from discover.answer import TOLERANCE
     from discover.compilation_cache import enable_compilation_cache
     from discover.dataset import load_dataset
     from discover.first_use import enable_x64
@@ -83,7 +84,7 @@ def fit(
         fixed=numbers[1],
         effects={"solvent_viscosity": "fit"} if solvent else None,
         held_out=held_out or (),
-        **({} if tolerance is None else {"tolerance": tolerance}),
+        tolerance=TOLERANCE if tolerance is None else tolerance,
     )
     if out is not None:
         _write(found, out, overwrite)

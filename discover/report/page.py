@@ -187,7 +187,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 "inside": expected(one, "inside"),
                 "beyond": expected(one, "beyond"),
                 "known": one.is_known,
-                "note": one.note,
+                "note": _unbroken(one.note),
             }
             for symbol, one in rows
         ],
