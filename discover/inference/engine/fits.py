@@ -230,8 +230,10 @@ class Fitter:
     def start(
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
     ) -> Fit:
-        """Return a hypothesis before its first step."""
+        """Return a hypothesis before its first step; what is not in it is not there."""
         priors, theta = Priors(self.priors(names)), theta.copy()
+        absent = np.setdiff1d(np.arange(len(theta)), priors.positions)
+        theta[absent] = self.problem.zero[absent]
         for at, prior in priors.items():
             theta[at] = np.clip(theta[at], prior.low, prior.high)
         linear = np.zeros(self.linear_count) if linear is None else linear
