@@ -1,5 +1,6 @@
 """Packages that answer a call: ``discover.laws()`` beside ``discover.laws.Giesekus``."""
 
+import inspect
 import sys
 from collections.abc import Callable
 from types import ModuleType
@@ -24,4 +25,7 @@ def answer_calls(package: str, answer: Callable[..., Any]) -> None:
         def __call__(self, *args: Any, **options: Any) -> Any:
             return answer(*args, **options)
 
-    sys.modules[package].__class__ = CallablePackage
+    module = sys.modules[package]
+    module.__class__ = CallablePackage
+    module.__doc__ = f"{inspect.getdoc(answer)}\n\n{inspect.getdoc(module)}"
+    module.__signature__ = inspect.signature(answer)  # type: ignore[attr-defined]

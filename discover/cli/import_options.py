@@ -208,7 +208,7 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str
     folder = here.resolve().as_posix() if here.is_dir() else name
     make_folder(out)
     path = _place_for_page(out, PAGE, IMPORT_PAGE)
-    kept = [] if path.name == PAGE else [f"{out / PAGE} is not a data page; it was kept."]
+    kept = [] if path.name == PAGE else [f"{out / PAGE} is not a data page and is kept."]
     _write_page(dataset, folder, path, check_folder(name))
     if not _write_study(dataset, folder, out):
         kept.append(

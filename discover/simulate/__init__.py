@@ -1,4 +1,13 @@
-"""From a fluid and a protocol to stresses, to a tolerance, and to data sets made of them."""
+"""From a fluid and a protocol to stresses, to a tolerance, and to data sets made of them.
+
+Examples
+--------
+>>> import numpy as np, discover as dc
+>>> fluid = dc.Fluid(dc.make_law("ucm"), 1.0, 1.0)
+>>> stress = dc.simulate(fluid, dc.start_up(1.0), np.array([1.0, 10.0]))
+>>> print(np.round(stress.components[:, 3], 3))
+[0.632 1.   ]
+"""
 
 from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
 from discover.callable_package import answer_calls

@@ -89,11 +89,24 @@ def simulate(
     Tsitouras' explicit method, a wide one with an exponential method that is exact for linear
     relaxation.
 
-    `fluid`: the fluid, in the units of `times`; `Fluid.dimensionless` for a bare law. `times`:
-    sampling times, shape (n,), increasing, from 0 on. `rtol`, `atol`: tolerances on the
-    dimensionless stress of each mode. What begins with a periodic state is followed in fixed steps
-    instead, for that state is solved for. Raises InputError if the flow is not at a given rate.
-    Raises SimulationError if no solution to this tolerance was found within 100,000 steps.
+    Parameters
+    ----------
+    fluid
+        The fluid, in the units of `times`; `Fluid.dimensionless` for a bare law.
+    protocol
+        Flow at a given rate. What begins with a periodic state is followed in fixed steps instead,
+        for that state is solved for.
+    times
+        Sampling times in s, shape (n,), increasing, from 0 on.
+    rtol, atol
+        Tolerances on the dimensionless stress of each mode.
+
+    Raises
+    ------
+    InputError
+        If the flow is not at a given rate.
+    SimulationError
+        If no solution to this tolerance was found within 100,000 steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in ("stress", "oscillation"):

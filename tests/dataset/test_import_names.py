@@ -180,8 +180,8 @@ def test_names_of_the_users_own_are_read_and_kept_for_the_next_import(tmp_path):
     [
         ('shear_rte = ["a"]', "Did you mean 'shear_rate'"),
         ('stress = "tau"', "must be a list"),
-        ("stress = [3]", "no name"),
-        ('stress = ["()"]', "no name"),
+        ("stress = [3]", "not a name"),
+        ('stress = ["()"]', "not a name"),
         ("stress = [", "own.toml"),
     ],
 )

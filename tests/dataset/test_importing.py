@@ -240,7 +240,7 @@ BAD = {
     "unknown quantity": (["--column", "viscosity=x"], "viscosity"),
     "no equals sign": (["--column", "stress"], "name=value"),
     "column that is not there": (["--column", "N2=Second"], "'Second'"),
-    "unit of something else": (["--unit", "stress=s"], "no unit of stress"),
+    "unit of something else": (["--unit", "stress=s"], "not a unit of stress"),
     "a sum for a unit": (["--unit", "stress=9**9**9**9"], "not known"),
     "no encoding of text": (["--encoding", "base64"], "no encoding"),
     "an encoding of domain names": (["--encoding", "idna"], "no encoding"),

@@ -167,6 +167,6 @@ def test_the_ten_answers_run():
             del LAWS[name]
     assert len(re.findall(r"^## \d+\. .*\?$", (ROOT / page).read_text("utf-8"), re.M)) == 10
     assert (names["errors"] > 0.0).all()
-    assert "the rest is systematic" in names["answer"]  # the runs were made with another α
+    assert "The misfit is systematic" in names["answer"]  # the runs were made with another α
     assert names["loop"].verdict == "effects_added"
     assert names["number"] == 1

@@ -52,5 +52,5 @@ def test_the_network_sees_every_state_of_a_sweep_in_fewer_steps(tmp_path):
     rough, said = of_network._rougher(fine, runs, known, 100)
     assert np.array_equal(rough.records.recorded, fine.records.recorded)
     assert rough.flows.n_steps <= fine.flows.n_steps / 1.5
-    assert "fewer steps than it is judged in" in said
+    assert "fewer steps than it is tested in" in said
     assert "samples" not in said

@@ -154,7 +154,7 @@ def test_a_lock_that_is_no_plain_file_is_refused_at_once(tmp_path, kind, monkeyp
         lock.symlink_to(tmp_path / "elsewhere")
     else:
         lock.mkdir()
-    with pytest.raises(InputError, match="no plain file"):
+    with pytest.raises(InputError, match="not a plain file"):
         RunFolder(tmp_path, "abc")
     assert not (tmp_path / "elsewhere").exists()
 

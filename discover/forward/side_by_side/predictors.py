@@ -185,7 +185,7 @@ class StatePredictor(LanePredictor):
     def _by_states(
         self,
         thetas: Float[np.ndarray, "trials p"],
-        alike: Sequence[Int[np.ndarray, " states"]],
+        alike: Sequence[Int[np.ndarray, " _"]],
         eights_at_once: int,
         solve: Callable[[np.ndarray, np.ndarray, np.ndarray], None],
     ) -> None:
