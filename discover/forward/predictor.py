@@ -118,7 +118,7 @@ class Predictor:
         self, trials: Trials, piece: _Piece, normal: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
         program, (part, judging, runs) = self.program, piece
-        judged = [program.is_judged_by_modes(theta) for theta in trials.thetas]
+        judged = program.are_judged_by_modes(trials.thetas)
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         kernel = self.side_by_side(part)
         if kernel is None:

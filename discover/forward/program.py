@@ -9,6 +9,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
@@ -124,10 +125,11 @@ class Program:
         self._known_parts = [*self._known_parts[1 - _KEPT :], (part, found)]
         return found
 
-    def is_judged_by_modes(self, theta: np.ndarray) -> bool:
-        """Return whether nothing alters the record after the modes, or gives way in series."""
+    def are_judged_by_modes(self, thetas: Float[np.ndarray, "trials p"]) -> np.ndarray:
+        """Return whether nothing alters each record after the modes, or gives way in series."""
         after = (*self._signal, *self.fluid.series)
-        return not any(theta[self.fluid.slices[effect.name].start] for effect in after)
+        at = [self.fluid.slices[effect.name].start for effect in after]
+        return ~np.any(thetas[:, at], axis=1)
 
     def _predict_all(self, numbers, used, theta, runs: Flows):
         if isinstance(runs, PeriodicFlows):
