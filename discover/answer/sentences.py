@@ -135,11 +135,9 @@ def tolerance(answer: Any) -> str:
     if answer.adequate is None:
         return ""
     asked = percent_of(answer.tolerance)
-    met = [
-        SYMBOLS[name] if answer.expected(name).is_measured else f"{SYMBOLS[name]} (not measured)"
-        for name in SYMBOLS
-        if answer.within_tolerance(name)
-    ]
+    within = [name for name in SYMBOLS if answer.within_tolerance(name)]
+    met = [SYMBOLS[name] for name in within if answer.expected(name).is_measured]
+    assumed = [SYMBOLS[name] for name in within if not answer.expected(name).is_measured]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
@@ -149,6 +147,8 @@ def tolerance(answer: Any) -> str:
     else:
         said = f"met{kept}{f', missed{lost}' if missed else ''}"
     parts = [f"Tolerance of {asked}: {said}"]
+    if assumed:
+        parts.append(f"{listed(assumed)} within it if this law holds, not measured")
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
     over = sorted((n for n in by_run if by_run[n] > answer.tolerance), key=lambda n: -by_run[n])
     if over and len(over) < len(by_run):

@@ -341,7 +341,7 @@ def _of_stress(result: Any) -> ExpectedError:
     if inside is None and result.material is not None:
         return ExpectedError(result.error_after.fit, beyond, note="fitted runs, noise included")
     if inside is None and result.left_out_error is not None:
-        return ExpectedError(result.left_out_error, beyond, note="runs left out, beside noise")
+        return ExpectedError(result.left_out_error, beyond, note="runs left out, noise removed")
     return ExpectedError(inside, beyond, note="unseen runs, noise included" if held else "")
 
 
