@@ -25,7 +25,7 @@ from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
-from discover.loop.parts import DeclaredEffect
+from discover.loop.parts import DeclaredEffect, NearestLaw
 from tensor_library import LawTerm
 
 
@@ -295,3 +295,20 @@ def test_an_export_replaces_no_link_even_where_it_is_asked_to(results, tmp_path)
     assert "is a link" in done.stderr
     assert (tmp_path / "law.tex").is_symlink()
     assert target.read_text() == "years"
+
+
+def test_the_nearest_classical_law_stands_in_the_result_and_is_exported_in_place_of_the_answer(
+    tmp_path,
+):
+    equation = loop_result(base=("giesekus", {"alpha": 0.137})).equation()
+    near = NearestLaw("giesekus", {"alpha": StageParameter(0.1, (0.05, 0.2), "1")}, 0.12, equation)
+    replace(loop_result(("yield_stress", 0.1)), nearest_law=near).write_json(tmp_path / "loop.json")
+    said = json.loads((tmp_path / "loop.json").read_text())["nearest_law"]
+    assert (said["law"], said["size"]) == ("giesekus", 0.12)
+    assert said["constants"]["alpha"] == {"value": 0.1, "ci95": [0.05, 0.2], "unit": "1"}
+    exported = invoke("export", tmp_path, "--format", "python")
+    assert exported.exit_code == 0, exported.output
+    assert "0.137" in exported.stdout
+    # negative control: without one the law that cannot be written out is refused
+    loop_result(("yield_stress", 0.1)).write_json(tmp_path / "loop.json")
+    assert invoke("export", tmp_path, "--format", "python").exit_code == 2
