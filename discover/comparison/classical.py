@@ -160,12 +160,7 @@ def _result(
     for constant, at in places.items():
         if constant not in LAWS[name].parameters:
             continue
-        prior, place = fit.priors[at], fit.free.index(at)
-        half = 1.96 * float(np.sqrt(fit.covariance[place, place]))
-        middle = fit.coordinates[place]
-        low, high = (prior.to_value(float(np.clip(end, *prior.ends)))
-                     for end in (middle - half, middle + half))  # fmt: skip
-        values[constant], ends[constant] = float(fit.theta[at]), (low, high)
+        values[constant], ends[constant] = float(fit.theta[at]), fit.interval(at)
     off = (rows.recorded - fitter.record(fit)) / rows.size
     misfit = float(np.mean(rows.rms_by_run(off)))
     return ClassicalFit(

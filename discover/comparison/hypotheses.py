@@ -34,7 +34,6 @@ _NEAR = 0.3
 """Distance of a coefficient from one within which the exponential term is exponential PTT."""
 
 MOST_EFFECTS = 3
-_HALF_BAND = 1.959963984540054
 
 
 def search_hypotheses(
@@ -172,11 +171,7 @@ def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[R
         name, factor = _EFFECTS.get(term.term, (term.term, 1.0))
         name = "ptt_exponential" if term.term == _EXPONENTIAL else name
         at = model.positions(name)[0]
-        prior, place = fit.priors[at], fit.free.index(at)
-        half = _HALF_BAND * float(np.sqrt(fit.covariance[place, place]))
-        middle = fit.coordinates[place]
-        ends = (np.clip(middle - half, *prior.ends), np.clip(middle + half, *prior.ends))
-        low, high = (prior.to_value(float(end)) / factor for end in ends)
+        low, high = (end / factor for end in fit.interval(at))
         value = float(fit.theta[at]) / factor
         if term.term == _EXPONENTIAL:
             inner = {"epsilon": value}

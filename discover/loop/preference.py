@@ -11,7 +11,6 @@ from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import norm
 
 from discover.answer.naming import named_law
 from discover.equations import Equation, law_parts
@@ -34,8 +33,6 @@ _MOST = 8
 
 _AS_WELL = float(np.log(0.05))
 """Log of odds against the best down to which runs left out do not exclude a law."""
-
-_HALF_95 = float(norm.ppf(0.975))
 
 
 @in_one_thread
@@ -94,12 +91,9 @@ def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
     constants = {}
     for key, value in values.items():
         ends = value, value  # one that was declared
-        for i, at in enumerate(fit.free):
+        for at in fit.free:
             if fit.covariance is not None and np.isclose(fit.theta[at], value, rtol=1e-6, atol=0.0):
-                half = _HALF_95 * np.sqrt(fit.covariance[i, i])
-                prior = fit.priors[at]
-                low, high = np.clip(fit.coordinates[i] + half * np.array([-1.0, 1.0]), *prior.ends)
-                ends = prior.to_value(low), prior.to_value(high)
+                ends = fit.interval(at)
         constants[key] = StageParameter(value, ends, "1")
     return NearestLaw(name, constants, size, equation)
 

@@ -141,7 +141,7 @@ class Discrepancy:
         rows = fitter.rows
         self.record = fitter.record(fit)
         stiff = fit.priors.pulls(fit.coordinates)[:, 1]
-        self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.widths(0.0 * fit.linear, 1.0)])
+        self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.usual_widths])
         self.offset = np.concatenate([fit.coordinates - fit.priors.centres, fit.linear])
         self.names, self._steps = self._others()
         unused = self.signatures(fitter, fit.predicted)

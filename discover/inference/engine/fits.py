@@ -16,6 +16,7 @@ from discover.inference.engine.problem import (
     Problem,
 )
 from discover.inference.engine.rows import Rows
+from discover.statistics import HALF_BAND
 
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""
@@ -105,6 +106,14 @@ class Fit:
         ends = self.priors.ends
         return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
 
+    def interval(self, position: int) -> tuple[float, float]:
+        """Return the 95 % interval of a free constant by this fit alone, inside its range."""
+        assert self.covariance is not None
+        at, prior = self.free.index(position), self.priors[position]
+        half = HALF_BAND * float(np.sqrt(self.covariance[at, at]))
+        low, high = np.clip(self.coordinates[at] + half * np.array([-1.0, 1.0]), *prior.ends)
+        return prior.to_value(low), prior.to_value(high)
+
 
 def _running_away() -> np.errstate:
     """Return what lets a trial that runs away be a rejected step, without a word."""
@@ -179,6 +188,12 @@ class Fitter:
     def linear_count(self) -> int:
         """How much is linear in the records."""
         return int(self.deviations[-1][0].stop)
+
+    @property
+    def usual_widths(self) -> Float[np.ndarray, " q"]:
+        """Standard deviations of what is linear, as they usually are."""
+        counts = [at.stop - at.start for at, _ in self.deviations]
+        return np.repeat([known.size for _, known in self.deviations], counts)
 
     def widths(
         self, linear: Float[np.ndarray, " q"], least: float = 0.0

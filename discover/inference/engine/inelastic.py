@@ -21,7 +21,6 @@ from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import NONE, SAME, Posterior
 from discover.inference.engine.priors import Prior
 from discover.linear_algebra_threads import in_one_thread
-from discover.statistics import HALF_BAND
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
 _NO_FLUID = ""
@@ -157,19 +156,11 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
         off = (fitter.record(alive[0]) - fitted.record(fit)) / noise
         if np.sqrt(np.mean(off**2)) < SAME:
             other -= _NEAR
-    odds = rank - float(np.logaddexp(other, nothing))
-    if odds < 0.0:
+    if rank < np.logaddexp(other, nothing):
         return None
     beside = Discrepancy(fitted, fit).log_factor + np.log(NONE / (1.0 - NONE))
     odds = rank - float(np.logaddexp.reduce([other, nothing, rank + beside]))
     if odds < 0.0:
         return None
-    assert fit.covariance is not None
-    ends = HALF_BAND * np.sqrt(np.diag(fit.covariance))[: len(fit.priors)]
-    prior = list(fit.priors.values())
-    spans = [
-        (p.to_value(max(c - e, p.ends[0])), p.to_value(min(c + e, p.ends[1])))
-        for p, c, e in zip(prior, fit.coordinates, ends, strict=True)
-    ]
-    values = tuple(map(float, fit.theta))
-    return Inelastic(law, values, tuple(spans), fitted.misfit(fit), odds)
+    spans = tuple(map(fit.interval, fit.free))
+    return Inelastic(law, tuple(map(float, fit.theta)), spans, fitted.misfit(fit), odds)

@@ -36,10 +36,6 @@ class Prior:
         """Whether the coordinate that is fitted is the logarithm of the constant."""
         return self.kind == "logarithm"
 
-    def to_coordinate(self, value: float) -> float:
-        """Return the coordinate that is fitted, of the constant."""
-        return float(np.log(value)) if self.is_logarithm else float(value)
-
     def to_value(self, coordinate: float) -> float:
         """Return the constant, of the coordinate."""
         return float(np.exp(coordinate)) if self.is_logarithm else float(coordinate)
