@@ -1,11 +1,13 @@
 """Laws by name: which named law a sum of terms is, with its constants."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from discover.equations.equation import Equation
+from discover.laws.base import NamedLaw
 from discover.laws.registry import LAWS, starting_values
 from tensor_library.law_terms import LawTerm
 
@@ -32,13 +34,12 @@ def named_law(equation: Equation) -> tuple[str, dict[str, float]] | None:
 
 
 def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, float]] | None:
-    names = sorted(term.term for term in terms)
+    names = tuple(sorted(term.term for term in terms))
     wanted = _numbers(terms)
     for name, law in LAWS.items():
-        start = starting_values(name)
-        own = law.build(*start.values()).as_terms()
-        if own is None or sorted(term.term for term in own) != names:
+        if _names_of(name, law) != names:
             continue
+        start = starting_values(name)
         if not start:
             return name, {}
         low, high = np.transpose(list(law.parameters.values()))
@@ -52,6 +53,13 @@ def _of_terms(terms: Sequence[LawTerm]) -> tuple[str, dict[str, float]] | None:
         if np.max(np.abs(found.fun)) <= _SAME * max(float(np.max(np.abs(wanted))), 1e-3):
             return name, dict(zip(start, map(float, found.x), strict=True))
     return None
+
+
+@lru_cache
+def _names_of(name: str, law: NamedLaw) -> tuple[str, ...] | None:
+    """Return the names of the terms that a law is; None where it is no sum of these."""
+    own = law.build(*starting_values(name).values()).as_terms()
+    return None if own is None else tuple(sorted(term.term for term in own))
 
 
 def _numbers(terms: Sequence[LawTerm]) -> np.ndarray:

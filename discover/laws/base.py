@@ -206,7 +206,7 @@ def as_parameter(value: ArrayLike) -> Float[Array, ""]:
     return jnp.asarray(value, dtype=jnp.result_type(float))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NamedLaw:
     """A law that can be asked for by name.
 

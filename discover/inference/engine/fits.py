@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -59,7 +60,7 @@ class Fit:
         The likeliest noise.
     jacobian
         Derivatives of `predicted` with respect to the coordinates of the free constants, then of
-        what is linear, shape (rows, free + q).
+        what is linear, shape (rows, free + q). None where they were not taken at these constants.
     covariance, root
         Of these, and a factor of it: root rootᵀ, both of shape (free + q, free + q).
     log_evidence
@@ -101,7 +102,7 @@ class Fit:
         """Coordinates of the free constants."""
         return self.priors.coordinates(self.theta)
 
-    def at(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, " p"]:
+    def at(self, coordinates: Float[np.ndarray, "*trials free"]) -> Float[np.ndarray, "*trials p"]:
         """Return the constants at other coordinates of what is free, inside their ranges."""
         ends = self.priors.ends
         return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
@@ -133,6 +134,7 @@ class Fitter:
         self.problem, self.rows = problem, rows
         self.noise = NoiseModel(rows, None, problem.noise)
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
+        self._priors: dict[tuple[str, ...], Priors] = {}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
         self._own = (rows.run[:, None] == np.arange(len(rows.runs))).astype(float)
@@ -246,7 +248,10 @@ class Fitter:
         self, names: Sequence[str], theta: np.ndarray, linear: np.ndarray | None = None
     ) -> Fit:
         """Return a hypothesis before its first step; what is not in it is not there."""
-        priors, theta = Priors(self.priors(names)), theta.copy()
+        key = tuple(names)
+        if key not in self._priors:
+            self._priors[key] = Priors(self.priors(key))
+        priors, theta = self._priors[key], theta.copy()
         absent = np.setdiff1d(np.arange(len(theta)), priors.positions)
         theta[absent] = self.problem.zero[absent]
         for at, prior in priors.items():
@@ -256,15 +261,32 @@ class Fitter:
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
         return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
 
-    def _set(self, fit: Fit, predicted: np.ndarray) -> None:
-        """Set what a prediction of the model says of a hypothesis."""
-        fit.predicted = predicted
-        record = self.record(fit)
-        left = self.rows.recorded - record
-        fit.log_likelihood, fit.noise = self.noise_of(fit).log_likelihood(left, record)
-        known = fit.priors.log_density(fit.coordinates)
-        known += sum(one.log_density(fit.linear[at]) for at, one in self.deviations)
-        fit.log_posterior = fit.log_likelihood + known
+    def _set(self, fits: Sequence[Fit], predicted: Float[np.ndarray, "fits rows"]) -> None:
+        """Set what predictions of the model say of hypotheses."""
+        for fit, own in zip(fits, predicted, strict=True):
+            fit.predicted = own
+        records = np.array([self.record(fit) for fit in fits]).reshape(-1, len(self.rows))
+        values, noises = self._log_likelihoods(fits, records)
+        for fit, value, noise in zip(fits, values, noises, strict=True):
+            fit.log_likelihood, fit.noise = float(value), noise
+            fit.log_posterior = float(value + self._log_prior(fit, fit.theta, fit.linear))
+
+    def _log_likelihoods(self, fits: Sequence[Fit], records: Float[np.ndarray, "fits rows"]):
+        """Return the log likelihood of records, of the rows that each fit sees, and the noises."""
+        values, noises = np.empty(len(fits)), [fit.noise for fit in fits]
+        without = np.array([-1 if fit.without is None else fit.without for fit in fits])
+        for one in np.unique(without):
+            at = np.flatnonzero(without == one)
+            model = self.noise_of(fits[at[0]])
+            values[at], own = model.log_likelihoods(self.rows.recorded - records[at], records[at])
+            for place, noise in zip(at, own, strict=True):
+                noises[place] = noise
+        return values, noises
+
+    def _log_prior(self, fit: Fit, theta: np.ndarray, linear: np.ndarray) -> Any:
+        """Return the log density of constants before the data, and of what is linear."""
+        known = fit.priors.log_density(fit.priors.coordinates(theta))
+        return known + sum(one.log_density(linear[..., at]) for at, one in self.deviations)
 
     def _steps(self, fit: Fit) -> Float[np.ndarray, " free"]:
         """Return by how much each coordinate is moved for a derivative, away from an upper end."""
@@ -273,8 +295,7 @@ class Fitter:
 
     def _moved(self, fit: Fit) -> list[np.ndarray]:
         """Return vectors whose differences from the fit are its derivatives."""
-        moved = fit.coordinates + np.diag(self._steps(fit))
-        return [fit.priors.placed(fit.theta, one) for one in moved]
+        return [*fit.priors.placed(fit.theta, fit.coordinates + np.diag(self._steps(fit)))]
 
     def _columns(self, fit: Fit, moved: np.ndarray) -> Float[np.ndarray, "rows n"]:
         """Return the derivatives of the records, of predictions at `_moved`."""
@@ -306,25 +327,18 @@ class Fitter:
         """Return hypotheses at their likeliest constants; all take their steps side by side."""
         fits = list(starts)
         with _running_away():
-            for fit, predicted in zip(fits, self.predict([f.theta for f in fits]), strict=True):
-                self._set(fit, predicted)
+            self._set(fits, self.predict([fit.theta for fit in fits]))
         active = [fit for fit in fits if np.isfinite(fit.log_posterior)]
         for _ in range(rounds):
             if not active:
                 break
-            self.linearise(active)
-            trials = [trial for fit in active for trial in self._trials(fit)]
-            found = self.predict([theta for theta, _ in trials])
-            each = range(0, len(trials), len(_TRIALS))
-            own = [slice(first, first + len(_TRIALS)) for first in each]
+            # where no trial was better, all is as it was
+            self.linearise([fit for fit in active if fit.jacobian is None])
             with _running_away():
-                active = [
-                    fit for fit, at in zip(active, own, strict=True)
-                    if self._take(fit, trials[at], found[at])
-                ]  # fmt: skip
+                active = self._stepped(active)
         if derivatives:
             usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
-            self.linearise(usable)
+            self.linearise([fit for fit in usable if fit.jacobian is None])
             for fit in usable:
                 self._judge(fit)
         return fits
@@ -348,8 +362,9 @@ class Fitter:
             if k:
                 fit.shifts = self._shifts_of(own[len(some) :])
             fit.jacobian = self._columns(fit, own[: len(some)])
-            if k and np.isfinite(fit.log_posterior):
-                self._set(fit, fit.predicted)
+        if k:
+            usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
+            self._set(usable, np.array([fit.predicted for fit in usable]))
 
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
@@ -368,8 +383,8 @@ class Fitter:
         curvature[at, at] += 1.0 / widths**2
         return gradient, curvature
 
-    def _trials(self, fit: Fit) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return vectors to try, and what is linear in them."""
+    def _trials(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
+        """Return vectors to try, and what is linear in them, shapes (trials, p) and (trials, q)."""
         gradient, curvature = self._normal_equations(fit)
         ends, now, n = fit.priors.ends, fit.coordinates, len(fit.priors)
         slope = gradient[:n]
@@ -386,26 +401,38 @@ class Fitter:
         inner[:, diagonal, diagonal] *= 1.0 + fit.damping * multiples[:, None]
         steps = np.zeros((len(_TRIALS), len(gradient)))
         steps[:, at] = np.linalg.solve(inner, (gradient - known * place)[:, at, None])[..., 0]
-        return [(fit.at(now + step[:n]), fit.linear + step[n:]) for step in steps]
+        return fit.at(now + steps[:, :n]), fit.linear + steps[:, n:]
 
-    def _take(self, fit: Fit, trials, found) -> bool:
-        """Take the best of some trials; return whether the fit is to go on."""
-        before = fit.log_posterior
-        saved = fit.theta, fit.linear, fit.predicted, fit.log_likelihood, fit.noise
-        best, best_value, chosen = saved, before, None
-        for (multiple, _), (theta, linear), predicted in zip(_TRIALS, trials, found, strict=True):
-            fit.theta, fit.linear = theta, linear
-            self._set(fit, predicted)
-            if fit.log_posterior > best_value:
-                best_value, chosen = fit.log_posterior, multiple
-                best = theta, linear, predicted, fit.log_likelihood, fit.noise
-        fit.theta, fit.linear, fit.predicted, fit.log_likelihood, fit.noise = best
-        fit.log_posterior = best_value
-        if chosen is None:
-            fit.damping *= 1e3
-            return fit.damping < 1e4
-        fit.damping = max(fit.damping * chosen, 1e-7)
-        return best_value - before > _ENOUGH
+    def _stepped(self, fits: Sequence[Fit]) -> list[Fit]:
+        """Take the best of some trials of each fit; return fits that are to go on."""
+        trials = [self._trials(fit) for fit in fits]
+        thetas, linear = (np.concatenate(one) for one in zip(*trials, strict=True))
+        of = [fit for fit in fits for _ in _TRIALS]
+        found = self.predict(thetas)
+        records = np.array([
+            predicted + self.linear_columns(predicted, fit.shifts) @ own
+            for fit, predicted, own in zip(of, found, linear, strict=True)
+        ])  # fmt: skip
+        likelihoods, noises = self._log_likelihoods(of, records)
+        going_on = []
+        for fit, first in zip(fits, range(0, len(of), len(_TRIALS)), strict=True):
+            at = slice(first, first + len(_TRIALS))
+            values = likelihoods[at] + self._log_prior(fit, thetas[at], linear[at])
+            gains = np.where(values > fit.log_posterior, values - fit.log_posterior, 0.0)
+            best = int(np.argmax(gains))
+            if not gains[best]:
+                fit.damping *= 1e3
+                if fit.damping < 1e4:
+                    going_on.append(fit)
+                continue
+            chosen = first + best
+            fit.theta, fit.linear, fit.predicted = thetas[chosen], linear[chosen], found[chosen]
+            fit.log_likelihood, fit.noise = float(likelihoods[chosen]), noises[chosen]
+            fit.log_posterior, fit.jacobian = float(values[best]), None
+            fit.damping = max(fit.damping * _TRIALS[best][0], 1e-7)
+            if gains[best] > _ENOUGH:
+                going_on.append(fit)
+        return going_on
 
     def _judge(self, fit: Fit) -> None:
         """Set covariance and evidence of a fit, by Laplace's method."""

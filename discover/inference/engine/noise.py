@@ -32,6 +32,9 @@ LEAST = 3e-4
 """Size over the record of independent noise that is always there: what a model of a fluid is not
 told to. Records without noise differ from any integration by as much."""
 
+_FAR = 1e6
+"""Of a record, from which on a residual is none."""
+
 _SHARES = np.array(SHARES)
 
 _GRID = tuple(product(range(len(SHARES)), range(len(CORRELATIONS))))
@@ -73,6 +76,8 @@ class NoiseModel:
         self._alike = _ALIKE if known is None else _KNOWN
         self.kept = np.flatnonzero(rows.run != without)
         self._run, self._gap = rows.run[self.kept], rows.gap[self.kept]
+        self._size = rows.size[self.kept]
+        self._log_size = float(np.sum(np.log(self._size)))
         self._before = np.maximum(np.arange(len(self.kept)) - 1, 0)
         self._count = np.bincount(self._run, minlength=len(rows.runs)).astype(float)
         self._there = np.flatnonzero(self._count)
@@ -80,14 +85,15 @@ class NoiseModel:
         self._gammas = float(np.sum(gammaln(half + 0.5 * self._count) - gammaln(half)))
         self._starts = np.searchsorted(self._run, self._there)
         # samples of one run as far from the one before decay alike
-        self._order = np.lexsort((self._gap, self._run))
-        run, gap = self._run[self._order], self._gap[self._order]
+        order = np.lexsort((self._gap, self._run))
+        run, gap = self._run[order], self._gap[order]
+        self._order = order if np.any(np.diff(order) != 1) else None
         new = np.append(True, (np.diff(run) != 0) | (np.diff(gap) != 0)) if len(run) else []
         self._groups = np.flatnonzero(new)
         self._group_starts = np.searchsorted(run[self._groups], self._there)
         decay = np.array([self._decay(c) for c in CORRELATIONS])
         self._determinants = -0.5 * np.sum(np.log(1.0 - decay**2), axis=1)
-        self._decays = decay[:, self._order[self._groups]]
+        self._decays = decay[:, order[self._groups]]
 
     def _decay(self, correlation: float) -> Float[np.ndarray, " rows"]:
         return np.where(self._gap > 0, correlation ** np.maximum(self._gap, 1), 0.0)
@@ -107,31 +113,55 @@ class NoiseModel:
         self, residual: Float[np.ndarray, " rows"], predicted: Float[np.ndarray, " rows"]
     ) -> tuple[float, Noise]:
         """Return the log likelihood over all noises, and the likeliest noise."""
-        if not (np.all(np.isfinite(residual)) and np.max(np.abs(residual / self.rows.size)) < 1e6):
-            return -np.inf, Noise(np.ones(len(self._count)), 1.0, 0.0, 0.0)
-        size = self.rows.size[self.kept]
-        relative = (predicted[self.kept] / size) ** 2
-        spread = size * np.sqrt(1.0 + _SHARES[:, None] * (relative - 1.0))
-        scaled = residual[self.kept] / spread
-        before, decay = scaled[:, self._before], self._decays
+        values, noises = self.log_likelihoods(residual[None], predicted[None])
+        return float(values[0]), noises[0]
+
+    def log_likelihoods(
+        self,
+        residual: Float[np.ndarray, "trials rows"],
+        predicted: Float[np.ndarray, "trials rows"],
+    ) -> tuple[Float[np.ndarray, " trials"], list[Noise]]:
+        """Return the log likelihood of each trial over all noises, and its likeliest noise.
+
+        Minus infinity, where a residual is not finite or far beyond its record.
+        """
+        runs = len(self._count)
+        values = np.full(len(residual), -np.inf)
+        noises = [Noise(np.ones(runs), 1.0, 0.0, 0.0)] * len(residual)
+        off = residual[:, self.kept] / self._size
+        # a number that is none compares as false
+        usable = np.flatnonzero(np.max(np.abs(residual / self.rows.size), axis=1) < _FAR)
+        if not len(usable):
+            return values, noises
+        off = off[usable, None]
+        relative = (predicted[usable][:, None, self.kept] / self._size) ** 2
+        variance = 1.0 + _SHARES[:, None] * (relative - 1.0)
+        scaled = off / np.sqrt(variance)
         # independent noise is a large one where it is taken for correlated or in proportion
-        least = (LEAST * size / spread) ** 2
-        sums = np.stack([scaled**2 + least, before**2 + least[:, self._before], scaled * before])
-        sums = np.add.reduceat(sums[..., self._order], self._groups, axis=-1)[:, :, None]
+        own = scaled**2 + LEAST**2 / variance
+        sums = np.stack([own, own[..., self._before], scaled * scaled[..., self._before]])
+        if self._order is not None:
+            sums = sums[..., self._order]
+        sums = np.add.reduceat(sums, self._groups, axis=-1)[..., None, :]
+        decay = self._decays
         left = (sums[0] + decay**2 * sums[1] - 2.0 * decay * sums[2]) / (1.0 - decay**2)
-        square = np.zeros((len(SHARES), len(CORRELATIONS), len(self._count)))
+        square = np.zeros((len(usable), len(SHARES), len(CORRELATIONS), runs))
         square[..., self._there] = np.add.reduceat(left, self._group_starts, axis=-1)
-        square = square.reshape(len(_GRID), -1)
-        logs = (self._determinants - np.sum(np.log(spread), axis=1)[:, None]).ravel()
-        values, common = self._marginal(square)
-        values = values + logs
-        values = values + _PRIORS
-        best = int(np.argmax(values))
-        share, correlation = (SHARES[_GRID[best][0]], CORRELATIONS[_GRID[best][1]])
-        sizes = np.sqrt((self._alike * common[best] + square[best]) / (self._alike + self._count))
-        return float(np.logaddexp.reduce(values)), Noise(
-            sizes, float(np.sqrt(common[best])), correlation, share
-        )
+        square = square.reshape(len(usable), len(_GRID), runs)
+        spreads = self._log_size + 0.5 * np.sum(np.log(variance), axis=-1)
+        densities, common = self._marginal(square)
+        densities += (self._determinants - spreads[..., None]).reshape(len(usable), -1) + _PRIORS
+        values[usable] = np.logaddexp.reduce(densities, axis=1)
+        for one, at, best in zip(usable, range(len(usable)), np.argmax(densities, 1), strict=True):
+            share, correlation = _GRID[best]
+            size, known = common[at, best], self._alike + self._count
+            noises[one] = Noise(
+                np.sqrt((self._alike * size + square[at, best]) / known),
+                float(np.sqrt(size)),
+                CORRELATIONS[correlation],
+                SHARES[share],
+            )
+        return values, noises
 
     def refined(
         self,
@@ -168,18 +198,18 @@ class NoiseModel:
         sizes = np.sqrt((self._alike * common + square) / (self._alike + self._count))
         return Noise(sizes, float(np.sqrt(common)), correlation, noise.share)
 
-    def _marginal(self, square: Float[np.ndarray, "grid runs"]):
+    def _marginal(self, square: Float[np.ndarray, "*grid runs"]):
         """Return the log density with sizes of runs integrated out, and the likeliest a²."""
         counts, total = self._alike + self._count, float(np.sum(self._count))
-        common = square @ np.ones(len(counts)) / total
+        common = np.sum(square, axis=-1) / total
         if self.known is not None:
             common = np.full_like(common, max(self.known, LEAST) ** 2)
         for _ in range(6 if self.known is None else 0):
-            common = len(counts) / ((1.0 / (self._alike * common[:, None] + square)) @ counts)
+            common = len(counts) / ((1.0 / (self._alike * common[..., None] + square)) @ counts)
         alike = self._alike * common
         density = self._gammas - 0.5 * total * np.log(np.pi)
         density += 0.5 * self._alike * len(counts) * np.log(alike)
-        return density - 0.5 * np.log(alike[:, None] + square) @ counts, common
+        return density - 0.5 * np.log(alike[..., None] + square) @ counts, common
 
     def least(self, predicted: Float[np.ndarray, " rows"], noise: Noise) -> float:
         """Return the sum of squares that `whitened` makes of the independent noise `LEAST`."""

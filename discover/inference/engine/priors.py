@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -92,26 +92,27 @@ class Priors(dict[int, Prior]):
         scales = np.where(self._are_amplitudes, np.pi, np.sqrt(2.0 * np.pi))
         return float(np.sum(sided) * np.log(2.0) - np.sum(np.log(scales * self.widths)))
 
-    def coordinates(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, " free"]:
+    def coordinates(self, theta: Float[np.ndarray, "*trials p"]) -> Float[np.ndarray, "*trials n"]:
         """Return the coordinates that are fitted, of the constants."""
-        values, logs = theta[self.positions], self._are_logarithms
-        values[logs] = np.log(values[logs])
+        values, logs = theta[..., self.positions], self._are_logarithms
+        values[..., logs] = np.log(values[..., logs])
         return values
 
     def placed(
-        self, theta: Float[np.ndarray, " p"], coordinates: Float[np.ndarray, " free"]
-    ) -> Float[np.ndarray, " p"]:
+        self, theta: Float[np.ndarray, " p"], coordinates: Float[np.ndarray, "*trials n"]
+    ) -> Float[np.ndarray, "*trials p"]:
         """Return the constants at other coordinates of what is free."""
-        values, logs, found = coordinates.copy(), self._are_logarithms, theta.copy()
-        values[logs] = np.exp(values[logs])
-        found[self.positions] = values
+        values, logs = coordinates.copy(), self._are_logarithms
+        values[..., logs] = np.exp(values[..., logs])
+        found = np.broadcast_to(theta, (*values.shape[:-1], len(theta))).copy()
+        found[..., self.positions] = values
         return found
 
-    def log_density(self, coordinates: Float[np.ndarray, " free"]) -> float:
+    def log_density(self, coordinates: Float[np.ndarray, "*trials n"]) -> Float[Any, "*trials"]:
         """Return the log density of the coordinates."""
         square = ((coordinates - self.centres) / self.widths) ** 2
         logs = np.where(self._are_amplitudes, np.log1p(square), 0.5 * square)
-        return self._constant - float(np.sum(logs))
+        return self._constant - np.sum(logs, axis=-1)
 
     def pulls(self, coordinates: Float[np.ndarray, " free"]) -> Float[np.ndarray, "free 2"]:
         """Return the derivatives of the log density, and curvatures that bound it."""
@@ -136,15 +137,15 @@ class Deviations:
     size: float
     known: float = np.inf
 
-    def log_density(self, values: Float[np.ndarray, " n"]) -> float:
+    def log_density(self, values: Float[np.ndarray, "*trials n"]) -> Float[Any, "*trials"]:
         """Return the log density of all deviations together."""
-        n, square = len(values), float(values @ values) / self.size**2
+        n, square = values.shape[-1], np.sum(values**2, axis=-1) / self.size**2
         if not np.isfinite(self.known):
             return -0.5 * square - n * float(np.log(self.size) + 0.5 * np.log(2.0 * np.pi))
         known = self.known
         factor = gammaln(0.5 * (known + n)) - gammaln(0.5 * known)
         factor -= n * (np.log(self.size) + 0.5 * np.log(np.pi * known))
-        return float(factor - 0.5 * (known + n) * np.log1p(square / known))
+        return factor - 0.5 * (known + n) * np.log1p(square / known)
 
     def width(self, values: Float[np.ndarray, " n"], least: float = 0.0) -> float:
         """Return the standard deviation that such deviations tell of.
