@@ -58,9 +58,12 @@ class Fit:
         At these constants, over all noises.
     noise
         The likeliest noise.
+    slopes
+        Derivatives of `predicted` with respect to the coordinates, shape (rows, free). None where a
+        step has made them old.
     jacobian
-        Derivatives of `predicted` with respect to the coordinates of the free constants, then of
-        what is linear, shape (rows, free + q). None where they were not taken at these constants.
+        Derivatives of the records with respect to the coordinates, then of what is linear, shape
+        (rows, free + q).
     covariance, root
         Of these, and a factor of it: root rootᵀ, both of shape (free + q, free + q).
     log_evidence
@@ -82,6 +85,7 @@ class Fit:
     log_likelihood: float
     log_posterior: float
     noise: Noise
+    slopes: Float[np.ndarray, "rows free"] | None = None
     jacobian: Float[np.ndarray, "rows n"] | None = None
     covariance: Float[np.ndarray, "n n"] | None = None
     root: Float[np.ndarray, "n n"] | None = None
@@ -197,14 +201,15 @@ class Fitter:
         counts = [at.stop - at.start for at, _ in self.deviations]
         return np.repeat([known.size for _, known in self.deviations], counts)
 
-    def widths(
-        self, linear: Float[np.ndarray, " q"], least: float = 0.0
-    ) -> Float[np.ndarray, " q"]:
-        """Return the standard deviations of what is linear, as far as it tells of them itself."""
-        found = np.empty(len(linear))
+    def widths(self, linear: Float[np.ndarray, " q"], least: Any = 0.0) -> Float[Any, "*least q"]:
+        """Return the standard deviations of what is linear, as far as it tells of them itself.
+
+        `least`: times the usual size, for what does not tell yet; one or several.
+        """
+        found = np.empty((len(linear), *np.shape(least)))
         for at, known in self.deviations:
             found[at] = known.width(linear[at], least)
-        return found
+        return found.T
 
     def linear_columns(
         self,
@@ -254,8 +259,7 @@ class Fitter:
         priors, theta = self._priors[key], theta.copy()
         absent = np.setdiff1d(np.arange(len(theta)), priors.positions)
         theta[absent] = self.problem.zero[absent]
-        for at, prior in priors.items():
-            theta[at] = np.clip(theta[at], prior.low, prior.high)
+        theta[priors.positions] = np.clip(theta[priors.positions], *priors.range.T)
         linear = np.zeros(self.linear_count) if linear is None else linear
         nothing = np.full(len(self.rows), np.nan)
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
@@ -297,13 +301,11 @@ class Fitter:
         """Return vectors whose differences from the fit are its derivatives."""
         return [*fit.priors.placed(fit.theta, fit.coordinates + np.diag(self._steps(fit)))]
 
-    def _columns(self, fit: Fit, moved: np.ndarray) -> Float[np.ndarray, "rows n"]:
-        """Return the derivatives of the records, of predictions at `_moved`."""
-        with _running_away():
-            own = (moved - fit.predicted).T / self._steps(fit)
-        own = np.where(np.all(np.isfinite(own), axis=0), own, 0.0)
+    def _set_jacobian(self, fit: Fit) -> None:
+        """Set the derivatives of the records, of those of the predictions."""
+        assert fit.slopes is not None
         linear = self.linear_columns(fit.predicted, fit.shifts)
-        return np.column_stack([own * self.gain(fit)[:, None], linear])
+        fit.jacobian = np.column_stack([fit.slopes * self.gain(fit)[:, None], linear])
 
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return by how much a record changes with the stress of the fluid."""
@@ -314,7 +316,22 @@ class Fitter:
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the records as predicted, with what is linear."""
-        return fit.predicted + self.linear_columns(fit.predicted, fit.shifts) @ fit.linear
+        return self.records(fit, fit.predicted[None], fit.linear[None])[0]
+
+    def records(
+        self,
+        fit: Fit,
+        predicted: Float[np.ndarray, "trials rows"],
+        linear: Float[np.ndarray, "trials q"],
+    ) -> Float[np.ndarray, "trials rows"]:
+        """Return the records of trials of a fit, as the model predicts them and what is linear."""
+        runs = len(self.rows.runs)
+        gain, zeros, rest = linear[:, :1], linear[:, 1 : 1 + 2 * runs], linear[:, 1 + 2 * runs :]
+        shifts = self._shifts if fit.shifts is None else fit.shifts
+        if self.problem.loading:
+            gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
+        found = predicted * (1.0 + gain) + zeros @ self._zeros.T
+        return found + rest[:, : shifts.shape[1]] @ shifts.T if shifts.shape[1] else found
 
     def misfit(self, fit: Fit) -> float:
         """Return the root mean square of what a fit leaves, over the size of each record."""
@@ -332,13 +349,12 @@ class Fitter:
         for _ in range(rounds):
             if not active:
                 break
-            # where no trial was better, all is as it was
-            self.linearise([fit for fit in active if fit.jacobian is None])
+            self.linearise([fit for fit in active if fit.slopes is None])
             with _running_away():
                 active = self._stepped(active)
         if derivatives:
             usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
-            self.linearise([fit for fit in usable if fit.jacobian is None])
+            self.linearise([fit for fit in usable if fit.slopes is None])
             for fit in usable:
                 self._judge(fit)
         return fits
@@ -361,7 +377,10 @@ class Fitter:
             place += len(own)
             if k:
                 fit.shifts = self._shifts_of(own[len(some) :])
-            fit.jacobian = self._columns(fit, own[: len(some)])
+            with _running_away():
+                slopes = (own[: len(some)] - fit.predicted).T / self._steps(fit)
+            fit.slopes = np.where(np.all(np.isfinite(slopes), axis=0), slopes, 0.0)
+            self._set_jacobian(fit)
         if k:
             usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
             self._set(usable, np.array([fit.predicted for fit in usable]))
@@ -391,9 +410,9 @@ class Fitter:
         stays = ((now <= ends[:, 0]) & (slope < 0)) | ((now >= ends[:, 1]) & (slope > 0))
         at = np.flatnonzero(np.append(~stays, np.ones(len(gradient) - n, bool)))
         multiples, least = np.array(_TRIALS).T
-        widths = np.array([self.widths(fit.linear, one) for one in least])
+        widths = self.widths(fit.linear, least)  # the first as they are
         known = np.zeros((len(_TRIALS), len(gradient)))
-        known[:, n:] = 1.0 / widths**2 - 1.0 / self.widths(fit.linear) ** 2
+        known[:, n:] = 1.0 / widths**2 - 1.0 / widths[0] ** 2
         place = np.append(np.zeros(n), fit.linear)
         inner = np.tile(curvature[np.ix_(at, at)], (len(_TRIALS), 1, 1))
         diagonal = np.arange(len(at))
@@ -409,14 +428,13 @@ class Fitter:
         thetas, linear = (np.concatenate(one) for one in zip(*trials, strict=True))
         of = [fit for fit in fits for _ in _TRIALS]
         found = self.predict(thetas)
-        records = np.array([
-            predicted + self.linear_columns(predicted, fit.shifts) @ own
-            for fit, predicted, own in zip(of, found, linear, strict=True)
-        ])  # fmt: skip
-        likelihoods, noises = self._log_likelihoods(of, records)
+        own = [slice(first, first + len(_TRIALS)) for first in range(0, len(of), len(_TRIALS))]
+        records = [
+            self.records(fit, found[at], linear[at]) for fit, at in zip(fits, own, strict=True)
+        ]
+        likelihoods, noises = self._log_likelihoods(of, np.concatenate(records))
         going_on = []
-        for fit, first in zip(fits, range(0, len(of), len(_TRIALS)), strict=True):
-            at = slice(first, first + len(_TRIALS))
+        for fit, at in zip(fits, own, strict=True):
             values = likelihoods[at] + self._log_prior(fit, thetas[at], linear[at])
             gains = np.where(values > fit.log_posterior, values - fit.log_posterior, 0.0)
             best = int(np.argmax(gains))
@@ -425,13 +443,16 @@ class Fitter:
                 if fit.damping < 1e4:
                     going_on.append(fit)
                 continue
-            chosen = first + best
+            chosen = at.start + best
             fit.theta, fit.linear, fit.predicted = thetas[chosen], linear[chosen], found[chosen]
             fit.log_likelihood, fit.noise = float(likelihoods[chosen]), noises[chosen]
-            fit.log_posterior, fit.jacobian = float(values[best]), None
+            fit.log_posterior = float(values[best])
             fit.damping = max(fit.damping * _TRIALS[best][0], 1e-7)
             if gains[best] > _ENOUGH:
+                fit.slopes = None
                 going_on.append(fit)
+            else:  # so near that the slopes are those of the end
+                self._set_jacobian(fit)
         return going_on
 
     def _judge(self, fit: Fit) -> None:

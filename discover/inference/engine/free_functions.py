@@ -151,6 +151,19 @@ class WithFunction(Fitter):
         own = self.variable.columns(predicted, self.rows.size)
         return np.column_stack([super().linear_columns(predicted, shifts), own])
 
+    def records(
+        self,
+        fit: Fit,
+        predicted: Float[np.ndarray, "trials rows"],
+        linear: Float[np.ndarray, "trials q"],
+    ) -> Float[np.ndarray, "trials rows"]:
+        """Return the records of trials of a fit; the function last."""
+        own = [
+            self.variable.columns(one, self.rows.size) @ values[-_KNOTS:]
+            for one, values in zip(predicted, linear, strict=True)
+        ]
+        return super().records(fit, predicted, linear) + own
+
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return by how much a record changes with the stress of the fluid."""
         gain, own, step = super().gain(fit), fit.linear[-_KNOTS:], 1e-6

@@ -78,6 +78,11 @@ class Priors(dict[int, Prior]):
         return np.array([prior.ends for prior in self.values()]).reshape(-1, 2)
 
     @cached_property
+    def range(self) -> Float[np.ndarray, "free 2"]:
+        """Ends of the constants."""
+        return np.array([(prior.low, prior.high) for prior in self.values()]).reshape(-1, 2)
+
+    @cached_property
     def _are_logarithms(self) -> np.ndarray:
         return np.array([prior.is_logarithm for prior in self.values()], bool)
 
@@ -147,15 +152,15 @@ class Deviations:
         factor -= n * (np.log(self.size) + 0.5 * np.log(np.pi * known))
         return factor - 0.5 * (known + n) * np.log1p(square / known)
 
-    def width(self, values: Float[np.ndarray, " n"], least: float = 0.0) -> float:
+    def width(self, values: Float[np.ndarray, " n"], least: Any = 0.0) -> Any:
         """Return the standard deviation that such deviations tell of.
 
         `least`: times the usual size, for where they do not tell yet.
         """
-        if not np.isfinite(self.known):
+        if self.known == np.inf:
             return self.size
         square = self.known * self.size**2 + float(values @ values)
-        return max(float(np.sqrt(square / (self.known + len(values)))), least * self.size)
+        return np.maximum(np.sqrt(square / (self.known + len(values))), least * self.size)
 
     def log_odds_of_size(self, width: float) -> float:
         """Return the log density of a standard deviation, over that of the usual one."""
