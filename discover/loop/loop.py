@@ -174,7 +174,7 @@ class Found:
         curves = free_functions(self.posterior)
         if not curves:
             return self
-        odds = float(np.logaddexp.reduce([curve.log_odds for curve in curves]))
+        odds = float(np.logaddexp.reduce([curve.log_odds_in_all for curve in curves]))
         shown = [curve for curve in curves if curve.is_shown]
         return replace(self, posterior=self.posterior.with_something_else(odds), curves=shown)
 

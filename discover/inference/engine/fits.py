@@ -233,7 +233,7 @@ class Fitter:
 
     def predict(
         self,
-        thetas: Sequence[np.ndarray],
+        thetas: Sequence[np.ndarray] | Float[np.ndarray, "trials p"],
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of the model alone; not finite where the law runs away."""

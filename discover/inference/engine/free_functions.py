@@ -15,10 +15,12 @@ from jaxtyping import Float
 from scipy.stats import chi2
 
 from discover.dataset import Run
+from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import Posterior
 from discover.inference.engine.priors import Deviations
 from discover.inference.engine.problem import TERM_ODDS
+from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread
 
 _LATE = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
@@ -28,7 +30,7 @@ what settles at its beginning."""
 
 _KNOTS = len(_LATE)
 
-_WIDTHS = (0.1, 0.3, 1.0, 3.0)
+_WIDTHS = (0.03, 0.1, 0.3, 1.0, 3.0)
 """Standard deviations of a change of slope, both axes over their size."""
 
 _BASES = 12
@@ -43,6 +45,9 @@ up to 10."""
 
 _POSSIBLE = -7.0
 """Log odds from which on a curve is among what is possible, shown or not."""
+
+_WORTH_IT = -20.0
+"""Log odds in the fitted runs from which on a curve is weighed in all runs."""
 
 _POINTS = 61
 _TRIED = 60
@@ -103,7 +108,9 @@ class FreeFunction:
     beside
         Effects in the hypothesis with it.
     log_odds
-        Against all that has a name, and any discrepancy of another kind.
+        Against all that has a name, and any discrepancy of another kind, by the fitted runs.
+    log_odds_in_all
+        The same by all runs, as explanations are weighed.
     grid, value, low95, high95
         The curve with its 95 % band, shape (n,), in Pa or as a relative change.
     nearest
@@ -113,6 +120,7 @@ class FreeFunction:
     variable: Variable
     beside: tuple[str, ...]
     log_odds: float
+    log_odds_in_all: float
     grid: Float[np.ndarray, " n"]
     value: Float[np.ndarray, " n"]
     low95: Float[np.ndarray, " n"]
@@ -138,7 +146,7 @@ class WithFunction(Fitter):
 
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
         self.__dict__.update(vars(fitter))
-        self.variable = variable
+        self.variable, self.width = variable, width
         first = fitter.linear_count
         self.deviations = [*fitter.deviations, (slice(first, first + _KNOTS), Deviations(width))]
 
@@ -188,18 +196,33 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     usable.sort(key=lambda fit: -fit.log_likelihood)
     sizes = range(_LARGEST_BASE + 1)
     bases = [f for size in sizes for f in [f for f in usable if len(f.names) == size][:_BASES]]
-    other = max(search.rank(search.alive()[0]), search.rank(left.fit) + left.log_factor)
+    whole, _, discrepancies = posterior.memory["whole"]
+    other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
     prior, found = posterior.problem.log_odds_of(TERM_ODDS), []
+    everywhere = {one.slot: one for one in _variables(whole.fitter)}
     for variable in _variables(search.fitter):
-        best = None
-        for fitter, starts in _starts(search.fitter, bases, variable):
-            for fit in fitter.fit(starts):
-                rank = fit.log_evidence + posterior.problem.log_prior(fit.names) + prior
-                if np.isfinite(rank) and (best is None or rank > best[0]):
-                    best = rank, fitter, fit
-        if best is not None and best[0] - other > _POSSIBLE:
-            found.append(_described(*best[1:], float(best[0] - other)))
+        possible = [
+            (fit.log_evidence + posterior.problem.log_prior(fit.names) + prior, fitter, fit)
+            for fitter, starts in _starts(search.fitter, bases, variable)
+            for fit in fitter.fit(starts)
+        ]
+        if not possible:
+            continue
+        rank, fitter, fit = max(possible, key=lambda one: one[0])
+        if rank - other < _WORTH_IT:
+            continue
+        again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
+        (refit,) = again.fit([again.start(fit.names, fit.theta)])
+        odds = refit.log_evidence - fit.log_evidence + rank - in_all
+        if max(odds, rank - other) > _POSSIBLE:
+            found.append(_described(fitter, fit, float(rank - other), float(odds)))
     return sorted(found, key=lambda one: -one.log_odds)
+
+
+def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
+    """Return the largest log of evidence times prior, with a discrepancy or without."""
+    beside = [search.rank(one.fit) + one.log_factor for one in discrepancies]
+    return max(*beside, *(search.rank(fit) for fit in search.alive()[:1]))
 
 
 def _variables(fitter: Fitter) -> Iterator[Variable]:
@@ -268,7 +291,7 @@ def _starts(
     return list(chosen.values())
 
 
-def _described(fitter: WithFunction, fit: Fit, log_odds: float) -> FreeFunction:
+def _described(fitter: WithFunction, fit: Fit, *log_odds: float) -> FreeFunction:
     """Return a function that was fitted, with its band and its closed form."""
     assert fit.covariance is not None
     variable, k = fitter.variable, _KNOTS
@@ -281,7 +304,7 @@ def _described(fitter: WithFunction, fit: Fit, log_odds: float) -> FreeFunction:
     half = 1.96 * np.sqrt(np.sum(spread**2, axis=1))
     nearest = _nearest(variable, fit, grid, size)
     return FreeFunction(
-        variable, fit.names, log_odds, grid, value, value - half, value + half, nearest
+        variable, fit.names, *log_odds, grid, value, value - half, value + half, nearest
     )  # fmt: skip
 
 

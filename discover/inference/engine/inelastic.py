@@ -111,7 +111,7 @@ class _InelasticFitter(Fitter):
 
     def predict(
         self,
-        thetas: Sequence[np.ndarray],
+        thetas: Sequence[np.ndarray] | Float[np.ndarray, "trials p"],
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of the law, in Pa; it has no moduli."""
