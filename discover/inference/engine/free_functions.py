@@ -291,7 +291,7 @@ def _starts(
     return list(chosen.values())
 
 
-def _described(fitter: WithFunction, fit: Fit, *log_odds: float) -> FreeFunction:
+def _described(fitter: WithFunction, fit: Fit, odds: float, odds_in_all: float) -> FreeFunction:
     """Return a function that was fitted, with its band and its closed form."""
     assert fit.covariance is not None
     variable, k = fitter.variable, _KNOTS
@@ -304,7 +304,7 @@ def _described(fitter: WithFunction, fit: Fit, *log_odds: float) -> FreeFunction
     half = 1.96 * np.sqrt(np.sum(spread**2, axis=1))
     nearest = _nearest(variable, fit, grid, size)
     return FreeFunction(
-        variable, fit.names, *log_odds, grid, value, value - half, value + half, nearest
+        variable, fit.names, odds, odds_in_all, grid, value, value - half, value + half, nearest
     )  # fmt: skip
 
 
