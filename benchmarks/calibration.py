@@ -11,7 +11,8 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
 Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
 run, and never used to change anything: 20261130; since each set is fitted from larger ones too
 20261208 for ``close-loop``, and 20261206 and 20261209 for ``compare``; since runs tell how far they
-differ, 20261210 for ``close-loop`` and 20261211 for ``compare``.
+differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves are weighed in all
+runs, 20261212 for ``close-loop`` and 20261213 for ``compare``.
 """
 
 from collections.abc import Callable
@@ -98,7 +99,7 @@ QUESTIONS = tuple(TASKS)
 
 def names(seed: int) -> list[str]:
     del seed
-    return [str(index) for index in range(1000)]
+    return [str(index) for index in range(2000)]
 
 
 def run(name: str, question: str, seed: int, folder: Path) -> dict:
