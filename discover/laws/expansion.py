@@ -80,7 +80,8 @@ def law_of_terms(
     )
 
 
-_TENSORS = build_library(degree=0)
+# in simple shear that last one and two tensors are the same: laws that agree there differ by it
+_TENSORS = build_library(degree=0, extra=["tr(gammadot.gammadot)*I"])
 
 
 def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
