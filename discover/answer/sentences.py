@@ -13,6 +13,9 @@ SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial exte
 
 _MOST_RUNS = 1
 
+_USELESS = 0.25
+"""Relative discrepancy beyond which a law is of no use for any prediction."""
+
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
 )
@@ -66,9 +69,10 @@ def description(answer: Any) -> str:
         return "" if answer.error is None else f"Misfit {percent_of(answer.error)}."
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
-    ends = f" (95 %: {low}–{high})" if low != high else ""
-    text = f"Describes {flows(answer)} to {size}{ends}"
-    return f"{text} plus {noise} noise." if noise else f"{text}."
+    said = [f"95 %: {low}–{high}"] if low != high else []
+    said += [f"{noise} noise removed"] if noise else []
+    bracket = f" ({'; '.join(said)})" if said else ""
+    return f"Describes {flows(answer)} to {size}{bracket}."
 
 
 def flows(answer: Any) -> str:
@@ -87,9 +91,10 @@ def where(answer: Any) -> str:
     """Return where the law may be used; in numbers without units where the modes have none."""
     found = []
     one = answer.range
+    numeral = "λω" if one.oscillates else "λ/duration"
     if _is_plain(answer) and one.weissenberg is not None:
-        found.append(f"Wi ≤ {_short(one.weissenberg[1])}")
-        found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
+        found.append(f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}")
+        found += [] if one.deborah is None else [f"De = {numeral} {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
     elif one.frequency_rad_s is not None:
@@ -97,9 +102,11 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
-    if answer.adequate is False:
-        return f"Do not use to predict within {percent_of(answer.tolerance)}; fitted in {place}."
-    return f"Use in {place}."
+    if answer.adequate is not False:
+        return f"Use in {place}."
+    if answer.size > _USELESS:
+        return f"Do not use to predict; fitted in {place}."
+    return f"Use only where that error is acceptable, in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -170,7 +177,7 @@ def expected(one: Any, place: str) -> str:
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     named = listed([one.text for one in answer.suspects[:_MOST_CONSTANTS]])
-    return f"Instrument: {named}." if named else ""
+    return f"Suspect {named}." if named else ""
 
 
 def further(answer: Any) -> list[str]:

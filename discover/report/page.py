@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from discover._version import __version__
 from discover.answer import Answer
@@ -108,6 +108,7 @@ def _environment() -> Environment:
         interval=interval,
         estimate=estimate,
         readable=readable,
+        subscripts=_subscripts,
         safe_svg=Markup,
         as_link=_as_link,
     )
@@ -179,7 +180,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     return found | {
         "law": _typeset(answer),
         "constants": [
-            (one.symbol, _in_cell(one.number), _in_cell(one.interval)) for one in answer.constants
+            (one.symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
+            for one in answer.constants
         ],
         "expected": [
             {
@@ -211,6 +213,14 @@ def _unbroken(text: str) -> str:
     return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
 
 
+_LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
+
+
+def _subscripts(text: str) -> Markup:
+    """Return text, escaped, with what follows a letter and an underscore lowered."""
+    return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
+
+
 def _in_cell(text: str) -> str:
     """Return a number or an interval that breaks before a power of ten at most."""
     return _unbroken(text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×"))
@@ -218,22 +228,25 @@ def _in_cell(text: str) -> str:
 
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
-    law = "" if equation is None else _law(equation)
     lines = answer.written.get("formula", "").splitlines()
+    law = "" if equation is None else _law(equation, any(line.startswith("h = ") for line in lines))
     return law + "".join(f'<p class="scroll">{formula(one, "answer")}</p>' for one in lines)
 
 
-def _law(equation: Equation) -> str:
+def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
     plain = (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
     modes = 0 if plain else len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
         law = law_element(
-            equation.terms, equation.linear_relaxation, equation.named, modes, solvent
+            equation.terms, equation.linear_relaxation, equation.named, modes, solvent, rest
         )
         # what a state of the whole fluid does stands below the law of a mode
-        states = [formula(part.own.equation, part.effect) for part in equation.states]
+        index = "_k" if modes > 1 else ""
+        states = [
+            formula(part.own.equation.replace("_k", index), part.effect) for part in equation.states
+        ]
         return law + "".join(f'<p class="scroll">{one}</p>' for one in states)
     except InputError:  # nobody said how a law of their own is written
         return ""
