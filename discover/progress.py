@@ -72,29 +72,30 @@ def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callabl
     return part
 
 
-UNKNOWN = 0.125
-"""Fraction told before anything is known: that of an inelastic material, which is found at once;
-other tasks have done less by then, and say so as soon as they know."""
-
-
 def by_time(
     progress: Progress | None, clock: Callable[[], float] = time.perf_counter
-) -> Callable[[str, float | None], None]:
+) -> Callable[[str, float | None, float], None]:
     """Return what passes on lines with the seconds still to come, as the fraction of all time.
 
-    While the seconds are not known, None, that is `UNKNOWN`. It never falls.
+    While the seconds are not known, None, a fraction stands in their place. It never falls.
     """
     begun = progress.begun if isinstance(progress, FollowedBy) else clock()
     largest = 0.0
 
-    def say(text: str, left: float | None) -> None:
+    def say(text: str, left: float | None, fraction: float = 0.0) -> None:
         nonlocal largest
         passed = clock() - begun
-        fraction = UNKNOWN if left is None else passed / max(passed + left, 1e-9)
+        if left is not None:
+            fraction = passed / max(passed + left, 1e-9)
         largest = max(largest, min(fraction, 1.0))
         (progress or silent)(text, largest)
 
     return say
+
+
+STATES = 0.125
+"""Fraction that is done when states alone begin to be searched: most are found to be those of an
+inelastic material at once. It is of the drawing too."""
 
 
 class FollowedBy:
@@ -111,7 +112,7 @@ class FollowedBy:
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""
-        if fraction > UNKNOWN:
+        if fraction > STATES:
             passed = self._clock() - self.begun
             fraction = passed / (passed / fraction + self._seconds)
         (self._progress or silent)(text, fraction)

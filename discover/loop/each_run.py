@@ -13,7 +13,7 @@ from discover.loop.loop import run_loop
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import ErrorPair, Fold
 from discover.loop.search_time import SearchTime
-from discover.progress import Progress, by_time
+from discover.progress import STATES, Progress, by_time
 from discover.study.data import StudyData
 
 
@@ -39,8 +39,10 @@ def run_loop_on(
     tell = by_time(progress)
     left = SearchTime(max_effects, len(declared.modulus) > 1, rounds)
 
+    states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
+
     def say(line: str) -> None:
-        tell(line, left.heard(line))
+        tell(line, left.heard(line), STATES if states else 0.0)
 
     options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
     if data.each:
