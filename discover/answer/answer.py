@@ -39,9 +39,14 @@ class Constant:
     meaning: str = ""  # in a few words, where its letter is not one of the field
 
     @property
+    def is_term(self) -> bool:
+        """Whether it is the coefficient of a term of the library."""
+        return "sigma" in self.name or "gammadot" in self.name
+
+    @property
     def symbol(self) -> str:
         """Letter of the field, such as α."""
-        if "sigma" in self.name or "gammadot" in self.name:  # a term of the library
+        if self.is_term:
             return readable(self.name)
         name = self.name.rpartition(".")[2]
         if name in _SYMBOLS:

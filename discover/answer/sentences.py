@@ -181,9 +181,9 @@ def suspects(answer: Any) -> str:
 
 
 def further(answer: Any) -> list[str]:
-    """Return what stands below the table: instrument, tolerance, other law, failed test."""
-    found = [suspects(answer), answer.alternative, tolerance(answer), answer.failed]
-    return [line for line in found if line]
+    """Return what stands below the table: instrument and other law, tolerance and failed test."""
+    pairs = (suspects(answer), answer.alternative), (tolerance(answer), answer.failed)
+    return [" ".join(filter(None, pair)) for pair in pairs if any(pair)]
 
 
 def lines(answer: Any) -> list[str]:

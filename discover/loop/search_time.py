@@ -53,9 +53,9 @@ class SearchTime:
         if found := re.search(r"search among (\d+)", line):
             self._search(float(found[1]))
         elif found := re.search(r"sets of (\d+): (\d+) fitted", line):
+            self._depth = int(found[1])
             self._spend(float(found[2]))
             self._fitted += float(found[2])
-            self._depth = int(found[1])
             self._rest = _DEEPER * (self._most - self._depth) + self._exchanged + _WEIGHED
         elif found := re.search(r"exchanged: (\d+)", line):
             exchanged = _EXCHANGE * max(float(found[1]) - self._fitted, 0.0)

@@ -177,10 +177,20 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if not answer.title:
         return found
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
+    if (shown := answer.equation or answer.shown) is not None and not _is_plain(shown):
+        # terms as the equation in Pa and s has them
+        for one in answer.constants:
+            if one.is_term:
+                found["headline"] = found["headline"].replace(one.symbol, _of_mode(one.symbol))
     return found | {
         "law": _typeset(answer),
         "constants": [
-            (one.symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
+            (
+                _of_mode(one.symbol) if one.is_term else one.symbol,
+                one.said,
+                _in_cell(one.number),
+                _in_cell(one.interval),
+            )
             for one in answer.constants
         ],
         "expected": [
@@ -213,6 +223,16 @@ def _unbroken(text: str) -> str:
     return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
 
 
+def _is_plain(equation: Equation) -> bool:
+    """Return whether a law is dimensionless: one mode of 1 Pa and 1 s."""
+    return (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
+
+
+def _of_mode(term: str) -> str:
+    """Return a term over the stress of a mode in units of its modulus."""
+    return term.replace("σ", "τ")
+
+
 _LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
 
 
@@ -235,8 +255,7 @@ def _typeset(answer: Answer) -> str:
 
 def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    plain = (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
-    modes = 0 if plain else len(equation.modulus)
+    modes = 0 if _is_plain(equation) else len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
         law = law_element(

@@ -34,9 +34,11 @@ MELT = Answer(
 
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
-        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7) "
-        "plus 0.25 % noise. Do not use to predict within 5 %; fitted in shear, 0.003–3 1/s."
+        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7; "
+        "0.25 % noise removed). Use only where that error is acceptable, in shear, 0.003–3 1/s."
     )
+    useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
+    assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits to the noise (1 %)." in exact.headline
 
