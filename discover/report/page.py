@@ -4,7 +4,7 @@ import logging
 import os
 import platform
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -177,21 +177,18 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if not answer.title:
         return found
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
+    symbols = [one.symbol for one in answer.constants]
     if (shown := answer.equation or answer.shown) is not None and not _is_plain(shown):
-        # terms as the equation in Pa and s has them
-        for one in answer.constants:
+        # terms as the equation in Pa and s has them: over the stress of a mode in units of G
+        for i, one in enumerate(answer.constants):
             if one.is_term:
-                found["headline"] = found["headline"].replace(one.symbol, _of_mode(one.symbol))
+                symbols[i] = one.symbol.replace("σ", "τ")
+                found["headline"] = found["headline"].replace(one.symbol, symbols[i])
     return found | {
         "law": _typeset(answer),
         "constants": [
-            (
-                _of_mode(one.symbol) if one.is_term else one.symbol,
-                one.said,
-                _in_cell(one.number),
-                _in_cell(one.interval),
-            )
-            for one in answer.constants
+            (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
+            for symbol, one in zip(symbols, answer.constants, strict=True)
         ],
         "expected": [
             {
@@ -228,11 +225,6 @@ def _is_plain(equation: Equation) -> bool:
     return (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
 
 
-def _of_mode(term: str) -> str:
-    """Return a term over the stress of a mode in units of its modulus."""
-    return term.replace("σ", "τ")
-
-
 _LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
 
 
@@ -250,7 +242,16 @@ def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
     lines = answer.written.get("formula", "").splitlines()
     law = "" if equation is None else _law(equation, any(line.startswith("h = ") for line in lines))
-    return law + "".join(f'<p class="scroll">{formula(one, "answer")}</p>' for one in lines)
+    return law + _formulas(lines)
+
+
+def _formulas(lines: Sequence[str]) -> str:
+    """Return equations in LaTeX, each in a paragraph that breaks between its parts."""
+    parts = [
+        [formula(part, f"answer{i}_{k}") for k, part in enumerate(line.split(r",\quad"))]
+        for i, line in enumerate(lines)
+    ]
+    return "".join(f'<p class="scroll">{" &emsp; ".join(one)}</p>' for one in parts)
 
 
 def _law(equation: Equation, rest: bool = False) -> str:
@@ -263,10 +264,8 @@ def _law(equation: Equation, rest: bool = False) -> str:
         )
         # what a state of the whole fluid does stands below the law of a mode
         index = "_k" if modes > 1 else ""
-        states = [
-            formula(part.own.equation.replace("_k", index), part.effect) for part in equation.states
-        ]
-        return law + "".join(f'<p class="scroll">{one}</p>' for one in states)
+        parts = [part.own.equation.replace("_k", index) for part in equation.states]
+        return law + _formulas(parts)
     except InputError:  # nobody said how a law of their own is written
         return ""
 

@@ -116,5 +116,5 @@ def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy(
 def test_numbers_keep_to_a_line_with_their_units():
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
     (row,) = answer_screen(exact)["constants"]
-    assert " " not in row[1].replace(" ×", "")  # a break at most before the power of ten
+    assert " " not in row[2].replace(" ×", "")  # a break at most before the power of ten
     assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]
