@@ -106,7 +106,7 @@ def where(answer: Any) -> str:
         return f"Use in {place}."
     if answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
-    return f"Use only where that error is acceptable, in {place}."
+    return f"Use to that accuracy only, in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -148,12 +148,12 @@ def tolerance(answer: Any) -> str:
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        said = f"missed{lost or ' by the fitted runs'}{f', met{kept}' if met else ''}"
+        said = f"missed{lost or ' by fitted runs'}{f', met{kept}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
-        said = f"met by the fitted runs, missed{lost}"
+        said = f"met by fitted runs, missed{lost}"
     else:
         said = f"met{kept}{f', missed{lost}' if missed else ''}"
-    parts = [f"Tolerance of {asked}: {said}"]
+    parts = [f"Tolerance {asked}: {said}"]
     if assumed:
         parts.append(f"{listed(assumed)} within it if this law holds, not measured")
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run

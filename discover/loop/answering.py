@@ -182,7 +182,7 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        return f"No law reaches the noise (systematic residual, p {p})."
+        return f"No law reaches the noise (p {p})."
     return ""
 
 

@@ -35,7 +35,7 @@ MELT = Answer(
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7; "
-        "0.25 % noise removed). Use only where that error is acceptable, in shear, 0.003–3 1/s."
+        "0.25 % noise removed). Use to that accuracy only, in shear, 0.003–3 1/s."
     )
     useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
     assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
@@ -50,7 +50,7 @@ def test_the_first_line_has_law_constants_error_and_range():
 def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
-    assert tolerance(answer).startswith(f"Tolerance of {said}")
+    assert tolerance(answer).startswith(f"Tolerance {said}")
     assert ("a.csv (8 %)" in tolerance(answer)) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
     assert Answer("", instead="No signal.").adequate is None
