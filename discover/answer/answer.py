@@ -111,7 +111,7 @@ _SYMBOLS = {
     "relaxation_time_s": ("λ", "relaxation time"),
     "modulus_factor": ("G/G_0", "modulus over that of the sweep"),
     "relaxation_time_factor": ("λ/λ_0", "times over those of the sweep"),
-    "eta_s": ("ηₛ", "solvent viscosity"),
+    "eta_s": ("η_s", "solvent viscosity"),
     "L2": ("L²", "extensibility"),
     "yield_stress_Pa": ("τ_y", "yield stress"),
     "consistency_Pa_sn": ("K", "consistency"),

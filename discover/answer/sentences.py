@@ -133,7 +133,7 @@ def linear_part(answer: Any) -> str:
     else:
         found = ["G", f"λ = {span((min(times), max(times)))} s"] if times else []
     if answer.solvent_viscosity_Pa_s:
-        found.append(f"ηs = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
+        found.append(f"η_s = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
     return ", ".join(found)
 
 
@@ -148,7 +148,8 @@ def tolerance(answer: Any) -> str:
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        said = f"missed{lost or ' by fitted runs'}{f', met{kept}' if met else ''}"
+        of = kept if lost else kept.replace("for", "for unseen")
+        said = f"missed{lost or ' by fitted runs'}{f', met{of}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
         said = f"met by fitted runs, missed{lost}"
     else:
