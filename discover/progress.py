@@ -74,7 +74,7 @@ def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callabl
 
 def by_time(
     progress: Progress | None, clock: Callable[[], float] = time.perf_counter
-) -> Callable[[str, float | None, float], None]:
+) -> Callable[..., None]:
     """Return what passes on lines with the seconds still to come, as the fraction of all time.
 
     While the seconds are not known, None, a fraction stands in their place. It never falls.

@@ -106,7 +106,7 @@ def loop_answer(result: Any) -> Answer:
         near = result.nearest_law
         classical = None if near is None else near.equation
         shown, others = _shown(result)
-        written = {"formula": _rest_of_h(others)} if others else {}
+        written = {"formula": rest_of_h(others)} if others else {}
         return replace(answer, shown=shown, classical=classical, written=written)
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
 
@@ -136,7 +136,7 @@ def _shown(result: Any) -> tuple[Equation | None, list[str]]:
     return equation, [one.equation for one in others]
 
 
-def _rest_of_h(equations: Sequence[str]) -> str:
+def rest_of_h(equations: Sequence[str]) -> str:
     """Return one equation of what effects add to h, over the stress of a mode; then others."""
     summands, where = [], []
     for one in equations:
