@@ -212,6 +212,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 
 _TOGETHER = re.compile(
     r" (?=[=≤] )|(?<=[=≤]) |(?<=\d) (?=(?:%|Pa|1/s|s|rad/s|modes?)\b|%)|(?<=Pa) (?=s)"
+    r"|(?<=[\d)]) (?=×)|(?<=×) "
 )
 
 
@@ -235,7 +236,7 @@ def _subscripts(text: str) -> Markup:
 
 def _in_cell(text: str) -> str:
     """Return a number or an interval that breaks before a power of ten at most."""
-    return _unbroken(text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×"))
+    return _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×")
 
 
 def _typeset(answer: Answer) -> str:
