@@ -108,14 +108,15 @@ class FollowedBy:
         clock: Callable[[], float] = time.perf_counter,
     ):
         self._progress, self._seconds, self._clock = progress, seconds, clock
-        self.begun = clock()
+        self.begun, self._largest = clock(), 0.0
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""
         if fraction > STATES:
             passed = self._clock() - self.begun
             fraction = passed / (passed / fraction + self._seconds)
-        (self._progress or silent)(text, fraction)
+        self._largest = max(self._largest, fraction)
+        (self._progress or silent)(text, self._largest)
 
 
 def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:
