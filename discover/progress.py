@@ -1,5 +1,6 @@
 """One shape of progress, for everything that takes long."""
 
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
@@ -71,27 +72,51 @@ def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callabl
     return part
 
 
-def by_stages(progress: Progress | None, rounds: int = 1) -> Callable[[str], None]:
-    """Return what passes on the lines of searches that end by themselves, one after another.
+def by_time(
+    progress: Progress | None, clock: Callable[[], float] = time.perf_counter
+) -> Callable[..., None]:
+    """Return what passes on lines with the seconds still to come, as the fraction of all time.
 
-    How many stages a search has is not known. The first line comes when the model it starts from is
-    fitted, after a quarter of its time; each further one leaves two fifths of the rest, until the
-    next search begins, which its first line shows by its beginning (the text before a colon).
+    While the seconds are not known, None, a fraction stands in their place. It never falls.
     """
-    begun: list[str] = []
-    left = 1.0
+    begun = progress.begun if isinstance(progress, FollowedBy) else clock()
+    largest = 0.0
 
-    def say(line: str) -> None:
-        nonlocal left
-        name = line.partition(":")[0] if rounds > 1 else ""
-        if name not in begun and len(begun) < rounds:
-            begun.append(name)
-            left = 0.75
-        else:
-            left *= 0.4
-        (progress or silent)(line, min((len(begun) - left) / rounds, 0.95))
+    def say(text: str, left: float | None, fraction: float = 0.0) -> None:
+        nonlocal largest
+        passed = clock() - begun
+        if left is not None:
+            fraction = passed / max(passed + left, 1e-9)
+        largest = max(largest, min(fraction, 1.0))
+        (progress or silent)(text, largest)
 
     return say
+
+
+STATES = 0.125
+"""Fraction that is done when states alone begin to be searched: most are found to be those of an
+inelastic material at once. It is of the drawing too."""
+
+
+class FollowedBy:
+    """Progress of a part from the beginning, after which others take so many seconds."""
+
+    def __init__(
+        self,
+        progress: Progress | None,
+        seconds: float,
+        clock: Callable[[], float] = time.perf_counter,
+    ):
+        self._progress, self._seconds, self._clock = progress, seconds, clock
+        self.begun, self._largest = clock(), 0.0
+
+    def __call__(self, text: str, fraction: float) -> None:
+        """Pass on a line, with the fraction of all time."""
+        if fraction > STATES:
+            passed = self._clock() - self.begun
+            fraction = passed / (passed / fraction + self._seconds)
+        self._largest = max(self._largest, fraction)
+        (self._progress or silent)(text, self._largest)
 
 
 def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:

@@ -152,7 +152,7 @@ _EFFECTS = {
     "ptt_exponential": "exponential PTT",
     "thixotropic_modulus_by_stress": "stress-driven thixotropic modulus",
     "thixotropic_relaxation_by_stress": "stress-driven thixotropic relaxation",
-    "thixotropic_relaxation_two_times": "thixotropic relaxation with two times",
+    "thixotropic_relaxation_two_times": "two-time thixotropic relaxation",
 }
 
 

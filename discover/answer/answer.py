@@ -2,11 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from discover.answer import sentences
 from discover.equations.equation import Equation
+from discover.equations.spelling.plain_signs import plain as plain_signs
 from discover.plain_numbers import plain
 from discover.summary_view import Estimate
 from discover.words import effect_title, estimate, interval, readable
@@ -34,21 +35,36 @@ class Constant:
     ci95: Span | None = None
     unit: str = "1"
     determined: bool = True  # whether the data determine it
+    letter: str = ""  # LaTeX, as the equation of its effect has it
+    meaning: str = ""  # in a few words, where its letter is not one of the field
+
+    @property
+    def is_term(self) -> bool:
+        """Whether it is the coefficient of a term of the library."""
+        return "sigma" in self.name or "gammadot" in self.name
 
     @property
     def symbol(self) -> str:
         """Letter of the field, such as α."""
-        if "sigma" in self.name or "gammadot" in self.name:  # a term of the library
+        if self.is_term:
             return readable(self.name)
         name = self.name.rpartition(".")[2]
-        return readable(_SYMBOLS.get(name, name).replace("_", " "))
+        if name in _SYMBOLS:
+            return _SYMBOLS[name][0]
+        return plain_signs(self.letter) if self.letter else readable(name.replace("_", " "))
+
+    @property
+    def said(self) -> str:
+        """What it is, in a few words; empty of a term, and where nobody said."""
+        name = self.name.rpartition(".")[2]
+        return self.meaning or _SYMBOLS.get(name, ("", ""))[1]
 
     @property
     def number(self) -> str:
         """Value to as many digits as the interval leaves it, with its unit."""
         if not self.determined:
             return "not determined"
-        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        unit = "" if self.unit in ("", "1") else f" {self.unit.replace('^2', '²')}"
         return f"{self._rounded(self.value) or estimate(self.value, self.ci95)}{unit}"
 
     @property
@@ -91,18 +107,19 @@ class Constant:
 
 _MINUS = "−"
 _SYMBOLS = {
-    "modulus_Pa": "G",
-    "relaxation_time_s": "λ",
-    "modulus_factor": "factor on G",
-    "relaxation_time_factor": "factor on λ",
-    "eta_s": "eta s",
-    "L2": "L²",
-    "yield_stress_Pa": "τy",
-    "consistency_Pa_sn": "K",
-    "flow_index": "n",
-    "viscosity_Pa_s": "η",
-    "elastic_modulus_Pa": "G",
+    "modulus_Pa": ("G", "modulus"),
+    "relaxation_time_s": ("λ", "relaxation time"),
+    "modulus_factor": ("G/G_0", "modulus over that of the sweep"),
+    "relaxation_time_factor": ("λ/λ_0", "times over those of the sweep"),
+    "eta_s": ("η_s", "solvent viscosity"),
+    "L2": ("L²", "extensibility"),
+    "yield_stress_Pa": ("τ_y", "yield stress"),
+    "consistency_Pa_sn": ("K", "consistency"),
+    "flow_index": ("n", "flow index"),
+    "viscosity_Pa_s": ("η", "viscosity"),
+    "elastic_modulus_Pa": ("G", "modulus"),
 }
+"""Symbol and meaning of constants that no effect has."""
 
 
 @dataclass(frozen=True)
@@ -122,13 +139,21 @@ class Suspect:
 
     @property
     def text(self) -> str:
-        """Name and amplitude, with its interval."""
+        """Name and amplitude, with its interval; a pure number as a percentage."""
         title = effect_title(self.effect)
         if not self.constants:
             return title
-        amplitude = self.constants[0]
-        size = amplitude.with_interval("95 %: ").removeprefix(f"{amplitude.symbol} ")
-        return f"{title} {size.removeprefix('= ')}"
+        amplitude, share = self.constants[0], ""
+        if amplitude.unit == "1":
+            said = amplitude.meaning != amplitude.name.replace("_", " ")
+            share = f" {amplitude.meaning}" if amplitude.meaning and said else ""
+            ends = None if amplitude.ci95 is None else tuple(100.0 * e for e in amplitude.ci95)
+            value = 100.0 * amplitude.value
+            amplitude = replace(amplitude, value=value, ci95=ends, unit="%")
+        if not amplitude.determined:
+            return f"{title} not determined"
+        ends = f" (95 %: {amplitude.interval})" if amplitude.has_interval else ""
+        return f"{title} {amplitude.number}{share}{ends}"
 
 
 @dataclass(frozen=True)
@@ -147,6 +172,7 @@ class Range:
     rate_1_s: Span | None = None
     frequency_rad_s: Span | None = None  # of sweeps, which have no rate of their own
     flows: tuple[str, ...] = ("shear",)
+    oscillates: bool = True  # whether De is λω; else λ over the length of a run
 
 
 @dataclass(frozen=True)
@@ -203,7 +229,7 @@ class Answer:
         to mode at their mean.
     `classical`: law of the field to take instead where the law cannot be written out.
     `written`: a law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX
-        alone).
+        alone; of a law that is `shown`, what its h holds besides).
     `alternative`: what comes next to this law, one short sentence; empty where it is settled.
 
     Examples

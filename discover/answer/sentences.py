@@ -13,6 +13,9 @@ SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial exte
 
 _MOST_RUNS = 1
 
+_USELESS = 0.25
+"""Relative discrepancy beyond which a law is of no use for any prediction."""
+
 A_TRANSIENT = (
     "Measure a transient, such as start-up: steady and periodic states alone do not identify a law."
 )
@@ -66,9 +69,10 @@ def description(answer: Any) -> str:
         return "" if answer.error is None else f"Misfit {percent_of(answer.error)}."
     low, high = (percent_of(end).removesuffix(" %") for end in answer.discrepancy.ci95)
     size = percent_of(answer.discrepancy.size)
-    ends = f" (95 %: {low}–{high})" if low != high else ""
-    text = f"Describes {flows(answer)} to {size}{ends}"
-    return f"{text} plus {noise} noise." if noise else f"{text}."
+    said = [f"95 %: {low}–{high}"] if low != high else []
+    said += [f"{noise} noise removed"] if noise else []
+    bracket = f" ({'; '.join(said)})" if said else ""
+    return f"Describes {flows(answer)} to {size}{bracket}."
 
 
 def flows(answer: Any) -> str:
@@ -87,9 +91,10 @@ def where(answer: Any) -> str:
     """Return where the law may be used; in numbers without units where the modes have none."""
     found = []
     one = answer.range
+    numeral = "λω" if one.oscillates else "λ/duration"
     if _is_plain(answer) and one.weissenberg is not None:
-        found.append(f"Wi ≤ {_short(one.weissenberg[1])}")
-        found += [] if one.deborah is None else [f"De {span(one.deborah)}"]
+        found.append(f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}")
+        found += [] if one.deborah is None else [f"De = {numeral} {span(one.deborah)}"]
     elif one.rate_1_s is not None:
         found.append(f"{span(one.rate_1_s)} 1/s")
     elif one.frequency_rad_s is not None:
@@ -97,9 +102,11 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
-    if answer.adequate is False:
-        return f"Do not use to predict within {percent_of(answer.tolerance)}; fitted in {place}."
-    return f"Use in {place}."
+    if answer.adequate is not False:
+        return f"Use in {place}."
+    if answer.size > _USELESS:
+        return f"Do not use to predict; fitted in {place}."
+    return f"Use to that accuracy only, in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -126,7 +133,7 @@ def linear_part(answer: Any) -> str:
     else:
         found = ["G", f"λ = {span((min(times), max(times)))} s"] if times else []
     if answer.solvent_viscosity_Pa_s:
-        found.append(f"ηs = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
+        found.append(f"η_s = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
     return ", ".join(found)
 
 
@@ -141,12 +148,13 @@ def tolerance(answer: Any) -> str:
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     kept, lost = (f" for {listed(names)}" if names else "" for names in (met, missed))
     if not answer.adequate:
-        said = f"missed{lost or ' by the fitted runs'}{f', met{kept}' if met else ''}"
+        of = kept if lost else kept.replace("for", "for unseen")
+        said = f"missed{lost or ' by fitted runs'}{f', met{of}' if met else ''}"
     elif answer.within_tolerance("sigma12") is False:
-        said = f"met by the fitted runs, missed{lost}"
+        said = f"met by fitted runs, missed{lost}"
     else:
         said = f"met{kept}{f', missed{lost}' if missed else ''}"
-    parts = [f"Tolerance of {asked}: {said}"]
+    parts = [f"Tolerance {asked}: {said}"]
     if assumed:
         parts.append(f"{listed(assumed)} within it if this law holds, not measured")
     by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
@@ -170,13 +178,13 @@ def expected(one: Any, place: str) -> str:
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
     named = listed([one.text for one in answer.suspects[:_MOST_CONSTANTS]])
-    return f"Instrument: {named}." if named else ""
+    return f"Suspect {named}." if named else ""
 
 
 def further(answer: Any) -> list[str]:
-    """Return what stands below the table: instrument, tolerance, other law, failed test."""
-    found = [suspects(answer), answer.alternative, tolerance(answer), answer.failed]
-    return [line for line in found if line]
+    """Return what stands below the table: instrument and other law, tolerance and failed test."""
+    pairs = (suspects(answer), answer.alternative), (tolerance(answer), answer.failed)
+    return [" ".join(filter(None, pair)) for pair in pairs if any(pair)]
 
 
 def lines(answer: Any) -> list[str]:

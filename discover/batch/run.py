@@ -22,7 +22,7 @@ from discover.batch.workers import run_in_workers, run_on_cluster
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error
 from discover.first_use import enable_x64
-from discover.progress import Progress, by_shares, on_stop
+from discover.progress import FollowedBy, Progress, by_shares, on_stop
 from discover.study.atomic import make_folder, require_ours
 from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -30,9 +30,10 @@ from discover.study.schema import Study, Verdict
 from discover.validation import validated
 from discover.words import counted
 
-_LOOP_SHARES = {"loading": 0.05, "search": 0.69, "drawing": 0.26}
-_COMPARE_SHARES = {"comparing": 0.91, "drawing": 0.09}
-"""Of the time of small studies, such as the demonstration's."""
+_DRAWING = 2.5
+"""Seconds in which the pictures of a page are drawn."""
+
+_DEMO_SHARES = {"comparison": 0.86, "loop": 0.14}
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -114,6 +115,7 @@ def run_compare(
     study, folder, there = _begin("compare", path, out, seed, overwrite, note, tolerance)
     if there is not None:
         return there
+    part = FollowedBy(progress, _DRAWING)
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
     from discover.report.overlay import comparison_overlays, read_overlays
@@ -121,9 +123,8 @@ def run_compare(
     from discover.study.declared_model import declared_model
 
     sources = read_overlays(study)
-    part = by_shares(progress, _COMPARE_SHARES)
-    comparison = compare(study, seed, part("comparing"), folder)
-    part("drawing")("drawing", 0.0)
+    comparison = compare(study, seed, part, folder)
+    part("drawing", 1.0)
     overlays = ()
     if sources:
         model = declared_model(study, load_study_data(study, seed).dataset)
@@ -155,6 +156,7 @@ def run_close_loop(
     study, folder, there = _begin("close-loop", path, out, seed, overwrite, note, tolerance)
     if there is not None:
         return there
+    part = FollowedBy(progress, _DRAWING)
     from discover.dataset.run_table import material_and_temperature
     from discover.loop.each_run import run_loop_on
     from discover.report.loop.report import write_loop
@@ -162,17 +164,16 @@ def run_close_loop(
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model, forward_model
 
-    part = by_shares(progress, _LOOP_SHARES)
-    part("loading")("loading data", 0.0)
+    part("loading data", 0.0)
     sources = read_overlays(study)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
     asked = dict(study.loop)
-    result = run_loop_on(data_of_study, declared, part("search"), laws=model.choice, **asked)
+    result = run_loop_on(data_of_study, declared, part, laws=model.choice, **asked)
     result = replace(result, tolerance=study.verdict.tolerance)
     each = data_of_study.each
-    part("drawing")("drawing", 0.0)
+    part("drawing", 1.0)
     window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
     window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
     summary = (
@@ -211,7 +212,7 @@ def run_demo(
 
     `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
     """
-    part = by_shares(progress, {"comparison": 0.9, "loop": 0.1})
+    part = by_shares(progress, _DEMO_SHARES)
     studies = files("discover.batch") / "demo_studies"
     with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:
         first = run_compare(comparison, out, seed, overwrite, part("comparison"))

@@ -98,24 +98,33 @@ def progress_bar(quiet: bool) -> Iterator[Report]:
         yield lambda label, fraction: None
         return
     from rich.markup import escape
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
+    from rich.text import Text
+
+    class TimeLeft(ProgressColumn):
+        """Time left, as told last, less what has passed since."""
+
+        def render(self, task):
+            """Return it in words; nothing while it is unknown."""
+            if task.fields["end"] is None:
+                return Text()
+            return Text(f"about {_duration(task.fields['end'] - (task.elapsed or 0.0))} left")
 
     columns = (
         BarColumn(bar_width=24),
         TextColumn("{task.percentage:3.0f} %"),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[left]}"),
+        TimeLeft(),
         TextColumn("{task.description}"),
     )
     with Progress(*columns, console=console, transient=True) as bar, on_stop(bar.stop):
-        task = bar.add_task("starting", total=1.0, left="")
+        task = bar.add_task("starting", total=1.0, end=None)
 
         def report(label: str, fraction: float) -> None:
             elapsed = bar.tasks[0].elapsed or 0.0
-            # parts differ in speed: the mean so far is steadier than the latest speed
-            left = elapsed * (1.0 - fraction) / fraction if fraction > 0.02 else None
-            text = "" if left is None or fraction >= 1.0 else f"about {_duration(left)} left"
-            bar.update(task, completed=fraction, description=escape(label[:70]), left=text)
+            # fractions are of time
+            end = elapsed / fraction if 0.02 < fraction < 1.0 else None
+            bar.update(task, completed=fraction, description=escape(label[:70]), end=end)
 
         yield report
 

@@ -20,13 +20,14 @@ from discover.comparison.flows import (
     true_terms,
     without_spikes_in_fit,
 )
-from discover.comparison.hypotheses import search_hypotheses, terms_of, with_proposals
+from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher, study_library
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.predictive_check import expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
+from discover.comparison.time_left import ComparisonTime
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
@@ -148,10 +149,6 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
     return f"{text}; {model.solid.rstrip('.')}" if model.solid else text
 
 
-_SEARCH = 0.15
-"""Share of the time that the search among hypotheses takes, about."""
-
-
 @in_one_thread
 def compare(
     study: Study,
@@ -203,17 +200,18 @@ def compare(
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
-    progress("searching among laws, effects and terms", 0.0)
-    found = search_hypotheses(
-        study, data, declared, library, lambda line: progress(line, 0.5 * _SEARCH)
-    )
-    frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation)
+    several = len(declared.modulus) > 1
+    times = ComparisonTime(progress, MOST_EFFECTS, several, n_parts / len(options.learners))
+    progress("searching among laws, effects and terms", 0.0)
+    found = search_hypotheses(study, data, declared, library, times.searching)
+    frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)
+    times.learning()
 
     def at(done: int, title: str) -> Progress:
         def say(text: str, fraction: float) -> None:
             share = (done + fraction) / n_parts
-            progress(f"{title}: {text}" if title else text, _SEARCH + (0.95 - _SEARCH) * share)
+            times.learned(f"{title}: {text}" if title else text, share)
 
         return say
 
@@ -224,7 +222,7 @@ def compare(
     done = len(own)
     points = sweep_points(sweep, learning, frame.model, seed, lambda i, title: at(done + i, title))
     distillations = distilled(study, data.truth, store, at((1 + len(sweep)) * done, "distillation"))
-    progress("weighing what was found", 0.95)
+    times.weighing("weighing what was found")
     outcomes = {name: frame.outcome(outcome) for name, outcome in own.items()}
     found, proposed = with_proposals(found, {name: one.terms for name, one in outcomes.items()})
     found = found.with_curves()

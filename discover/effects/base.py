@@ -66,6 +66,7 @@ class EffectParameter:
         if its name says nothing of that time.
     `absent`: of a constant that may be `low`: what the effect is there, where its name says
         otherwise.
+    `meaning`: in a few words; by default the name in words. Of a share: of what it is one.
     """
 
     name: str  # name in JSON and reports
@@ -80,6 +81,7 @@ class EffectParameter:
     ends: tuple[Literal["low", "high"], ...] = field(default=(), kw_only=True)
     endless: str = field(default="", kw_only=True)
     absent: str = field(default="", kw_only=True)
+    meaning: str = field(default="", kw_only=True)
 
 
 @dataclass(frozen=True)

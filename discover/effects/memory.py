@@ -38,6 +38,7 @@ THIXOTROPY = Thixotropy(
         EffectParameter(
             "breakdown",
             "k",
+            meaning="breakdown per unit strain",
             low=0.0,
             high=1e3,
             first_trial=0.02,
@@ -60,7 +61,7 @@ THIXOTROPY = Thixotropy(
         ),
     ),
     equation=(
-        r"\sigma = s \sum_k \sigma_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}}"
+        r"G_k \to s\,G_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}}"
         r" - k\,|\dot\gamma|\,s"
     ),
     source="Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009, Adv. Colloid "
@@ -105,6 +106,7 @@ VISCOUS_HEATING = ViscousHeating(
             "heating",
             "b",
             "1/Pa",
+            meaning="fall of ln λ per unit work",
             low=0.0,
             high=1e-6,
             scale="inverse_stress",
@@ -153,6 +155,7 @@ SOFTENING_BY_WORK = SofteningByWork(
             "softening",
             "b",
             "1/Pa",
+            meaning="fall of ln λ per unit work",
             low=0.0,
             high=10.0,
             scale="inverse_stress",

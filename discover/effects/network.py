@@ -132,6 +132,7 @@ GIESEKUS_MOBILITY = GiesekusMobility(
         EffectParameter(
             "alpha",
             r"\alpha",
+            meaning="mobility",
             low=0.0,
             high=1.0,
             first_trial=0.01,
@@ -163,6 +164,7 @@ NON_AFFINE_MOTION = NonAffineMotion(
         EffectParameter(
             "xi",
             r"\xi",
+            meaning="slip of the network",
             low=0.0,
             high=1.0,
             first_trial=0.01,
@@ -199,6 +201,7 @@ PTT_EXPONENTIAL = ExponentialNetworkLoss(
         EffectParameter(
             "epsilon",
             r"\varepsilon",
+            meaning="elongational parameter",
             low=0.0,
             high=10.0,
             first_trial=0.01,
@@ -233,6 +236,7 @@ PTT_LINEAR = LinearNetworkLoss(
         EffectParameter(
             "epsilon",
             r"\varepsilon",
+            meaning="elongational parameter",
             low=0.0,
             high=10.0,
             first_trial=0.01,
@@ -346,6 +350,7 @@ RELAXATION_MODE = RelaxationMode(
             "G",
             "G_+",
             "Pa",
+            meaning="modulus of the added mode",
             low=0.0,
             high=1e10,
             scale="stress",
@@ -356,6 +361,7 @@ RELAXATION_MODE = RelaxationMode(
             "lambda",
             r"\lambda_+",
             "s",
+            meaning="time of the added mode",
             low=1e-6,
             high=30.0,
             scale="run_time",

@@ -124,6 +124,14 @@ def make_effect(name: str) -> AbstractEffect:
         ) from error
 
 
+def parameters_of(name: str) -> dict[str, EffectParameter]:
+    """Return the parameters of an effect by name; none of one that was given as an object."""
+    try:
+        return {one.name: one for one in make_effect(name).parameters}
+    except InputError:
+        return {}
+
+
 Written = Any
 """As a study has them: effect → parameter → value or ``"fit"``; ``"fit"`` alone fits them all."""
 

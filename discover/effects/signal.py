@@ -63,6 +63,7 @@ EDGE_FRACTURE = EdgeFracture(
         EffectParameter(
             "loss",
             "k",
+            meaning="of the stress per unit strain",
             low=0.0,
             high=10.0,
             first_trial=0.005,

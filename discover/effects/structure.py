@@ -151,6 +151,7 @@ EXPONENT = EffectParameter(
 SLOWNESS = EffectParameter(
     "slowness",
     "R",
+    meaning="slow over fast structure time",
     low=2.0,
     high=1e4,
     first_trial=30.0,
@@ -162,6 +163,7 @@ SLOWNESS = EffectParameter(
 SLOW_SHARE = EffectParameter(
     "slow_share",
     "w",
+    meaning="share of the slow structure",
     low=0.01,
     high=0.99,
     first_trial=0.1,
@@ -181,7 +183,7 @@ THIXOTROPIC_MODULUS = ThixotropicModulus(
     name="thixotropic_modulus",
     parameters=(INVERSE_RATE, BUILD_UP_TIME, EXPONENT),
     equation=(
-        r"\sigma = s\sum_k\sigma_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r"G_k \to s\,G_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
         r" - \left(\frac{|\dot\gamma|}{\dot\gamma_\mathrm{c}}\right)^n s"
     ),
     source="Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147-148, 214; Dullaert & Mewis 2006, "
@@ -204,7 +206,7 @@ THIXOTROPIC_MODULUS_BY_STRESS = ThixotropicModulusByStress(
     name="thixotropic_modulus_by_stress",
     parameters=(INVERSE_STRESS, BUILD_UP_TIME, EXPONENT),
     equation=(
-        r"\sigma = s\sum_k\sigma_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
+        r"G_k \to s\,G_k,\quad t_\mathrm{b}\frac{ds}{dt} = 1 - s"
         r" - \left(\frac{|\sigma|}{\sigma_\mathrm{c}}\right)^n s"
     ),
     source="de Souza Mendes & Thompson 2013, Rheol. Acta 52, 673; Mewis & Wagner 2009, Adv. "

@@ -239,6 +239,20 @@ class AugmentedLaw(AbstractExtendedLaw):
         core, terms = self.base.split()
         return core, terms + self._added_terms()
 
+    def of_terms(self) -> "tuple[AugmentedLaw, tuple[ConstitutiveEffect, ...]]":
+        """Return the law with those effects that are sums of library terms, and the others."""
+        kept = [
+            i for i, one in enumerate(self.effects)
+            if one.as_terms(list(map(float, self.values[i]))) is not None
+        ]  # fmt: skip
+        law = AugmentedLaw(
+            base=self.base,
+            values=tuple(self.values[i] for i in kept),
+            effects=tuple(self.effects[i] for i in kept),
+            linear_relaxation=self.linear_relaxation,
+        )
+        return law, tuple(one for i, one in enumerate(self.effects) if i not in kept)
+
     def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
         """Return the law with an effect made part of the declared one, and that one's constant.
 

@@ -1,5 +1,6 @@
 """The answer of a closed loop: the law that one can use."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,15 +19,18 @@ from discover.answer import (
 )
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
+from discover.effects.base import EffectParameter
+from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
 from discover.equations.formats.rheotool import DENSITY
+from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, untested_by
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
-from discover.words import effect_title, effects_title, listed, percent_of
+from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -90,7 +94,7 @@ def loop_answer(result: Any) -> Answer:
         _expected(result, title.partition(" with ")[0] if law else "this law"),
         following,
         tuple(
-            Suspect(stage.effect, _constants(stage.parameters, stage.left_open))
+            Suspect(stage.effect, _constants(stage.parameters, stage.left_open, stage.effect))
             for stage in result.stages
             if stage.kind != "constitutive"
         ),
@@ -101,31 +105,48 @@ def loop_answer(result: Any) -> Answer:
     if equation is None:
         near = result.nearest_law
         classical = None if near is None else near.equation
-        shown = _shown(result)
-        # what has no terms is typeset by itself, below the law that it is added to
-        added = [s.equation for s in result.stages if s.kind == "constitutive"]
-        written = {} if shown is not None else {"formula": "\n".join(added)}
-        return replace(
-            answer, shown=shown or result.declared_law, classical=classical, written=written
-        )
+        shown, others = _shown(result)
+        written = {"formula": rest_of_h(others)} if others else {}
+        return replace(answer, shown=shown, classical=classical, written=written)
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
 
 
-def _shown(result: Any) -> Equation | None:
-    """Return a law that cannot be written out as a page shows it: constants at the mean mode."""
+def _shown(result: Any) -> tuple[Equation | None, list[str]]:
+    """Return a law that cannot be written out as a page shows it, constants at the mean mode.
+
+    And the equations of effects that are in its h, but no sum of terms.
+    """
     fluid = result.fluid_at_mean if result.fluid is None else result.fluid
+    added = [s.equation for s in result.stages if s.kind == "constitutive"]
     if fluid is None:
-        return None
+        return result.declared_law, added
+    law, others = fluid.law, ()
+    if isinstance(law, AugmentedLaw):
+        law, others = law.of_terms()
     try:
-        named, terms = law_parts(fluid.law)
+        named, terms = law_parts(law)
     except InputError:
-        return None
+        return result.declared_law, added
     modulus, time = (tuple(map(float, one)) for one in (fluid.modulus, fluid.relaxation_time))
     solvent = float(fluid.solvent_viscosity)
     relaxes = fluid.law.linear_relaxation
-    return Equation(
+    equation = Equation(
         terms, modulus, time, relaxes, solvent, named=named, states=tuple(result.states)
     )
+    return equation, [one.equation for one in others]
+
+
+def rest_of_h(equations: Sequence[str]) -> str:
+    """Return one equation of what effects add to h, over the stress of a mode; then others."""
+    summands, where = [], []
+    for one in equations:
+        first, *defined = one.split(r",\quad")
+        found = re.match(r"h \\mathrel\{([+-])\}= (.*)", first, re.S)
+        if found:
+            summands.append(("-" if found[1] == "-" else "+" if summands else "") + found[2])
+        where += defined if found else [one]
+    law = re.sub(r"\\sigma(?!_)", r"\\mathbf{\\tau}", f"h = {' '.join(summands)}")
+    return "\n".join([*([law] if summands else []), *where])
 
 
 def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
@@ -161,7 +182,7 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        return f"No law reaches the noise (systematic residual, p {p})."
+        return f"No law reaches the noise (p {p})."
     return ""
 
 
@@ -189,10 +210,12 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
     found = list(_constants(result.declared_parameters))
     for stage in in_fluid:
-        found += _renamed(stage.effect, _constants(stage.parameters, stage.left_open), found)
+        own = _constants(stage.parameters, stage.left_open, stage.effect)
+        found += _renamed(stage.effect, own, found)
     for known in result.declared_effects:
         if known.kind == "constitutive":
-            found += _renamed(known.effect, _constants(known.parameters), found)
+            own = _constants(known.parameters, (), known.effect)
+            found += _renamed(known.effect, own, found)
     named = None if equation is None else named_law(equation)
     solvent = equation is not None and equation.solvent_viscosity > 0.0
     if named is None:
@@ -228,7 +251,10 @@ def _beside(values: Mapping[str, float], found: Sequence[Constant]) -> list[Cons
     return [*own, *left]
 
 
-def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Constant, ...]:
+def _constants(
+    parameters: Mapping, left_open: Sequence[str] = (), effect: str = ""
+) -> tuple[Constant, ...]:
+    known = parameters_of(effect) if effect else {}
     return tuple(
         Constant(
             name,
@@ -236,9 +262,18 @@ def _constants(parameters: Mapping, left_open: Sequence[str] = ()) -> tuple[Cons
             one.ci95,
             one.unit or "1",
             name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
+            known[name].symbol if name in known else "",
+            _meaning(effect, known[name]) if name in known else "",
         )
         for name, one in parameters.items()
     )
+
+
+def _meaning(effect: str, parameter: EffectParameter) -> str:
+    """Return what a parameter is, in a few words; a letter stands for its effect."""
+    words = parameter.name.replace("_", " ")
+    is_letter = len(words) < 3 or readable(words) != words
+    return parameter.meaning or (effect_title(effect) if is_letter else words)
 
 
 def _renamed(
@@ -281,6 +316,7 @@ def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> 
         (min(rates), max(rates)) if rates else None,
         None,
         flows,
+        any(np.min(r.rate) < 0.0 < np.max(r.rate) for r in fitted),
     )
 
 

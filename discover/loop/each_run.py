@@ -12,7 +12,8 @@ from discover.forward import DeclaredModel
 from discover.loop.loop import run_loop
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import ErrorPair, Fold
-from discover.progress import Progress, by_stages
+from discover.loop.search_time import SearchTime
+from discover.progress import STATES, Progress, by_time
 from discover.study.data import StudyData
 
 
@@ -35,7 +36,14 @@ def run_loop_on(
         Called with a line of text now and then, and about what fraction is done.
     """
     rounds = 1 + len(data.fit) if data.each else 1
-    say = by_stages(progress, rounds)
+    tell = by_time(progress)
+    left = SearchTime(max_effects, len(declared.modulus) > 1, rounds)
+
+    states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
+
+    def say(line: str) -> None:
+        tell(line, left.heard(line), STATES if states else 0.0)
+
     options |= {"fit": data.fit.names, "max_effects": max_effects, "progress": say}
     if data.each:
         return run_loop_on_each(data.dataset, declared, **options)

@@ -135,7 +135,7 @@ def _predicted(
 
 
 CHECKS = {
-    "yield_stress": "Creep just below and just above τy: it shows whether the material flows.",
+    "yield_stress": "Creep just below and just above τ_y: it shows whether the material flows.",
     "viscous": "N1, or a start-up: a constant viscosity alone does not show elasticity.",
     "solid": "Creep or relaxation over a longer time: it shows whether the material flows.",
 }

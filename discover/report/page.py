@@ -4,7 +4,7 @@ import logging
 import os
 import platform
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 from urllib.parse import quote
 
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from discover._version import __version__
 from discover.answer import Answer
@@ -108,6 +108,7 @@ def _environment() -> Environment:
         interval=interval,
         estimate=estimate,
         readable=readable,
+        subscripts=_subscripts,
         safe_svg=Markup,
         as_link=_as_link,
     )
@@ -176,10 +177,18 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if not answer.title:
         return found
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
+    symbols = [one.symbol for one in answer.constants]
+    if (shown := answer.equation or answer.shown) is not None and not _is_plain(shown):
+        # terms as the equation in Pa and s has them: over the stress of a mode in units of G
+        for i, one in enumerate(answer.constants):
+            if one.is_term:
+                symbols[i] = one.symbol.replace("σ", "τ")
+                found["headline"] = found["headline"].replace(one.symbol, symbols[i])
     return found | {
         "law": _typeset(answer),
         "constants": [
-            (one.symbol, _in_cell(one.number), _in_cell(one.interval)) for one in answer.constants
+            (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
+            for symbol, one in zip(symbols, answer.constants, strict=True)
         ],
         "expected": [
             {
@@ -203,6 +212,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
 
 _TOGETHER = re.compile(
     r" (?=[=≤] )|(?<=[=≤]) |(?<=\d) (?=(?:%|Pa|1/s|s|rad/s|modes?)\b|%)|(?<=Pa) (?=s)"
+    r"|(?<=[\d)]) (?=×)|(?<=×) "
 )
 
 
@@ -211,30 +221,52 @@ def _unbroken(text: str) -> str:
     return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
 
 
+def _is_plain(equation: Equation) -> bool:
+    """Return whether a law is dimensionless: one mode of 1 Pa and 1 s."""
+    return (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
+
+
+_LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
+
+
+def _subscripts(text: str) -> Markup:
+    """Return text, escaped, with what follows a letter and an underscore lowered."""
+    return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
+
+
 def _in_cell(text: str) -> str:
     """Return a number or an interval that breaks before a power of ten at most."""
-    return _unbroken(text.replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×"))
+    return _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×")
 
 
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
-    law = "" if equation is None else _law(equation)
     lines = answer.written.get("formula", "").splitlines()
-    return law + "".join(f'<p class="scroll">{formula(one, "answer")}</p>' for one in lines)
+    law = "" if equation is None else _law(equation, any(line.startswith("h = ") for line in lines))
+    return law + _formulas(lines)
 
 
-def _law(equation: Equation) -> str:
+def _formulas(lines: Sequence[str]) -> str:
+    """Return equations in LaTeX, each in a paragraph that breaks between its parts."""
+    parts = [
+        [formula(part, f"answer{i}_{k}") for k, part in enumerate(line.split(r",\quad"))]
+        for i, line in enumerate(lines)
+    ]
+    return "".join(f'<p class="scroll">{" &emsp; ".join(one)}</p>' for one in parts)
+
+
+def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    plain = (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
-    modes = 0 if plain else len(equation.modulus)
+    modes = 0 if _is_plain(equation) else len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
         law = law_element(
-            equation.terms, equation.linear_relaxation, equation.named, modes, solvent
+            equation.terms, equation.linear_relaxation, equation.named, modes, solvent, rest
         )
         # what a state of the whole fluid does stands below the law of a mode
-        states = [formula(part.own.equation, part.effect) for part in equation.states]
-        return law + "".join(f'<p class="scroll">{one}</p>' for one in states)
+        index = "_k" if modes > 1 else ""
+        parts = [part.own.equation.replace("_k", index) for part in equation.states]
+        return law + _formulas(parts)
     except InputError:  # nobody said how a law of their own is written
         return ""
 

@@ -241,7 +241,7 @@ class Model(Section):
     effects: dict[str, dict[str, float | Literal["fit"]] | Literal["fit"]] = Field(
         default_factory=dict
     )
-    """Effects known beside the law, with values or `"fit"`; `discover effects` lists them."""
+    """Known effects added to the law, with values or `"fit"`; `discover effects` lists them."""
     from_: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
         default=None, alias="from"
     )
@@ -373,7 +373,7 @@ class Report(Section):
     """What the page shows beside the results."""
 
     overlay: Annotated[tuple[OverlayAsked, ...], Field(max_length=4)] = ()
-    """Curves beside those of the report."""
+    """Curves drawn with those of the report."""
 
 
 class Verdict(Section):

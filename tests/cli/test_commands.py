@@ -184,7 +184,7 @@ def test_constants_to_be_fitted_are_fitted_before_the_learners_run(tmp_path, tra
     result = invoke("compare", tmp_path / "s.toml", "--out", tmp_path / "out")
     assert result.exit_code == 0, result.stderr
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "then held" in page
+    assert "fitted)" in page
 
 
 BAD_STUDIES = {

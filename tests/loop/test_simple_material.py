@@ -87,7 +87,7 @@ def test_a_loop_names_a_yield_stress_without_a_search():
     lines = []
     found = run_loop(data, DeclaredModel.named("ucm", {}, [1.0], [1.0]), progress=lines.append)
     assert not any("search" in line for line in lines)
-    assert found.answer.headline.startswith("Yield-stress fluid (Herschel–Bulkley), τy = 1")
+    assert found.answer.headline.startswith("Yield-stress fluid (Herschel–Bulkley), τ_y = 1")
     assert found.use["law"] == "herschel_bulkley"
     assert found.use["constants"]["yield_stress_Pa"]["unit"] == "Pa"
     assert "stress(rate)" in found.answer.written["python"]

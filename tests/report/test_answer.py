@@ -8,8 +8,11 @@ from test_loop_report import few_pictures, loop_result  # noqa: F401
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.answer.naming import named_law
 from discover.answer.sentences import tolerance
+from discover.effects.registry import named_effects
 from discover.equations import Equation
+from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
+from discover.loop.answering import rest_of_h
 from discover.report.loop.report import write_loop
 from discover.report.page import answer_screen, render
 from discover.study import RunFolder
@@ -34,9 +37,11 @@ MELT = Answer(
 
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
-        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7) "
-        "plus 0.25 % noise. Do not use to predict within 5 %; fitted in shear, 0.003–3 1/s."
+        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Describes shear to 6 % (95 %: 4–7; "
+        "0.25 % noise removed). Use to that accuracy only, in shear, 0.003–3 1/s."
     )
+    useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
+    assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits to the noise (1 %)." in exact.headline
 
@@ -48,7 +53,7 @@ def test_the_first_line_has_law_constants_error_and_range():
 def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate, said):
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
-    assert tolerance(answer).startswith(f"Tolerance of {said}")
+    assert tolerance(answer).startswith(f"Tolerance {said}")
     assert ("a.csv (8 %)" in tolerance(answer)) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
     assert Answer("", instead="No signal.").adequate is None
@@ -111,8 +116,46 @@ def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy(
     assert not any(one["text"] for one in bare["copies"] if one["name"] != "JSON")
 
 
+def test_rows_have_the_letters_of_the_equation_and_say_what_they_are():
+    for effect in named_effects().values():
+        if effect.kind == "constitutive" and effect.name != "relaxation_mode":
+            equation = plain(effect.equation)
+            for one in effect.parameters:
+                assert plain(one.symbol).removeprefix("1/") in equation, one.name
+    time = Constant(
+        "heat_loss_time", 160.0, (110.0, 230.0), "s", True, r"t_\mathrm{h}", "heat loss"
+    )
+    page = render("answer.html", screen=answer_screen(replace(MELT, constants=(time,))))
+    assert 't<sub>h</sub> <span class="note">heat loss</span>' in page
+    run = answer_screen(replace(MELT, failed="Missed in run a_1b <x>."))
+    assert "run a_1b &lt;x&gt;." in render("answer.html", screen=run)
+
+
+def test_what_cannot_be_written_out_is_one_equation_with_the_law_it_is_added_to():
+    effects = named_effects()
+    added = [effects[name].equation for name in ("strain_damping", "yield_stress")]
+    first, *where = rest_of_h(added).splitlines()
+    assert first.startswith("h = n")
+    assert first.count("=") == 1
+    assert r"-\min" in first
+    assert len(where) == 1
+    law = Equation((LawTerm("sigma.sigma", 0.1),), (2.0, 1.0), (1.0, 10.0))
+    answer = replace(MELT, equation=None, shown=law, written={"formula": rest_of_h(added)})
+    assert "<mi>h</mi>" in answer_screen(answer)["law"]
+    assert "<mi>h</mi>" not in answer_screen(replace(answer, written={}))["law"]
+
+
+def test_a_suspected_share_is_a_percentage_of_something_and_others_have_units():
+    assert MELT.suspects[0].text == "stress gain −11 % (95 %: −36 to 2)"
+    loss = Constant("loss", 0.018, (0.012, 0.022), meaning="of the stress per unit strain")
+    said = Suspect("edge_fracture", (loss,)).text
+    assert said.startswith("edge fracture 1.80 % of the stress per unit strain (95 %: 1.20–2.20)")
+    lag = Constant("tau", 0.35, (0.13, 0.48), "s", meaning="tau")
+    assert Suspect("transducer_lag", (lag,)).text == "transducer lag 0.35 s (95 %: 0.13–0.48)"
+
+
 def test_numbers_keep_to_a_line_with_their_units():
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
     (row,) = answer_screen(exact)["constants"]
-    assert " " not in row[1].replace(" ×", "")  # a break at most before the power of ten
+    assert " " not in row[2].replace(" ×", "")  # a break at most before the power of ten
     assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]

@@ -183,14 +183,14 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
 
 
 class InUnitsNotation(MathmlNotation):
-    """The same in units, for each mode: s for σ/G, and λ before γ̇.
+    """The same in units, for each mode: τ for σ/G, and λ before γ̇.
 
     `modes`: how many there are; of several each symbol has the index k.
     """
 
     def __init__(self, modes: int):
         index = "<msub>{}<mi>k</mi></msub>" if modes > 1 else "{}"
-        self.stress = index.format(_BOLD.format("s"))
+        self.stress = index.format(_BOLD.format("τ"))
         self.time, self.modulus = index.format("<mi>λ</mi>"), index.format("<mi>G</mi>")
 
     def tensor(self, name: str) -> str:
@@ -210,13 +210,14 @@ def law_element(
     named: NamedPart | None = None,
     modes: int = 0,
     solvent: bool = False,
+    rest: bool = False,
 ) -> str:
     """Return the whole law, displayed; a long one goes on in the next line.
 
     Browsers do not break a `math` element, so each summand is one of its own.
 
     `modes`: of a law in Pa and s how many there are; 0 for a dimensionless one. `solvent`: whether
-    a law in Pa and s has a solvent.
+    a law in Pa and s has a solvent. `rest`: whether it has a summand h that stands elsewhere.
     """
     notation = InUnitsNotation(modes) if modes else MathmlNotation()
     stress, rate = notation.tensor("sigma"), notation.tensor("gammadot")
@@ -227,6 +228,7 @@ def law_element(
         + parse_term(t.term).spell(notation, _factor(t), t.inner)
         for t in terms
     ]
+    extra += [_SIGN.format("+") + "<mi>h</mi>"] if rest else []
     where = []
     if named is not None:
         function = named.function

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from discover.effects import make_effect
-from discover.errors import InputError
+from discover.effects.registry import parameters_of
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.asked import EXPLAINED, MOST_NAMES, doubted, several, untested_by
@@ -231,11 +230,9 @@ def noise_range(result: LoopResult) -> list[float] | None:
 
 def _symbols(stage: Stage) -> dict[str, str]:
     """Return the typeset symbol of each parameter, as the equation has it."""
-    try:
-        parameters = make_effect(stage.effect).parameters
-    except InputError:  # an effect that somebody gave as an object
-        return {}
-    return {p.name: formula(p.symbol, f"{safe_name(stage.effect)}_{p.name}") for p in parameters}
+    parameters = parameters_of(stage.effect)
+    own = safe_name(stage.effect)
+    return {name: formula(one.symbol, f"{own}_{name}") for name, one in parameters.items()}
 
 
 def stage_row(stage: Stage, number: int) -> dict[str, Any]:
