@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, beside_a_step
+from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, without_spikes
 from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
 from discover.statistics.noise.noise_model import read_times
@@ -18,9 +18,6 @@ from discover.words import counted
 
 FEWEST_SAMPLES = 10  # runs with fewer say little about a law
 
-# A spike stands out of its neighbours by this many standard deviations of the local noise, and by
-# this part of the largest stress: the first keeps noisy runs quiet, the second rounded ones
-_SPIKE_SIGMAS, _SPIKE_SHARE = 10.0, 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
@@ -129,29 +126,6 @@ def _at_given_stress(run: Run) -> Iterator[Finding]:
         yield warning("strain", run.name, f"{text}of one of the two columns.")
 
 
-def spikes(run: Run) -> Float[np.ndarray, " k"]:
-    """Return the times, in s, of single samples of stress that stand out of their neighbours.
-
-    A sample is compared with the straight line between its neighbours. A lone spike also bends
-    the lines at its neighbours the other way; a corner or a fast rise does not. Nor is a sample one
-    that is next to a step of the rate.
-    """
-    off = bends(run.time, run.stress)
-    if len(off) < 5:
-        return np.empty(0)
-    width = min(41, len(off))
-    first = np.clip(np.arange(len(off)) - width // 2, 0, len(off) - width)
-    windows = np.lib.stride_tricks.sliding_window_view(np.abs(off), width)
-    noise = 1.4826 * np.median(windows, axis=1)[first]
-    size = np.abs(off)
-    large = size > np.maximum(_SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.stress)))
-    alone = np.zeros(len(off), dtype=bool)
-    alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
-    # the neighbours of a spike bend too, but less
-    alone[1:-1] &= (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])
-    return run.time[1:-1][large & alone & ~beside_a_step(run)[1:-1]]
-
-
 def stress_noise(run: Run) -> float:
     """Return the standard deviation of the sample-to-sample noise of the stress, in Pa."""
     off = bends(run.time, run.stress)
@@ -170,8 +144,7 @@ def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
 
 def _of_samples(run: Run) -> Iterator[Finding]:
     """Yield spikes, values that are read several times, and a clock that began before the flow."""
-    found = spikes(run)
-    if len(found):
+    if found := without_spikes(run)[1]:
         where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
         count = "one sample" if len(found) == 1 else f"{len(found)} samples"
         text = f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
@@ -284,7 +257,7 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
             continue
         rates = np.array([abs(run.rate[0]) for run in alike])
         for what, quantity, rises in (
-            ("The stress", lambda run: float(np.max(np.abs(run.stress))), True),
+            ("The stress", _largest, True),
             ("The time at which the stress rises", _half_time, False),
         ):
             values = np.array([quantity(run) for run in alike])
@@ -314,6 +287,10 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         "and name the column of the factors ([data] clock_factor)."
     )
     yield warning("temperature", "", text)
+
+
+def _largest(run: Run) -> float:
+    return float(np.max(np.abs(run.stress)))
 
 
 def _half_time(run: Run) -> float:

@@ -4,7 +4,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from typing import NamedTuple
 
 from discover.errors import InputError
@@ -60,13 +60,8 @@ def read_heading(suffix: str) -> Unit | None:
     first, *below = suffix.split("_")
     if len(suffix) > _LONGEST or (first == "1" and not below):
         return None
-    found = Unit() if first == "1" else _power(first)
-    for word in below:
-        unit = _power(word)
-        if found is None or unit is None:
-            return None
-        found = found.times(unit, -1)
-    return found
+    powers = [Unit() if first == "1" else _power(first), *map(_power, below)]
+    return None if None in powers else reduce(lambda a, b: a.times(b, -1), powers)  # pyright: ignore
 
 
 def read_unit(text: str) -> Unit | None:
