@@ -7,7 +7,7 @@ from typing import Any, overload
 import numpy as np
 import pandas as pd
 
-from discover.dataset.checking.normal_stress import sound_normal_stress
+from discover.dataset.checking.start_up import sound_normal_stress
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run

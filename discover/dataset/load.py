@@ -20,7 +20,7 @@ from discover.dataset.records.repeats import in_sequence
 from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units
-from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table, shown
+from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table
 from discover.errors import InputError, Problems
 from discover.plain_numbers import as_number, short
 from discover.words import did_you_mean
@@ -220,10 +220,7 @@ def _provenance(root: Path) -> str:
 
 
 def read_index(root: Path) -> Table:
-    """Return ``runs.csv``, without lines where there is no such file.
-
-    Raises InputError if it has no column ``file``, or a name in it is empty, repeated or outside.
-    """
+    """``runs.csv``, empty where there is none; InputError if the column ``file`` is wrong."""
     if not os.path.lexists(root / INDEX_FILE):
         return Table(INDEX_FILE, {"file": []}, [])
     index = read_table(root / INDEX_FILE)
@@ -296,19 +293,10 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 def read_sweep(path: Path) -> LinearSweep:
     """Return a linear frequency sweep, sorted, one of very many thinned; InputError if wrong."""
-    table, problems = read_table(path), Problems()
+    table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     columns = table.all_required(*quantities)
-    for quantity, values in zip(quantities, columns, strict=True):
-        found = units.find_column(tuple(table.columns), quantity)
-        rows = np.flatnonzero(values <= 0)
-        if found is not None and rows.size:
-            row = int(rows[0])
-            problems.add(
-                f"{found[0]} in {table.name} must be positive; line {table.lines[row]} holds "
-                f"{shown(table.columns[found[0]][row])}. Remove that line.{table.like_it(rows)}"
-            )
-    problems.require_none(table.name)
+    table.require_positive(*quantities)
     order = np.argsort(columns[0], kind="stable")
     keep, note = thin_sweep(columns[0][order])
     return LinearSweep(*(values[order[keep]] for values in columns), thinned=note)

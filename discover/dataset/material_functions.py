@@ -55,7 +55,7 @@ def read_material_functions(
 
 def _flow_curve(table: Table) -> Run:
     rate, stress = table.all_required(units.SHEAR_RATE, units.SHEAR_STRESS)
-    _require_positive(table, rate, "shear_rate")
+    table.require_positive(units.SHEAR_RATE)
     order = np.argsort(rate, kind="stable")
     n1, n2 = (
         None if values is None else values[order]
@@ -94,7 +94,7 @@ def read_over_time(
     quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
     table = read_table(path)
     time, values = table.all_required(units.TIME, quantity)
-    _require_positive(table, time, "time")
+    table.require_positive(units.TIME)
     order = np.argsort(time, kind="stable")  # clocks that are written short repeat themselves
     return time[order], values[order]
 
@@ -103,8 +103,7 @@ def _amplitude_sweep(table: Table) -> Run:
     columns = table.all_required(
         units.STRAIN, units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     )
-    _require_positive(table, columns[0], "strain")
-    _require_positive(table, columns[1], "omega")
+    table.require_positive(units.STRAIN, units.ANGULAR_FREQUENCY)
     order = np.lexsort(columns[:2])
     return _oscillations(table.name, "amplitude sweep", *(values[order] for values in columns))
 
@@ -128,23 +127,13 @@ def _over_time(
     table: Table, quantity: units.Quantity
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
     time, values = table.all_required(units.TIME, quantity)
-    _require_positive(table, time, "time")
-    _require_positive(table, values, quantity.stem)
+    table.require_positive(units.TIME, quantity)
     if len(time) < 3 or np.any(np.diff(time) <= 0):
         raise InputError(
             f"time in {table.name} must increase strictly, over 3 samples or more; got "
             f"{len(time)}. Sort the rows and remove repeated times."
         )
     return time, values
-
-
-def _require_positive(table: Table, values: np.ndarray, what: str) -> None:
-    if np.any(values <= 0):
-        row = int(np.argmax(values <= 0))
-        raise InputError(
-            f"{what} in {table.name} must be positive; line {table.lines[row]} holds "
-            f"{values[row]:g}. Remove that line."
-        )
 
 
 _READERS: Mapping[str, Callable[[Table], Run]] = {

@@ -83,10 +83,7 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
 
 
 def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
-    """Return why the run on a line of ``runs.csv`` cannot be fitted; None if it can.
-
-    `rate_before`: whether it is known from which steady flow each run starts.
-    """
+    """Why a run cannot be fitted; None if it can, or the rate before it is known."""
     if declared_test(index, row, None).start == "steady" and not rate_before:
         return (
             "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
@@ -196,10 +193,7 @@ def read_run(
 
 
 def _columns(table: Table, test: DeclaredTest) -> tuple[Values, Values, list[Values | None]]:
-    """Return time, stress, and rate, strain, N1 and N2 where there are such columns.
-
-    Raises InputError with all that is wrong in the columns, and not with the first of it.
-    """
+    """Time, stress, and rate, strain, N1 and N2 or None; InputError with all that is wrong."""
     problems, found = Problems(), {}
     time = stress = np.empty(0)
     imposed, *answers = _OF_SHEAR if test.flow == "shear" else _OF_EXTENSION

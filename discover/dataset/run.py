@@ -35,21 +35,14 @@ _COLUMNS = (
 
 
 class Loading(NamedTuple):
-    """By how much one loading of a sample may differ from another.
-
-    Filling, trimming and temperature differ by some per cent, as a factor on every stress that is
-    recorded of one loading.
-    """
+    """Deviation of one loading from another: a factor on every stress recorded of it."""
 
     deviation: float  # standard deviation of the factor
     noise: float | None = None  # relative noise of the record, where it is known
 
 
 def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[np.ndarray, " n"]:
-    """Return in units of what a misfit of each of some values is told, shape (n,).
-
-    The root-mean-square of the record; of states, whose noise is in proportion, the value itself.
-    """
+    """Units of a misfit, shape (n,): root mean square of a record; of states, the value itself."""
     size = np.full(len(values), rms(values))
     if protocol.control in STATES:
         largest = float(np.max(np.abs(values), initial=0.0))

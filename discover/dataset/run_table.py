@@ -107,10 +107,7 @@ _TEMPERATURE = ("temperature_C", "temperature_C_measured")
 
 
 def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
-    """Return material and temperature of some runs in words; empty where neither is told.
-
-    `material`: what a study calls it, in place of the columns of runs.csv.
-    """
+    """Material (a study's, or of runs.csv) and temperature of runs in words, if told."""
     names, temperatures = [], []
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]

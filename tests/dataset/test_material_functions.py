@@ -155,7 +155,11 @@ def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("flow_curve.csv", "shear_rate_1_s,stress_Pa\n0,1\n1,2\n", "shear_rate .* line 2 holds 0"),
+        (
+            "flow_curve.csv",
+            "shear_rate_1_s,stress_Pa\n0,1\n1,2\n",
+            "shear_rate_1_s .* line 2 holds 0",
+        ),
         ("flow_curve.csv", "shear_rate_1_s\n1\n", "no column .*stress"),
         ("creep.csv", "time_s,compliance_1_Pa\n1,1\n1,2\n3,4\n", "increase strictly"),
         ("creep.csv", "time_s,compliance_1_Pa\n1,1\n2,-2\n3,4\n", "must be positive; line 3"),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from discover.dataset.checking.normal_stress import doubts_of_normal_stress, sound_normal_stress
+from discover.dataset.checking.start_up import doubts_of_normal_stress, sound_normal_stress
 from discover.dataset.dataset import Dataset
 from discover.dataset.run import Run
 from discover.protocols.protocol import start_up

@@ -5,6 +5,7 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
@@ -13,15 +14,18 @@ from discover.dataset.checking.linear_theory import (
     doubts_of_amplitude_sweep,
     doubts_of_sweep,
 )
-from discover.dataset.checking.normal_stress import doubts_of_normal_stress
 from discover.dataset.checking.runs import (
     Finding,
     Findings,
+    Severity,
     doubts_among_runs,
     doubts_of_run,
     doubts_of_temperature,
+    error,
+    note,
+    warning,
 )
-from discover.dataset.checking.start import doubts_of_start
+from discover.dataset.checking.start_up import doubts_of_normal_stress, doubts_of_start
 from discover.dataset.linear_viscoelasticity import (
     LinearSweep,
     RelaxationSpectrum,
@@ -77,47 +81,43 @@ def check_folder(
     >>> import discover as dc
     >>> dc.check_folder("melt")  # doctest: +SKIP
     """
+    findings: list[Finding] = []
+    place = "folder", ""
     try:
         root = resolve_folder(folder, base)
-    except InputError as error:
-        return Findings([Finding("error", "folder", "", str(error))])
-    try:
+        place = "runs", INDEX_FILE
         index = read_index(root)
-    except InputError as error:
-        return Findings(_errors("runs", INDEX_FILE, error))
-    findings = [*_clock(index, clock_factor), *_before(index)]
-    try:
+        findings += [*_clock(index, clock_factor), *_before(index)]
+        place = "start", INDEX_FILE
         before = rates_before(index, None)
-    except InputError as error:
-        return Findings([*findings, Finding("error", "start", INDEX_FILE, str(error))])
+    except InputError as wrong:
+        return Findings([*findings, *_errors(*place, wrong)])
     seen = _Columns()
     runs: list[Run] = []
     for row, name in enumerate(index.columns["file"]):
         try:
             reason = reason_to_set_aside(index, row, rate_before=True)
             if reason is not None:
-                text = f"{name} is set aside: {reason}."
-                findings.append(Finding("note", "runs", name, text))
+                findings.append(note("runs", name, f"{name} is set aside: {reason}."))
                 continue
             rate = None if before is None else float(before[row])
             table = table_of_run(root, name)
             runs.append(read_run(table, index, row, rate_before=rate))
-        except InputError as error:
-            findings += _errors("run", name, error)
+        except InputError as wrong:
+            findings += _errors("run", name, wrong)
             continue
-        findings += doubts_of_run(runs[-1])
-        findings += seen.of_run(table)
+        findings += [*doubts_of_run(runs[-1]), *seen.of_run(table)]
     for column, files in seen.unused.items():
         text = f"The column {shown(column)} in {_files(files)} is not used."
-        findings.append(Finding("note", "columns", files[0], text))
-    sweep, spectrum, said = _sweep(root, seen)
+        findings.append(note("columns", files[0], text))
+    sweep, spectrum, of_sweep = _sweep(root, seen)
     for name in (f"{kind}.csv" for kind in TABLES):
         if name not in index.columns["file"] and (root / name).is_file():
             with suppress(InputError):  # said when it is read
                 seen.note_conversions(read_table(root / name), _TABLE_QUANTITIES)
     for text, files in seen.converted.items():
-        findings.append(Finding("note", "units", files[0], f"In {_files(files)}, {text}."))
-    findings += said
+        findings.append(note("units", files[0], f"In {_files(files)}, {text}."))
+    findings += of_sweep
     transients = [run for run in runs if run.protocol.control == "rate"]
     for run in transients:
         findings += doubts_of_start(run, sweep, spectrum)
@@ -127,32 +127,31 @@ def check_folder(
     if clock_factor is None and not _shift_columns(index):
         findings += doubts_of_temperature(runs)
     tables, of_tables = _tables(root, index, sweep)
-    findings += of_tables
-    findings += _folder(root, index, [*runs, *tables.values()])
-    rank = {"error": 0, "warning": 1, "note": 2}
-    return Findings(sorted(findings, key=lambda finding: rank[finding.severity]))
+    findings += [*of_tables, *_others(root, index), *_copies([*runs, *tables.values()])]
+    rank = get_args(Severity)
+    return Findings(sorted(findings, key=lambda finding: rank.index(finding.severity)))
 
 
-def _errors(what: str, where: str, error: InputError) -> list[Finding]:
-    return [Finding("error", what, where, one) for one in problems_in(str(error))]
+def _errors(what: str, where: str, wrong: InputError) -> list[Finding]:
+    return [error(what, where, one) for one in problems_in(str(wrong))]
 
 
 def _tables(
     root: Path, index: Table, sweep: LinearSweep | None
 ) -> tuple[dict[str, Run], list[Finding]]:
     """Return the tables of steady and periodic states, and what each was taken for."""
-    findings: list[Finding] = []
     try:
         tables, aside = read_material_functions(root, index.columns["file"])
-    except InputError as error:
-        return {}, _errors("tables", "", error)
+    except InputError as wrong:
+        return {}, _errors("tables", "", wrong)
+    findings: list[Finding] = []
     for table in tables.values():
         kind = str(run_line(table)["flow"])
-        what = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}"
-        text = f"{what}, {len(table)} samples: it tests the law, unless the study fits it."
-        findings.append(Finding("note", "tables", table.name, text))
+        text = f"{table.name} is taken for {'an' if kind[0] in 'ao' else 'a'} {kind}, "
+        text += f"{len(table)} samples: it tests the law, unless the study fits it."
+        findings.append(note("tables", table.name, text))
     for name, reason in aside.items():
-        findings.append(Finding("warning", "tables", name, f"{name} is set aside: {reason}."))
+        findings.append(warning("tables", name, f"{name} is set aside: {reason}."))
     if "amplitude_sweep" in tables:
         if sweep is not None:
             text = (
@@ -160,7 +159,7 @@ def _tables(
                 "frequencies: used for the relaxation spectrum; not fitted unless the study asks "
                 "for it."
             )
-            findings.append(Finding("note", "tables", SWEEP_FILE, text))
+            findings.append(note("tables", SWEEP_FILE, text))
         findings += doubts_of_amplitude_sweep(tables["amplitude_sweep"], sweep)
     return tables, findings
 
@@ -171,40 +170,39 @@ def _shift_columns(index: Table) -> list[str]:
 
 
 def _clock(index: Table, column: str | None) -> Iterator[Finding]:
-    if column is None:
-        for name in _shift_columns(index):
-            text = (
-                f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
-                f'temperature, write clock_factor = "{name}" in the study, so that effects of '
-                "the instrument are looked for on the instrument's clock."
-            )
-            yield Finding("note", "clock", INDEX_FILE, text)
-        return
+    for name in _shift_columns(index) if column is None else ():
+        text = (
+            f"{INDEX_FILE} has a column {name}. If the times were shifted by it to another "
+            f'temperature, write clock_factor = "{name}" in the study, so that effects of '
+            "the instrument are looked for on the instrument's clock."
+        )
+        yield note("clock", INDEX_FILE, text)
     try:
         factors = read_clock_factors(index, column)
-    except InputError as error:
-        yield Finding("error", "clock", INDEX_FILE, str(error))
+    except InputError as wrong:
+        yield error("clock", INDEX_FILE, str(wrong))
         return
-    if np.all(factors == 1.0):
+    if column is not None and np.all(factors == 1.0):
         text = f"{column} is 1 in every run, so it changes nothing."
-        yield Finding("note", "clock", INDEX_FILE, text)
+        yield note("clock", INDEX_FILE, text)
 
 
 def _before(index: Table) -> Iterator[Finding]:
     for name in index.columns:
-        if name.lower().startswith(_BEFORE_WORDS):
-            try:
-                factor = units.heading_factor(name, units.SHEAR_RATE)
-            except InputError as error:
-                yield Finding("warning", "start", INDEX_FILE, str(error))
-                continue
-            unit = "1/s" if factor == 1.0 else f"1/s after multiplying by {factor:.6g}"
-            text = (
-                f"{INDEX_FILE} has a column {name}. If each run starts from a steady flow at that "
-                f'rate, write rate_before = "{name}" in the study, which reads it in {unit}; '
-                "without it every run starts from rest."
-            )
-            yield Finding("note", "start", INDEX_FILE, text)
+        if not name.lower().startswith(_BEFORE_WORDS):
+            continue
+        try:
+            factor = units.heading_factor(name, units.SHEAR_RATE)
+        except InputError as wrong:
+            yield warning("start", INDEX_FILE, str(wrong))
+            continue
+        unit = "1/s" if factor == 1.0 else f"1/s after multiplying by {factor:.6g}"
+        text = (
+            f"{INDEX_FILE} has a column {name}. If each run starts from a steady flow at that "
+            f'rate, write rate_before = "{name}" in the study, which reads it in {unit}; '
+            "without it every run starts from rest."
+        )
+        yield note("start", INDEX_FILE, text)
 
 
 def _files(names: list[str]) -> str:
@@ -252,7 +250,7 @@ class _Columns:
             else:
                 self.unused.setdefault(column, []).append(name)
                 continue
-            yield Finding("warning", "columns", name, text)
+            yield warning("columns", name, text)
 
 
 def _sweep(
@@ -260,34 +258,37 @@ def _sweep(
 ) -> tuple[LinearSweep | None, RelaxationSpectrum | None, list[Finding]]:
     try:
         sweep = find_sweep(root)
-    except InputError as error:
-        return None, None, _errors("sweep", SWEEP_FILE, error)
+    except InputError as wrong:
+        return None, None, _errors("sweep", SWEEP_FILE, wrong)
     if sweep is None:
         text = (
             f"The folder has no {SWEEP_FILE}. Without a linear sweep the relaxation times must be "
             "declared or fitted, and a wrong one looks like a missing effect."
         )
-        return None, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
+        return None, None, [warning("sweep", SWEEP_FILE, text)]
     seen.note_conversions(read_table(root / SWEEP_FILE), _SWEEP_QUANTITIES)
     try:
         spectrum = relaxation_spectrum(sweep)
-    except (InputError, RuntimeError, np.linalg.LinAlgError) as error:
-        text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {error}"
-        return sweep, None, [Finding("warning", "sweep", SWEEP_FILE, text)]
+    except (InputError, RuntimeError, np.linalg.LinAlgError) as wrong:
+        text = f"No relaxation spectrum can be found from {SWEEP_FILE}: {wrong}"
+        return sweep, None, [warning("sweep", SWEEP_FILE, text)]
     return sweep, spectrum, list(doubts_of_sweep(sweep, spectrum))
 
 
-def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
-    tables = {f"{kind}.csv" for kind in TABLES}
-    listed = set(index.columns["file"]) | {INDEX_FILE, SWEEP_FILE, *tables}
-    try:
-        others = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
-    except OSError:
-        others = []
-    for name in others:
+def _others(root: Path, index: Table) -> Iterator[Finding]:
+    """Yield which tables nothing reads."""
+    tables = (f"{kind}.csv" for kind in TABLES)
+    listed = {*index.columns["file"], INDEX_FILE, SWEEP_FILE, *tables}
+    there: list[str] = []
+    with suppress(OSError):
+        there = sorted(name for name in os.listdir(root) if name.lower().endswith(".csv"))
+    for name in there:
         if name not in listed:
-            text = f"{name} is not named in {INDEX_FILE}, so it is not used."
-            yield Finding("note", "runs", name, text)
+            yield note("runs", name, f"{name} is not named in {INDEX_FILE}, so it is not used.")
+
+
+def _copies(runs: list[Run]) -> Iterator[Finding]:
+    """Yield which runs hold the same samples, and that none holds a signal."""
     seen: dict[bytes, str] = {}
     for run in runs:
         # what tells runs of different samples apart, however many there are
@@ -298,8 +299,8 @@ def _folder(root: Path, index: Table, runs: list[Run]) -> Iterator[Finding]:
                 f"{run.name} holds the same samples as {first}. Held out, a copy of a fitted "
                 "run proves nothing: remove one."
             )
-            yield Finding("warning", "runs", run.name, text)
+            yield warning("runs", run.name, text)
     try:
         require_signal(runs)
-    except InputError as error:
-        yield Finding("error", "signal", "", str(error))
+    except InputError as wrong:
+        yield error("signal", "", str(wrong))

@@ -7,7 +7,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset.checking.runs import Finding, is_start_up, steady_stress, stress_noise
+from discover.dataset.checking.runs import (
+    Finding,
+    is_start_up,
+    note,
+    steady_stress,
+    stress_noise,
+    warning,
+)
 from discover.dataset.linear.mode_search import BEYOND, relative_moduli, solved
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
@@ -58,14 +65,14 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
             f"The strain in {run.name} goes from {low:.3g} to {high:.3g}. If that is in per cent, "
             "rename the column to strain_percent."
         )
-        yield Finding("warning", "units", run.name, text)
+        yield warning("units", run.name, text)
     for name, values in (("G′", storage), ("G″", loss)):
         if np.any(values <= 0.0):
             text = (
                 f"{np.count_nonzero(values <= 0.0)} values of {name} in {run.name} are not "
                 "positive, as those of a passive fluid are: they are noise, or the phase is wrong."
             )
-            yield Finding("warning", "sign", run.name, text)
+            yield warning("sign", run.name, text)
     if linear is None:
         return
     omega, known = run.angular_frequency, linear.angular_frequency
@@ -79,7 +86,7 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
             f"At strains up to {_SMALL:g} the modulus in {run.name} is {factor:.2g} times that of "
             "lve.csv at the same frequency: another loading, another unit, or no linear range."
         )
-        yield Finding("warning", "sweep", run.name, text)
+        yield warning("sweep", run.name, text)
 
 
 def magnitude_at(sweep: LinearSweep, frequency):
@@ -90,11 +97,7 @@ def magnitude_at(sweep: LinearSweep, frequency):
 
 
 def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterator[Finding]:
-    """Yield what is doubtful about a linear sweep.
-
-    That Maxwell modes with positive moduli, a solvent and an elastic constant fit G′ and G″
-    together is the practical form of the Kramers–Kronig relations.
-    """
+    """Doubts about a linear sweep; that modes fit G′ and G″ stands for Kramers–Kronig."""
     inertia = _inertia(sweep)
     repeated = len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency)
     if spectrum.best_error > _SWEEP_TOLERANCE:
@@ -104,16 +107,16 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
             "the instrument at high frequency, a shift of one column, or too large an amplitude do "
             "that."
         )
-        yield Finding("warning", "sweep", SWEEP_FILE, text)
+        yield warning("sweep", SWEEP_FILE, text)
     if sweep.thinned:
-        yield Finding("note", "samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
+        yield note("samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
     if inertia:
-        yield Finding("warning", "sweep", SWEEP_FILE, inertia)
+        yield warning("sweep", SWEEP_FILE, inertia)
     if spectrum.solid:
-        yield Finding("note", "sweep", SWEEP_FILE, f"{SWEEP_FILE}: {spectrum.solid}")
+        yield note("sweep", SWEEP_FILE, f"{SWEEP_FILE}: {spectrum.solid}")
     if repeated:
         text = f"{SWEEP_FILE} holds some frequencies more than once."
-        yield Finding("note", "sweep", SWEEP_FILE, text)
+        yield note("sweep", SWEEP_FILE, text)
 
 
 def _inertia(sweep: LinearSweep) -> str:
@@ -198,7 +201,7 @@ def against_linear_theory(
             f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
             "learned. Add faster runs."
         )
-        yield Finding("warning", "rate", "", text)
+        yield warning("rate", "", text)
     linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
     yield from _shared_gain(runs, linear, sweep, spectrum)
     for run in runs:
@@ -218,7 +221,7 @@ def _of_start_up(
             f"relaxation time is {mean_time:.3g} s. It does not reach its steady state, and slow "
             "modes hardly show. Run longer, or do not expect it to tell."
         )
-        yield Finding("warning", "duration", run.name, text)
+        yield warning("duration", run.name, text)
     ratio = float(np.median(stress / linear)) if len(stress) >= _FEWEST_RATIOS else 1.0
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
         text = (
@@ -226,7 +229,7 @@ def _of_start_up(
             f"what {SWEEP_FILE} predicts. Units, temperature, sample loading, a slow start or a "
             "soft instrument do that; the closed loop can distinguish some of them."
         )
-        yield Finding("warning", "linear", run.name, text)
+        yield warning("linear", run.name, text)
     level = steady_stress(run)
     if rate * mean_time > _COX_MERZ_RATE or level is None:
         return
@@ -239,7 +242,7 @@ def _of_start_up(
             f"{SWEEP_FILE} at the same rate (Cox–Merz rule). Slip, edge fracture, units or "
             "another sample do that; so do structured fluids."
         )
-        yield Finding("warning", "Cox-Merz", run.name, text)
+        yield warning("Cox-Merz", run.name, text)
 
 
 def _linear_stress(
@@ -262,10 +265,7 @@ def _linear_stress(
 def _linear_part(
     run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
 ) -> tuple[Values, Values]:
-    """Return the first stresses and those of linear theory, in their order.
-
-    Used is what comes before the strain from rest exceeds its limit for the first time.
-    """
+    """Stresses and those of linear theory until the strain first exceeds its limit."""
     rates, times = np.append(run.rate[0], run.rate), np.append(0.0, run.time)
     strain = np.abs(np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(times)))
     n = int(np.argmax(np.append(strain, np.inf) >= _LINEAR_STRAIN))
@@ -279,11 +279,7 @@ def _linear_part(
 
 
 def _gain(run: Run, stress: Values, linear: Values) -> tuple[float, float] | None:
-    """Return the logarithm of a run's gain against the sweep and its error; None if it is no gain.
-
-    It is one if its ratio to linear theory does not rise or fall while the run is linear, as it
-    does after a slow start, and if nothing but noise is left with it.
-    """
+    """Log of a run's gain against the sweep, and its error; None if it drifts or leaves more."""
     if len(stress) < _FEWEST_RATIOS or np.any(stress * linear <= 0):
         return None
     ratios = np.log(stress / linear)
@@ -338,7 +334,7 @@ def _shared_gain(
         f"{np.exp(shared):.3g} times what {SWEEP_FILE} predicts: {why}. Correct it, or let the "
         'study fit it: [model] modes = "lve" with modulus_Pa = "fit".'
     )
-    yield Finding("warning" if warned else "note", "gain", "", text)
+    yield (warning if warned else note)("gain", "", text)
 
 
 def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
@@ -355,4 +351,4 @@ def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
         "as fillings of one sample do. If each run is a loading of its own, say so in the study: "
         f"loading = {spread:.1g} in [loop] and in [compare]."
     )
-    yield Finding("note", "loading", "", text)
+    yield note("loading", "", text)

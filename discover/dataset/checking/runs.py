@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any, Literal, get_args
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, beside_a_step
+from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends, without_spikes
 from discover.dataset.run import Run
 from discover.protocols.kinematics import KINDS
 from discover.statistics.noise.noise_model import read_times
@@ -17,9 +18,6 @@ from discover.words import counted
 
 FEWEST_SAMPLES = 10  # runs with fewer say little about a law
 
-# A spike stands out of its neighbours by this many standard deviations of the local noise, and by
-# this part of the largest stress: the first keeps noisy runs quiet, the second rounded ones
-_SPIKE_SIGMAS, _SPIKE_SHARE = 10.0, 0.03
 # Samples before half of the largest stress is reached, fewer of which leave the start-up to guess
 _FEWEST_ON_THE_RISE = 5
 _FEWEST_PER_CYCLE = 16
@@ -30,7 +28,7 @@ _RETURNED_WORK = 0.1  # a lag of a tenth of a radian does less to an elastic flu
 _UNIT_FACTOR = 30.0
 # In °C. Times change by 2 to 10 % a degree (Ferry 1980, ch. 11): within the gain of most records
 _ONE_TEMPERATURE = 2.0
-
+_EQUAL = 1e-9  # range over the largest, up to which all values are one
 
 Severity = Literal["error", "warning", "note"]
 
@@ -80,89 +78,52 @@ class Findings(tuple[Finding, ...], NotebookView):
         yield pd.DataFrame([asdict(finding) for finding in self])
 
 
+error, warning, note = (partial(Finding, severity) for severity in get_args(Severity))
+
+
 def doubts_of_run(run: Run) -> Iterator[Finding]:
-    """Yield what is doubtful about a run."""
+    """Yield what is doubtful about a run by itself."""
+    name, rate, stress = run.name, run.rate, run.stress
     source = str(run.metadata.get("shear_rate_source", ""))
     if "thinned" in run.metadata:
-        yield Finding("note", "samples", run.name, f"{run.name}: {run.metadata['thinned']}.")
+        yield note("samples", name, f"{name}: {run.metadata['thinned']}.")
     if source.startswith("derived"):
-        yield Finding("note", "rate", run.name, f"{run.name}: the shear rate is {source}.")
+        yield note("rate", name, f"{name}: the shear rate is {source}.")
     if len(run) < FEWEST_SAMPLES:
-        text = f"{run.name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
-        yield Finding("warning", "samples", run.name, text)
+        text = f"{name} has only {len(run)} samples; a fit needs {FEWEST_SAMPLES}."
+        yield warning("samples", name, text)
     if run.protocol.control != "rate":
-        doubts = _at_given_stress(run)
-    elif unusable := _unusable(run):
-        doubts = (unusable,)
-    elif len(run) < 3:
-        doubts = ()
-    else:
-        doubts = (
-            _outliers(run), _held_values(run), _clock_start(run),
-            None if "derived" in source else _strain(run), *_by_course(run),
-        )  # fmt: skip
-    for subject, text in filter(None, doubts):
-        yield Finding("warning", subject, run.name, text)
+        yield from _at_given_stress(run)
+    elif not run.flows:
+        text = f"The shear rate in {name} is zero throughout, so nothing flows. Leave the run "
+        yield warning("rate", name, f"{text}out, unless it follows a flow.")
+    elif not np.any(stress):
+        text = f"The stress in {name} is zero throughout. Check the column."
+        yield warning("stress", name, text)
+    elif len(run) > 2 and np.ptp(stress) <= _EQUAL * np.max(np.abs(stress)):
+        text = f"The stress in {name} is the same in every sample: a steady value or a command "
+        yield warning("stress", name, f"{text}rather than a record. Check the column.")
+    elif len(run) > 2:
+        yield from _of_samples(run)
+        if run.strain is not None and "derived" not in source:
+            yield from _of_strain(run, run.strain)
+        turns = int(np.sum(np.diff(np.sign(rate[rate != 0])) != 0))
+        varies = np.ptp(rate) > 1e-6 * np.max(np.abs(rate))
+        if varies and turns > 1:
+            yield from _of_cycles(run, turns)
+        if not varies and run.from_rest and np.any(rate):
+            yield from _of_rise(run)
 
 
-Doubt = tuple[str, str] | None
-"""Subject and text of a warning, if there is one."""
-
-
-def _unusable(run: Run) -> Doubt:
-    if not run.flows:
-        return "rate", (
-            f"The shear rate in {run.name} is zero throughout, so nothing flows. Leave the run "
-            "out, unless it follows a flow."
-        )
-    if not np.any(run.stress):
-        return "stress", f"The stress in {run.name} is zero throughout. Check the column."
-    if len(run) > 2 and np.ptp(run.stress) <= 1e-9 * np.max(np.abs(run.stress)):
-        return "stress", (
-            f"The stress in {run.name} is the same in every sample: a steady value or a command "
-            "rather than a record. Check the column."
-        )
-    return None
-
-
-def _at_given_stress(run: Run) -> Iterator[Doubt]:
+def _at_given_stress(run: Run) -> Iterator[Finding]:
     """Yield what is doubtful of the strain that a given stress was answered with."""
     strain = run.recorded
-    if np.ptp(strain) <= 1e-9 * np.max(np.abs(strain)):
-        text = (
-            f"The strain in {run.name} is the same in every sample, whatever the stress. Check "
-            "the column."
-        )
-        yield "strain", text
+    if np.ptp(strain) <= _EQUAL * np.max(np.abs(strain)):
+        text = f"The strain in {run.name} is the same in every sample, whatever the stress. Check "
+        yield warning("strain", run.name, f"{text}the column.")
     elif float(strain @ run.stress) < 0.0:
-        text = (
-            f"The strain in {run.name} goes against the stress that is imposed. Change the sign "
-            "of one of the two columns."
-        )
-        yield "strain", text
-
-
-def spikes(run: Run) -> Float[np.ndarray, " k"]:
-    """Return the times, in s, of single samples of stress that stand out of their neighbours.
-
-    A sample is compared with the straight line between its neighbours. A lone spike also bends
-    the lines at its neighbours the other way; a corner or a fast rise does not. Nor is a sample one
-    that is next to a step of the rate.
-    """
-    off = bends(run.time, run.stress)
-    if len(off) < 5:
-        return np.empty(0)
-    width = min(41, len(off))
-    first = np.clip(np.arange(len(off)) - width // 2, 0, len(off) - width)
-    windows = np.lib.stride_tricks.sliding_window_view(np.abs(off), width)
-    noise = 1.4826 * np.median(windows, axis=1)[first]
-    size = np.abs(off)
-    large = size > np.maximum(_SPIKE_SIGMAS * noise, _SPIKE_SHARE * np.max(np.abs(run.stress)))
-    alone = np.zeros(len(off), dtype=bool)
-    alone[1:-1] = (off[1:-1] * off[:-2] < 0) & (off[1:-1] * off[2:] < 0)
-    # the neighbours of a spike bend too, but less
-    alone[1:-1] &= (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])
-    return run.time[1:-1][large & alone & ~beside_a_step(run)[1:-1]]
+        text = f"The strain in {run.name} goes against the stress that is imposed. Change the sign "
+        yield warning("strain", run.name, f"{text}of one of the two columns.")
 
 
 def stress_noise(run: Run) -> float:
@@ -181,74 +142,74 @@ def local_noise(time: Float[np.ndarray, " n"], values: Float[np.ndarray, " n"]):
     return SPREAD_OF_BENDS * np.pad(around, (width // 2 + 1, width - width // 2), mode="edge")
 
 
-def _outliers(run: Run) -> Doubt:
-    found = spikes(run)
-    if not len(found):
-        return None
-    where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
-    count = "one sample" if len(found) == 1 else f"{len(found)} samples"
-    return "outliers", (
-        f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
-        "them; remove them if the instrument made them."
-    )
+def _of_samples(run: Run) -> Iterator[Finding]:
+    """Yield spikes, values that are read several times, and a clock that began before the flow."""
+    if found := without_spikes(run)[1]:
+        where = ", ".join(f"{t:.6g}" for t in found[:4]) + (" …" if len(found) > 4 else "")
+        count = "one sample" if len(found) == 1 else f"{len(found)} samples"
+        text = f"The stress in {run.name} jumps out of line in {count} (time {where} s). Look at "
+        yield warning("outliers", run.name, f"{text}them; remove them if the instrument made them.")
+    if (often := read_times(run.stress)) > 1:
+        text = (
+            f"Each value of the stress in {run.name} stands in {often} samples: the "
+            "transducer is read more often than it has values. Keep the first sample of each "
+            "value, or what is late in the others looks like a lag."
+        )
+        yield warning("stress", run.name, text)
+    if run.time[0] > 0.2 * run.time[-1]:
+        text = (
+            f"{run.name} starts at {run.time[0]:.4g} s of {run.time[-1]:.4g} s. Time counts from "
+            "the start of the flow, from rest; if the clock started earlier, subtract its reading "
+            "then."
+        )
+        yield warning("time", run.name, text)
 
 
-def _held_values(run: Run) -> Doubt:
-    """Return that each value is read several times, where all are read as often."""
-    often = read_times(run.stress)
-    return None if often <= 1 else ("stress", (
-        f"Each value of the stress in {run.name} stands in {often} samples: the "
-        "transducer is read more often than it has values. Keep the first sample of each "
-        "value, or what is late in the others looks like a lag."
-    ))  # fmt: skip
-
-
-def _clock_start(run: Run) -> Doubt:
-    return None if run.time[0] <= 0.2 * run.time[-1] else ("time", (
-        f"{run.name} starts at {run.time[0]:.4g} s of {run.time[-1]:.4g} s. Time counts from "
-        "the start of the flow, from rest; if the clock started earlier, subtract its reading "
-        "then."
-    ))  # fmt: skip
-
-
-def _strain(run: Run) -> Doubt:
-    if run.strain is None:
-        return None
+def _of_strain(run: Run, strain: Float[np.ndarray, " n"]) -> Iterator[Finding]:
+    """Hold a strain that was recorded against the sum of its rate."""
     steps = 0.5 * (run.rate[1:] + run.rate[:-1]) * np.diff(run.time)
-    expected = np.concatenate([[0.0], np.cumsum(steps)])
-    measured = run.strain - run.strain[0]
+    expected, measured = np.concatenate([[0.0], np.cumsum(steps)]), strain - strain[0]
     size = np.max(np.abs(expected))
     off = float(np.max(np.abs(measured - expected)) / size) if size > 0 else 0.0
     if off <= 0.1:
-        return None
+        return
     if np.max(np.abs(measured + expected)) < 0.1 * size:
-        return "strain", (
+        text = (
             f"The strain in {run.name} runs against its shear rate: one of the two has the wrong "
             "sign. If it is the rate, the stress has it too."
         )
-    return "strain", (
-        f"The strain in {run.name} differs from its shear rate summed over time by up to "
-        f"{100 * off:.0f} %. Check the units of both (per cent?), or whether the commanded "
-        "rate was reached."
-    )
+    else:
+        text = (
+            f"The strain in {run.name} differs from its shear rate summed over time by up to "
+            f"{100 * off:.0f} %. Check the units of both (per cent?), or whether the commanded "
+            "rate was reached."
+        )
+    yield warning("strain", run.name, text)
 
 
-def _by_course(run: Run) -> Iterator[Doubt]:
-    """Yield what is doubtful of a start-up, or of cycles."""
-    varies = np.ptp(run.rate) > 1e-6 * np.max(np.abs(run.rate))
-    turns = int(np.sum(np.diff(np.sign(run.rate[run.rate != 0])) != 0))
-    if varies and turns > 1:
-        yield _returned_work(run) if run.from_rest else None
-        per_cycle = 2.0 * len(run) / turns
-        if per_cycle < _FEWEST_PER_CYCLE:
-            text = (
-                f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign "
-                f"{turns} times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the "
-                "rate if the sign changes are noise."
-            )
-            yield "sampling", text
-    if varies or not run.from_rest or not np.any(run.rate):
-        return
+def _of_cycles(run: Run, turns: int) -> Iterator[Finding]:
+    """Hold cycles against the second law, and their samples against what harmonics need."""
+    power = run.rate * run.stress
+    work, size = np.trapezoid(power, run.time), np.trapezoid(np.abs(power), run.time)
+    # noise around zero sums to some 1/√n of its size
+    if run.from_rest and work < -max(_RETURNED_WORK, 3.0 / np.sqrt(len(run))) * size:
+        text = (
+            f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
+            "exchange, and a fluid at rest before has none to return: the stress or the rate has "
+            "the wrong sign, or one lags the other."
+        )
+        yield warning("stress", run.name, text)
+    if (per_cycle := 2.0 * len(run) / turns) < _FEWEST_PER_CYCLE:
+        text = (
+            f"{run.name} has {per_cycle:.0f} samples a cycle (the rate changes its sign "
+            f"{turns} times); harmonics need {_FEWEST_PER_CYCLE}. Sample faster, or smooth the "
+            "rate if the sign changes are noise."
+        )
+        yield warning("sampling", run.name, text)
+
+
+def _of_rise(run: Run) -> Iterator[Finding]:
+    """Yield that the rise of a start-up is hardly seen, or its stress lost in noise."""
     stress, noise = run.stress * np.sign(run.rate[0]), stress_noise(run)
     half = int(np.argmax(stress >= 0.5 * np.max(stress)))
     if half < _FEWEST_ON_THE_RISE:
@@ -257,7 +218,7 @@ def _by_course(run: Run) -> Iterator[Doubt]:
             f"the start-up is hardly seen. Sample faster at the start, evenly in log time (at "
             f"least {_FEWEST_ON_THE_RISE})."
         )
-        yield "sampling", text
+        yield warning("sampling", run.name, text)
     lost = (np.abs(stress) < 3.0 * noise) | (stress < 0)
     if np.mean(lost) > 0.2:
         text = (
@@ -266,21 +227,7 @@ def _by_course(run: Run) -> Iterator[Doubt]:
             f"{run.time[np.flatnonzero(lost)[-1]]:.4g} s: the transducer's floor. "
             "These samples teach nothing; a strain window ([loop] strain) leaves them out."
         )
-        yield "stress", text
-
-
-def _returned_work(run: Run) -> Doubt:
-    """Hold the work of an oscillation from rest against zero, below which no passive fluid goes."""
-    power = run.rate * run.stress
-    work, size = np.trapezoid(power, run.time), np.trapezoid(np.abs(power), run.time)
-    # noise around zero sums to some 1/√n of its size
-    if work >= -max(_RETURNED_WORK, 3.0 / np.sqrt(len(run))) * size:
-        return None
-    return "stress", (
-        f"{run.name} returns {-100 * work / size:.0f} % of the work that its stress and rate "
-        "exchange, and a fluid at rest before has none to return: the stress or the rate has "
-        "the wrong sign, or one lags the other."
-    )
+        yield warning("stress", run.name, text)
 
 
 def is_start_up(run: Run) -> bool:
@@ -323,14 +270,11 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
                     "its shear rate, compared with the other start-ups. Check the units of its "
                     "stress and time (kPa for Pa, ms for s)."
                 )
-                yield Finding("warning", "units", run.name, text)
+                yield warning("units", run.name, text)
 
 
 def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
-    """Yield that runs at several temperatures are taken for those of one fluid, if they are.
-
-    `runs`: those whose times nobody has shifted to one temperature.
-    """
+    """Doubts about runs at several temperatures whose times nobody shifted to one."""
     told = {run.name: run.metadata.get("temperature_C") for run in runs}
     known = {name: float(t) for name, t in told.items() if isinstance(t, int | float)}
     if not known or max(known.values()) - min(known.values()) <= _ONE_TEMPERATURE:
@@ -342,7 +286,7 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         "missing effect. Fit the runs of one temperature ([data] fit), or shift their times to one "
         "and name the column of the factors ([data] clock_factor)."
     )
-    yield Finding("warning", "temperature", "", text)
+    yield warning("temperature", "", text)
 
 
 def _largest(run: Run) -> float:

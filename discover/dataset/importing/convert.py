@@ -20,7 +20,12 @@ from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
 from discover.dataset.importing.names import name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
-from discover.dataset.importing.quantities import UnsaidUnits, guess_columns
+from discover.dataset.importing.quantities import (
+    UnsaidUnits,
+    guess_columns,
+    require_units,
+    units_taken_as_si,
+)
 from discover.dataset.importing.readings import INSTRUMENT, SAME, Readings
 from discover.dataset.importing.recognition import Recognised, recognise
 from discover.dataset.importing.records import Record, clock_before, joined, record
@@ -32,10 +37,7 @@ from discover.errors import InputError
 
 
 def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
-    """Return the tables of a file with their numbers, from 1; those that the user chose.
-
-    Raises InputError if it cannot be read, holds no table, or none of those chosen.
-    """
+    """Tables of a file that the user chose, numbered from 1; InputError where there is none."""
     layout = mapping.layout
     found = blocks_of_importer(path, layout.format)
     if found is None:
@@ -72,46 +74,42 @@ class ImportedFolder:
 
 
 @dataclass
-class _Import:
-    """What has been found so far, over all files."""
+class _Found:
+    """What has been found so far, in one file or over all."""
 
-    mapping: Mapping
-    found: list[NamedRecord] = field(default_factory=list)
+    records: list[NamedRecord] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
-    seen: dict[str, set[str]] = field(default_factory=dict)
-    named: set[str] = field(default_factory=set)
-    asked_for: set[str] = field(default_factory=set)
-    units: UnsaidUnits = field(default_factory=UnsaidUnits)
-    tests: dict[str, TestName] = field(default_factory=dict)
     unread: list[str] = field(default_factory=list)
-    columns: dict[str, list[str]] = field(default_factory=dict)
+    tests: dict[str, TestName] = field(default_factory=dict)
+    seen: dict[str, set[str]] = field(default_factory=dict)  # names of columns by quantity
+    named: set[str] = field(default_factory=set)  # quantities that some block names
+    asked_for: set[str] = field(default_factory=set)  # those that a test needs
+    units: UnsaidUnits = field(default_factory=dict)
+    columns: dict[str, list[str]] = field(default_factory=dict)  # files by columns not read
 
     def note(self, readings: Readings, made: Record) -> None:
         """Keep what a test that is imported says of names and units."""
         for quantity, at in readings.columns.items():
             if quantity in readings.used:
                 self.seen.setdefault(quantity, set()).add(readings.block.columns[at][0])
-        parts = ((key, one) for key, one in readings.unsaid.items() if _is_part(key, made))
-        self.units.add(readings.name, parts)
+        for key, unit in readings.unsaid.items():
+            if _is_part(key, made):
+                self.units.setdefault((key, unit.column), (readings.name, unit))
         self.asked_for |= readings.used.keys() | {SAME[k] for k in readings.used if k in SAME}
 
-    def add(self, other: "_Import") -> None:
+    def add(self, other: "_Found") -> None:
         """Add what another file holds."""
-        for name in ("found", "said", "unread"):
-            getattr(self, name).extend(getattr(other, name))
-        for name in ("tests", "named", "asked_for"):
-            getattr(self, name).update(getattr(other, name))
-        self.units.found = {**other.units.found, **self.units.found}
+        self.records += other.records
+        self.said += other.said
+        self.unread += other.unread
+        self.tests |= other.tests
+        self.named |= other.named
+        self.asked_for |= other.asked_for
+        self.units = {**other.units, **self.units}
         for key, names in other.seen.items():
             self.seen.setdefault(key, set()).update(names)
         for names, files in other.columns.items():
             self.columns.setdefault(names, []).extend(files)
-
-    def refuse(self, where: str, error: InputError, chosen: TestName | None) -> None:
-        """Keep why a block cannot be read; raise it if the user named the block."""
-        if chosen is not None or self.mapping.blocks is not None:
-            raise error
-        self.unread.append(f"{where}: {error}")
 
 
 def import_files(
@@ -129,134 +127,131 @@ def import_files(
     `sweep`: file of which the first frequency sweep becomes ``lve.csv``, if any. Raises InputError
     if no file can be understood; says which columns it has.
     """
-    state = _Import(mapping)
-    sources = []
+    all_, sources = _Found(), []
     for path in paths:
-        one = _Import(mapping)
         try:
-            _read(path, one)
+            one = _read(path, mapping)
             sources.append(_source(path, False))
         except InputError as error:
             if len(paths) == 1:
                 raise
             said = str(error)
-            state.unread.append(said if path.name in said else f"{path.name}: {said}")
+            all_.unread.append(said if path.name in said else f"{path.name}: {said}")
         else:
-            state.add(one)
-    if paths and state.unread and not state.found and sweep is None:
-        raise InputError(
-            f"None of the {len(paths)} files can be read. {' '.join(state.unread[:6])}"
-        )
+            all_.add(one)
     if sweep is not None:
-        _read_sweep(sweep, state)
+        _read_sweep(sweep, mapping, all_)
         sources.append(_source(sweep, True))
-    if not state.found:
+    elif paths and not all_.records:
+        raise InputError(f"None of the {len(paths)} files can be read. {' '.join(all_.unread[:6])}")
+    if not all_.records:
         raise InputError(
             "No test to import was given. Name one or more exports, or list them under [[source]] "
             "in the mapping file."
         )
     given = {str(key): name for key, name in mapping.columns.items()}
-    if unmatched := sorted(set(given) - set(state.seen)):
+    if unmatched := sorted(set(given) - set(all_.seen)):
         key = unmatched[0]
         raise InputError(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
     of_units = set(map(str, mapping.units))
-    if unused := sorted(of_units - state.named):
+    if unused := sorted(of_units - all_.named):
         raise InputError(
             f"--unit {unused[0]} changes nothing: no column or line of these files is known as "
-            f"{unused[0]}. Known are {', '.join(sorted(state.named))}; name another with "
+            f"{unused[0]}. Known are {', '.join(sorted(all_.named))}; name another with "
             f'--column {unused[0]}="its name", or leave the unit out.'
         )
-    state.units.require()
+    require_units(all_.units)
     idle = [
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
-        for key in sorted(of_units - state.asked_for - _WAVES)
+        for key in sorted(of_units - all_.asked_for - _WAVES)
     ]
-    files, notes = files_of(state.found)
+    files, notes = files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
-    same = {key: next(iter(names)) for key, names in state.seen.items() if len(names) == 1}
-    tests = {**state.tests, **mapping.tests}
+    same = {key: next(iter(names)) for key, names in all_.seen.items() if len(names) == 1}
+    tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
-    unread = unread_columns(state.columns)
-    said = [*state.units.warning(), *idle, *state.said, *unread, *notes]
-    return ImportedFolder(files, mapping.model_copy(update=used), said, state.unread)
+    unread = unread_columns(all_.columns)
+    said = [*units_taken_as_si(all_.units), *idle, *all_.said, *unread, *notes]
+    return ImportedFolder(files, mapping.model_copy(update=used), said, all_.unread)
 
 
-def _read(path: Path, state: _Import) -> None:
-    """Add the tests of a file."""
-    blocks = joined_intervals(blocks_of_file(path, state.mapping), state.mapping, path.name)
+def _read(path: Path, mapping: Mapping) -> _Found:
+    """Return the tests of a file; InputError if it holds none."""
+    found, file = _Found(), path.name
+    blocks = joined_intervals(blocks_of_file(path, mapping), mapping, file)
+    plain = re.sub(r"[^\w.-]+", "_", path.stem).strip("_.") or "run"
     before: Record | None = None
     clock = 0.0
-    used = len(state.found)
     reasons, columns = [], []
     read: set[str] = set()
     there: dict[str, None] = {}
     tables: list[tuple[int, Readings]] = []
     for number, block in blocks:
-        key = f"{key_of(path.name)}:{number}"
-        where = f"{path.name}, block {number} {block.name}".strip()
-        plain = re.sub(r"[^\w.-]+", "_", path.stem).strip("_.") or "run"
+        key = f"{key_of(file)}:{number}"
+        where = f"{file}, block {number} {block.name}".strip()
         name = plain + (f"-{number}" if len(blocks) > 1 else "")
-        readings = Readings.of(block, state.mapping.of_block(path.name, number), path.name)
-        state.named |= readings.named()
+        readings = Readings.of(block, mapping.of_block(file, number), file)
+        found.named |= readings.named()
         tables.append((number, readings))
         if block.apart:
             before, clock = None, 0.0
         readings.begins, clock = clock_before(readings, clock)
-        chosen = state.mapping.test_of(path.name, number)
-        state.tests[key] = chosen or "none"
-        follows = before is not None and chosen in (None, "creep")
-        recovered = joined(before, readings) if follows else None  # pyright: ignore[reportArgumentType]
-        if recovered is not None:
-            state.found[-1] = replace(state.found[-1], record=recovered)
-            state.tests[key] = "creep"
-            state.said.append(
-                f"{where}: the recovery after the creep before it, added to that run."
-            )
-            before = None
-            continue
+        chosen = mapping.test_of(file, number)
+        found.tests[key] = chosen or "none"
         previous, before = before, None
+        if previous is not None and chosen in (None, "creep"):
+            recovered = joined(previous, readings)
+            if recovered is not None:
+                found.records[-1] = replace(found.records[-1], record=recovered)
+                found.tests[key] = "creep"
+                found.said.append(
+                    f"{where}: the recovery after the creep before it, added to that run."
+                )
+                continue
         try:
             one = _taken(readings, chosen, key)
             made = None if one.kind == "none" else record(readings, one, previous)
         except InputError as error:
-            state.refuse(where, error, chosen)
+            if chosen is not None or mapping.blocks is not None:
+                raise
+            found.unread.append(f"{where}: {error}")
         else:
             why = one.why
             if made is not None and made.kind == "none":
                 why = made.notes[0]
             elif made is not None:
-                why = _not_at(made, readings, one, state.mapping) if chosen is None else ""
+                why = _not_at(made, readings, one, mapping) if chosen is None else ""
             if made is None or made.kind == "none" or why:
                 reasons += [f"block {number} is {why}"] if why else []
-                state.said.append(left_out(where, block, why))
+                found.said.append(left_out(where, block, why))
             else:
-                state.found.append(NamedRecord(name, made, path.name, block.name))
-                state.tests[key] = made.kind
-                state.note(readings, made)
+                found.records.append(NamedRecord(name, made, file, block.name))
+                found.tests[key] = made.kind
+                found.note(readings, made)
                 made.notes += readings.notes.values()
-                state.said.append(_summary(where, readings, one, made, columns))
+                found.said.append(_summary(where, readings, one, made, columns))
                 before = made
                 known = readings.used.keys() & readings.columns.keys()
                 read |= {block.columns[readings.columns[k]][0] for k in known}
                 read |= set(block.told_by)
                 there |= dict.fromkeys(readings.numbered())
         for wave in waves_of(readings) if chosen != "none" else ():
-            point = wave.name.rpartition(" ")[2]
             # in SI units already, whatever the user says of the file's
-            of_wave = Readings.of(wave, Mapping(), path.name)
+            of_wave = Readings.of(wave, Mapping(), file)
             one = recognise(of_wave)
             made = record(of_wave, one, None)
-            state.found.append(NamedRecord(f"{name}-point-{point}", made, path.name, wave.name))
-            state.said.append(_summary(f"{path.name}, {wave.name}", of_wave, one, made))
-    unread = [shown(name) for name in there if name not in read]
-    if unread:
-        state.columns.setdefault(", ".join(unread), []).append(path.name)
-    if len(state.found) == used:
-        raise InputError(" ".join(state.unread) or nothing(path, tables, reasons))
+            point = wave.name.rpartition(" ")[2]
+            found.records.append(NamedRecord(f"{name}-point-{point}", made, file, wave.name))
+            found.said.append(_summary(f"{file}, {wave.name}", of_wave, one, made))
+    if unread := [shown(name) for name in there if name not in read]:
+        found.columns[", ".join(unread)] = [file]
+    if not found.records:
+        raise InputError(" ".join(found.unread) or nothing(path, tables, reasons))
+    return found
 
 
 _CALIBRATION = re.compile(
@@ -304,18 +299,18 @@ def _taken(readings: Readings, chosen: TestName | None, key: str) -> Recognised:
     return found if chosen in (None, found.kind) else Recognised(chosen, every, "as asked")
 
 
-def _read_sweep(path: Path, state: _Import) -> None:
+def _read_sweep(path: Path, mapping: Mapping, found: _Found) -> None:
     """Add the first frequency sweep of a file as the linear sweep."""
-    for _, block in blocks_of_file(path, state.mapping.model_copy(update={"blocks": None})):
-        readings = Readings.of(block, state.mapping, path.name)
+    for _, block in blocks_of_file(path, mapping.model_copy(update={"blocks": None})):
+        readings = Readings.of(block, mapping, path.name)
         if not readings.has("omega", "Gp", "Gpp"):
             continue
         one = _taken(readings, "frequency_sweep", "")
         made = record(readings, one, None)
-        state.named |= readings.named()
-        state.note(readings, made)
-        state.found.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
-        state.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
+        found.named |= readings.named()
+        found.note(readings, made)
+        found.records.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
+        found.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
         return
     raise InputError(
         f"{path.name} holds no sweep: a block with angular frequency, storage and loss modulus is "

@@ -32,10 +32,7 @@ _GAP = 100  # empty rows, after which lines are no longer counted
 
 
 def read_spreadsheet(path: Path) -> list[Block]:
-    """Return the blocks of numbers in all sheets of a spreadsheet; a sheet names what has no name.
-
-    Raises InputError if it is none, is larger than a measurement, or holds no numbers under names.
-    """
+    """Blocks of numbers in all sheets of a workbook; InputError where none, or too large."""
     from openpyxl import load_workbook
 
     content = io.BytesIO(read_bytes(path, path.name, largest=LARGEST_EXPORT))
@@ -137,10 +134,7 @@ _TEMPERATURE = ("temperature", "°C")
 
 
 def read_reptate(path: Path) -> list[Block]:
-    """Return the one block of a file of RepTate.
-
-    Raises InputError if it has too few columns of numbers, or lacks a parameter that it needs.
-    """
+    """Return the block of a file of RepTate; InputError where it lacks columns or a parameter."""
     suffix = path.suffix.lower()
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
     lines = re.split(r"\r\n|\r|\n", content.decode("cp1252", "replace"))
@@ -236,11 +230,7 @@ def register_importer(
 
 
 def blocks_of_importer(path: Path, form: str | None) -> list[Block] | None:
-    """Return the blocks of a file that an importer reads; None if it is to be read as text.
-
-    `form`: its name; by the suffix of the file if None. Raises InputError if there is none such, or
-    it cannot read the file.
-    """
+    """Blocks that the importer of a name, or of the suffix, reads; None for a file of text."""
     if form == TEXT:
         return None
     if form is not None and form not in IMPORTERS:

@@ -192,10 +192,7 @@ def left_out(where: str, block: Block, reason: str) -> str:
 
 
 def nothing(path: Path, tables: Sequence[tuple[int, Readings]], reasons: Sequence[str]) -> str:
-    """Say which table, of these by number, is nearest to a test, what it lacks, and what to do.
-
-    `reasons`: why some of them were left out, in words.
-    """
+    """Which of numbered tables is nearest to a test, what it lacks, and the remedy, in words."""
     if reasons:
         more = f" and {len(reasons) - 6} more" if len(reasons) > 6 else ""
         return (

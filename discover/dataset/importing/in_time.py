@@ -214,10 +214,7 @@ class UpAndDown(NamedTuple):
 
 
 def up_and_down(rate: Values, stress: Values) -> UpAndDown | None:
-    """Return by how much stresses differ on the way up and down; None if rates go one way only.
-
-    `rate`, `stress` in 1/s and Pa, as they were measured. Rows of one sign are compared.
-    """
+    """Difference of stresses on the ways up and down; None if rates go one way only."""
     use = (rate * np.sign(np.median(rate)) > 0.0) & (stress * np.sign(np.median(stress)) > 0.0)
     if np.sum(use) < 2 * _FEWEST_OF_BRANCH or np.mean(use) < 0.7:
         return None
@@ -293,10 +290,7 @@ def every_row_differs(rate: Values) -> bool:
 
 
 def strain_of(time: Values, rate: Values) -> Values:
-    """Return the strain that a rate has made since t = 0, shape (n,).
-
-    `time`, `rate` in s, increasing, and 1/s; before the first sample the rate is taken as there.
-    """
+    """Strain that a rate in 1/s, shape (n,), has made since t = 0; constant before the first."""
     before = max(float(time[0]), 0.0) * float(rate[0])
     if len(time) < 2:
         return np.full(len(time), before)

@@ -159,10 +159,7 @@ def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
 
 
 def read_names(path: Path) -> dict[str, tuple[str, ...]]:
-    """Return a user's names by quantity, from a file of the form of ``names.toml``.
-
-    Raises InputError if it cannot be read, or holds something else than names of quantities.
-    """
+    """Return a user's names by quantity, from a file as ``names.toml``; InputError if wrong."""
     example = 'Write lines such as stress = ["Sigma corr."].'
     content, _ = read_toml(path, "file of names", example)
     parts = {k: [*v.values()] if isinstance(v, dict) else [v] for k, v in content.items()}
@@ -193,10 +190,7 @@ _CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250"
 
 
 def code_page_of(content: bytes) -> str:
-    """Return the encoding of a text that is no Unicode: the one in which most names are known.
-
-    Instruments on Windows write the code page of the country; UTF-8 may have a damaged byte.
-    """
+    """Code page, or damaged UTF-8, of a text: the encoding in which most names are known."""
     sample, table = content[:20_000], name_table()
 
     def known(encoding: str) -> int:

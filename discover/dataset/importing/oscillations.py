@@ -81,11 +81,7 @@ def purer(time: Values, stress: Values, strain: Values) -> bool:
 
 
 def goes_on(time: Values, imposed: Values, answer: Values) -> bool:
-    """Return whether a record begins as it goes on, in steady alternation, and not from rest.
-
-    Its first cycle repeats in the next, or its first sample is far from rest. `imposed` and
-    `answer` are strain and stress, or stress and strain.
-    """
+    """Whether strain and stress, in either role, begin in steady alternation, not from rest."""
     period = 2.0 * np.pi / frequency_of(time, imposed)
     size = float(np.max(np.abs(answer)))
     step = float(np.median(np.diff(time)))
@@ -154,10 +150,7 @@ def waves_of(readings: Readings) -> list[Block]:
 
 
 def without_names(rows: Sequence[Sequence[str]]) -> Block | None:
-    """Return a table without names as an oscillation: time, strain and stress in SI units.
-
-    Or with the rate before the stress, which has to be the derivative of the strain; else None.
-    """
+    """Time, strain, (rate,) and stress in SI units of a table without names; None if it is none."""
     filled = [[cell for cell in row if cell] for row in rows]
     numbers = [row for row in filled if row and all(map(is_number, row))]
     if len(numbers) < _FEWEST or len({len(row) for row in numbers}) != 1:

@@ -1,7 +1,7 @@
 """Which column is what, and how its unit becomes SI: said, told by the numbers, or asked for."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -116,10 +116,7 @@ def _is_unit_of(key: str, unit: str) -> bool:
 
 
 def fits(key: str, name: str, unit: str) -> bool:
-    """Return whether a short name, which may mean several things, has a unit of the quantity.
-
-    A longer name fits whatever its unit is, so that a wrong one is said.
-    """
+    """Whether a short name has a unit of the quantity; a longer one fits: a wrong unit is said."""
     if name.strip() == "T" and not unit:
         return key == "temperature"
     name = plain(name)
@@ -147,10 +144,7 @@ def to_celsius(value: float, unit: str) -> float | None:
 
 
 def factor_to_si(key: str, unit: str, column: str, name: str) -> float:
-    """Return the factor to SI from a column's unit as the export or the user writes it.
-
-    Raises InputError if the unit is unknown or one of something else.
-    """
+    """Factor to SI of a unit as it was written; InputError where it is no unit of the quantity."""
     quantity = QUANTITIES[key]
     if key == "angular_velocity" and tidy_unit(unit) in ("1/min", "min-1", "min^-1"):
         unit = "turn/min"
@@ -253,50 +247,44 @@ def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
     return next(((unit, why) for unit in near), None)
 
 
-class UnsaidUnits:
-    """Units of all files of an import that none of them gives."""
+UnsaidUnits = dict[tuple[str, str], tuple[str, UnsaidUnit]]
+"""Units that no file gives, with the first such file, by quantity and name of the column."""
 
-    def __init__(self):
-        self.found: dict[tuple[str, str], tuple[str, UnsaidUnit]] = {}
 
-    def add(self, file: str, units: Iterable[tuple[str, UnsaidUnit]]) -> None:
-        """Add the units of a test that is imported, by quantity."""
-        for key, unit in units:
-            self.found.setdefault((key, unit.column), (file, unit))
+def _unsaid(found: UnsaidUnits, how: str) -> tuple[list[tuple[str, UnsaidUnit]], str]:
+    """Return the quantities whose unit is told so, and the files, in words."""
+    said = [(key, file, one) for (key, _), (file, one) in found.items() if one.how == how]
+    files = list(dict.fromkeys(file for _, file, _ in said))
+    return [(key, one) for key, _, one in said], listed(files) if files else ""
 
-    def _of(self, how: str) -> tuple[list[tuple[str, UnsaidUnit]], str]:
-        """Return the quantities whose unit is told so, and the files, in words."""
-        said = [(key, file, one) for (key, _), (file, one) in self.found.items() if one.how == how]
-        files = list(dict.fromkeys(file for _, file, _ in said))
-        return [(key, one) for key, _, one in said], listed(files) if files else ""
 
-    def require(self) -> None:
-        """Raise InputError if there are units that only the user knows; asks for all of them."""
-        pairs, files = self._of("asked")
-        asked = dict(pairs)
-        if not asked:
-            return
-        options = "; ".join(
-            f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
-            for key, one in asked.items()
-        )
-        what = "a unit" if len(asked) == 1 else "the units"
-        names = listed([shown(one.column) for one in asked.values()])
-        raise InputError(
-            f"{files} does not give {what} of {names}, and the numbers do not tell. "
-            f"Say which: {options}."
-        )
+def require_units(found: UnsaidUnits) -> None:
+    """Raise InputError if there are units that only the user knows; asks for all of them."""
+    pairs, files = _unsaid(found, "asked")
+    if not (asked := dict(pairs)):
+        return
+    options = "; ".join(
+        f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
+        for key, one in asked.items()
+    )
+    what = "a unit" if len(asked) == 1 else "the units"
+    names = listed([shown(one.column) for one in asked.values()])
+    raise InputError(
+        f"{files} does not give {what} of {names}, and the numbers do not tell. "
+        f"Say which: {options}."
+    )
 
-    def warning(self) -> list[str]:
-        """Return the sentence on what is taken as SI, if anything is."""
-        pairs, files = self._of("assumed")
-        assumed = [(key, one) for key, one in pairs if QUANTITIES[key].unit]
-        if not assumed:
-            return []
-        read = listed([f"{shown(one.column)} in {one.unit}" for _, one in assumed])
-        key, one = assumed[-1]
-        other = {"s": "min", "1/s": "1/min", "rad/s": "Hz"}.get(one.unit, f"m{one.unit}")
-        return [
-            f"warning: {files} gives no units here, so SI is taken: {read}. If one "
-            f"is another, say so, as in --unit {key}={other}."
-        ]
+
+def units_taken_as_si(found: UnsaidUnits) -> list[str]:
+    """Return the sentence on what is taken as SI, if anything is."""
+    pairs, files = _unsaid(found, "assumed")
+    assumed = [(key, one) for key, one in pairs if QUANTITIES[key].unit]
+    if not assumed:
+        return []
+    read = listed([f"{shown(one.column)} in {one.unit}" for _, one in assumed])
+    key, one = assumed[-1]
+    other = {"s": "min", "1/s": "1/min", "rad/s": "Hz"}.get(one.unit, f"m{one.unit}")
+    return [
+        f"warning: {files} gives no units here, so SI is taken: {read}. If one "
+        f"is another, say so, as in --unit {key}={other}."
+    ]

@@ -53,10 +53,7 @@ class Readings:
 
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
-        """Return the readings of a block.
-
-        Raises InputError if a name that the user gave stands above two columns.
-        """
+        """Return readings of a block; InputError if a given name stands above two columns."""
         given = {str(key): column for key, column in mapping.columns.items()}
         columns = guess_columns(block, given, name_table(mapping.names))
         found = cls(block, columns, mapping, name, mapping.geometry)
@@ -68,10 +65,7 @@ class Readings:
         return len(self.block.cells)
 
     def get(self, key: str) -> Values | None:
-        """Return a quantity in SI units (temperature in °C), nan where the block has no number.
-
-        Raises InputError if a unit is missing, unknown or one of something else.
-        """
+        """Return a quantity in SI units (°C), nan where no number is; InputError on wrong units."""
         if key == "temperature":
             return self._temperature()
         if key in self.columns:

@@ -37,10 +37,7 @@ class Recognised(NamedTuple):
 
 
 def recognise(readings: Readings) -> Recognised:
-    """Return which test a block holds; the tests of one table are apart already.
-
-    Raises InputError if a unit is missing or wrong.
-    """
+    """Which test a block holds, the tests of one table being apart; InputError on wrong units."""
     said = said_of(readings.block, readings.name)
     _find_time(readings)
     _as_extension(readings, said)
@@ -174,10 +171,7 @@ def _find_time(readings: Readings) -> None:
 
 
 def _as_extension(readings: Readings, said: Said | None) -> None:
-    """Take stress, rate and strain for those of an extension, where words or other columns say so.
-
-    A column that is called one of shear stays it.
-    """
+    """Take stress, rate, strain for those of an extension, unless called those of shear."""
     tensile = set(_OF_TENSION.values()) & set(readings.columns)
     if not tensile and (said is None or said.test not in ("uniaxial", "planar", "biaxial")):
         return

@@ -62,10 +62,7 @@ class _Needed(NamedTuple):
 
 
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
-    """Return the test that some rows of a block hold, after the one before it.
-
-    Raises InputError if it lacks what such a test needs; names it.
-    """
+    """Return the test that rows hold, after the one before; InputError names what it lacks."""
     needed = _needed(readings, found.kind)
     made = _table(readings, found, needed)
     if "time" in made.table:

@@ -193,10 +193,7 @@ class _Piece:
     told_by: tuple[int, ...] = ()
 
     def by_value(self, values: np.ndarray, column: int) -> "list[_Piece]":
-        """Return the rows of each value, in the order of their first; all of them if one has few.
-
-        `values`: of a column in these rows, shape (m,).
-        """
+        """Rows of each value of a column, shape (m,), in order; all of them if one has few."""
         _, first, group = np.unique(values, return_index=True, return_inverse=True)
         if len(first) < 2 or np.min(np.bincount(group)) < _FEWEST:
             return [self]

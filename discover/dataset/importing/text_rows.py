@@ -280,10 +280,7 @@ _KELVIN_FROM = 200.0  # K; below it a melt or a solution is frozen
 
 
 def temperature_in(text: str) -> Constant | None:
-    """Return the temperature that a title or a file's name says; None if it says none, or several.
-
-    In kelvin only where a melt or solution can be, since 95K may be a molar mass.
-    """
+    """Temperature that a title or file name says, in K only near a melt's; None if several."""
     found = {}
     text = text.replace("_", " ")
     for match in _DEGREES.finditer(text):

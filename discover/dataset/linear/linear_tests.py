@@ -135,10 +135,7 @@ def over_time(kind: str, time: Values, values: Values) -> LinearTest:
 
 
 def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
-    """Yield kind, temperature in °C and file of each linear test that ``tests.csv`` lists.
-
-    Raises InputError if the list is missing or wrong.
-    """
+    """Kind, temperature in °C and file of each test in ``tests.csv``; InputError if wrong."""
     missing = "Tests at several temperatures are listed there; write one with the columns file, "
     table = read_table(root / TESTS_FILE, TESTS_FILE, missing + "test and temperature_C.")
     problems = Problems()
@@ -303,10 +300,7 @@ class Agreement:
 
 
 def linear_agreements(tests: Tests) -> list[Agreement]:
-    """Return how well each test, as measured or moved, predicts each other one at its temperature.
-
-    Times that both reach are compared: the modes of a test say nothing of others.
-    """
+    """How well the modes of each test predict each other test, over the times both reach."""
     spectra: dict[tuple[str, float], RelaxationSpectrum | None] = {}
     found = []
     slack = 1.0 + 1e-9  # of 1/ω

@@ -60,10 +60,7 @@ def relative_moduli(
     solvent: bool = False,
     elastic: bool = False,
 ) -> Float[np.ndarray, "rows c"]:
-    """Return G′ and G″ over those measured, a column for each mode, solvent and elastic constant.
-
-    Modes and elastic constant are of 1 Pa, the solvent is of 1 Pa s.
-    """
+    """G′ and G″ over those measured of modes (1 Pa), solvent (1 Pa s) and constant (1 Pa)."""
     x, zero = frequency[:, None] * times, np.zeros_like(frequency)
     storage, loss = measured
     columns = [
@@ -122,10 +119,7 @@ class ModeSearch:
         return self._fitted(fit, _CLOSELY) if len(fit.modulus) else fit
 
     def elastic_time(self, fit: ModeFit) -> float:
-        """Return the shortest time in s of a mode that the sweep cannot tell from the constant.
-
-        It raises the misfit by one standard deviation at most, the other amounts fitted jointly.
-        """
+        """Shortest time in s of a mode that raises the misfit by one standard deviation at most."""
         solvent, target = fit.kinds[0], self._target
         if not isinstance(self.elastic_modulus, str) and self.elastic_modulus is not None:
             column = self._design(np.zeros(0), False, True)[:, 0]

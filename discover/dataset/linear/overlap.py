@@ -119,10 +119,7 @@ def lay_over(
 
 
 def overlap_misfit(cold: LinearTest, warm: LinearTest) -> float | None:
-    """Return the root-mean-square relative misfit of two tests where they overlap.
-
-    Samples count as they do in the fit; None where too few overlap.
-    """
+    """Root-mean-square relative misfit of two tests, as the fit weighs; None if few overlap."""
     used = _overlapping([_Pair(cold, warm, "")], 0.0)
     if not used:
         return None

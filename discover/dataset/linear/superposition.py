@@ -51,10 +51,7 @@ class ShiftLaw:
 def fit_shift_laws(
     celsius: Float[np.ndarray, " n"], log_shift: Float[np.ndarray, " n"], at: int
 ) -> tuple[ShiftLaw, ...]:
-    """Return WLF and Arrhenius, fitted to log10 a_T; fewer where there are too few temperatures.
-
-    `at`: which of them is the reference.
-    """
+    """WLF and Arrhenius fitted to log10 a_T, `at` the reference; fewer if temperatures are few."""
     fitted = (_fit_law(name, celsius, log_shift, at) for name in _LAWS)
     return tuple(law for law in fitted if law is not None)
 
@@ -268,10 +265,7 @@ class MovedTests:
 def move_tests(
     tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
 ) -> MovedTests:
-    """Return tests moved to one temperature as in `superpose`, with what can be said of them.
-
-    `between`: only temperatures in °C from one to the other.
-    """
+    """Return tests between two temperatures in °C moved to one, and what can be said of them."""
     if between is not None:
         low, high = min(between), max(between)
         chosen = {k: {t: one for t, one in at.items() if low <= t <= high}

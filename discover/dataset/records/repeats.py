@@ -81,10 +81,7 @@ def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
 
 
 def count_flows(runs: Sequence[Run]) -> int:
-    """Return how many different flows were measured.
-
-    A test that was repeated, or is there with other quantities, is one, as is a state of a table.
-    """
+    """Return the number of different flows: a repeated test is one, as is a state of a table."""
     named = [*{run.name: run for run in runs}.values()]
     again = sum(len(group) - 1 for group in repeated_tests(named))
     states = sum(len(run) - 1 for run in named if run.protocol.control in STATES)

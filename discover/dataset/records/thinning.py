@@ -184,10 +184,7 @@ def beside_a_step(run: Run) -> Bool[np.ndarray, " n"]:
 
 
 def without_spikes(run: Run) -> tuple[Run, list[float]]:
-    """Return a run without the samples that stand alone in it, and their times in s.
-
-    By the record alone (`isolated`): no law is asked, so whatever is fitted then has no part in it.
-    """
+    """Return a run without samples that stand alone in the record, and their times in s."""
     off = isolated(run.recorded) & ~beside_a_step(run)
     if not np.any(off):
         return run, []

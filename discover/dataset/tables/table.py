@@ -21,6 +21,7 @@ from discover.inputs_kept import note_input
 from discover.words import did_you_mean, listed, nearest
 
 LARGEST_FILE = 300_000_000  # bytes; some five million samples, more than can be looked at
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0)
 LARGEST_TEXT = 1_000_000  # bytes of TOML; what is written by hand is a page of text
 _MOST_LINES = 6  # faulty lines of a file that a message names
 # no rheometer quantity in SI units is larger; squares of such numbers still compute
@@ -86,6 +87,20 @@ class Table:
         """Return which lines of the file have the fault of the first of some rows too."""
         return _like_it([self.lines[row] for row in rows])
 
+    def require_positive(self, *quantities: Quantity) -> None:
+        """Raise InputError, with all problems, if a column is anywhere zero or less."""
+        problems = Problems()
+        for quantity in quantities:
+            values, found = self.quantity(quantity), find_column(tuple(self.columns), quantity)
+            if values is None or found is None or not (rows := np.flatnonzero(values <= 0)).size:
+                continue
+            row = int(rows[0])
+            problems.add(
+                f"{found[0]} in {self.name} must be positive; line {self.lines[row]} holds "
+                f"{shown(self.columns[found[0]][row])}. Remove that line.{self.like_it(rows)}"
+            )
+        problems.require_none(self.name)
+
     def quantity(self, quantity: Quantity) -> Float[np.ndarray, " n"] | None:
         """Return a quantity in SI units, None without a column; InputError if it is wrong."""
         try:
@@ -140,7 +155,7 @@ def read_bytes(
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
-        with open(path, "rb", opener=_at_once) as file:
+        with open(path, "rb", opener=lambda p, flags: os.open(p, flags | _AT_ONCE)) as file:
             status = os.fstat(file.fileno())
             size = status.st_size
             if not stat.S_ISREG(status.st_mode):
@@ -194,10 +209,6 @@ def did_you_mean_file(path: Path) -> str:
     except (OSError, ValueError):  # the folder is not there either, or may not be read
         return did_you_mean_file(path.parent) if path.parent != path.parent.parent else ""
     return did_you_mean(path.name, (name for name in there if not name.startswith(".")))
-
-
-def _at_once(path: str, flags: int) -> int:
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
@@ -341,10 +352,7 @@ def shown(cell: str) -> str:
 
 
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
-    """Return a list, an array or a series of finite numbers as an array of shape (n,).
-
-    Raises InputError if they have a unit of their own, or are none.
-    """
+    """Finite plain numbers as an array of shape (n,); InputError where they are none."""
     if hasattr(values, "magnitude"):
         raise InputError(
             f"{label} carries a unit; got a {type(values).__name__}. Give plain "

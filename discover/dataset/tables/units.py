@@ -4,7 +4,7 @@ import math
 import re
 import unicodedata
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, reduce
 from typing import NamedTuple
 
 from discover.errors import InputError
@@ -56,20 +56,12 @@ class Unit(NamedTuple):
 
 
 def read_heading(suffix: str) -> Unit | None:
-    """Return the unit at the end of a column's name, such as ``dyn_cm2``, or None if it is none.
-
-    The first word stands above the fraction line, the others below it.
-    """
+    """Return the unit that ends a column's name, ``dyn_cm2`` being dyn/cm²; None if none."""
     first, *below = suffix.split("_")
     if len(suffix) > _LONGEST or (first == "1" and not below):
         return None
-    found = Unit() if first == "1" else _power(first)
-    for word in below:
-        unit = _power(word)
-        if found is None or unit is None:
-            return None
-        found = found.times(unit, -1)
-    return found
+    powers = [Unit() if first == "1" else _power(first), *map(_power, below)]
+    return None if None in powers else reduce(lambda a, b: a.times(b, -1), powers)  # pyright: ignore
 
 
 def read_unit(text: str) -> Unit | None:
@@ -106,10 +98,7 @@ _WORDS = re.compile(r"[^\W\d_]{3,}|[tωδγ]|[a-z ]{4,}")
 
 
 def name_and_unit(name: str, unit: str) -> tuple[str, str]:
-    """Return a name and its unit, which may stand in brackets or after "in", as in "t in s".
-
-    `unit`: as it stands beside or below the name, or empty.
-    """
+    """Return a name and its unit, which was given, stands in brackets, or after in: t in s."""
     name, unit = name.translate(_BRACKETS), unit.translate(_BRACKETS).strip()
     if unit and _OPENING.get(unit[-1]) == unit[0]:
         unit = unit[1:-1].strip()
@@ -243,10 +232,7 @@ def factor_to(unit: Unit, quantity: Quantity) -> float | None:
 
 
 def heading_factor(column: str, quantity: Quantity) -> float:
-    """Return the factor to SI of a column with a name of the user's; one where it ends in no unit.
-
-    The longest ending that is a unit counts. Raises InputError if that is one of something else.
-    """
+    """Factor to SI by the longest ending that is a unit, 1 without; InputError if another's."""
     words = column.split("_")
     endings = ["_".join(words[i:]) for i in range(1, len(words))]
     if quantity.column.removeprefix(f"{quantity.stem}_") in endings:
@@ -280,10 +266,7 @@ def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
 
 
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
-    """Return the column that holds a quantity and its factor to SI, or None if there is none.
-
-    Raises InputError if two columns hold it, or its unit is wrong.
-    """
+    """Column of a quantity and its factor to SI, or None; InputError on two, or a wrong unit."""
     found = []
     for name in names:
         if name == quantity.column:
