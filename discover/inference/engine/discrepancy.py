@@ -41,6 +41,9 @@ TERMS = (0.0, 0.001, 0.005, 0.025, 0.12)
 SCATTERS = (1.0, 6.0)
 """By which runs may differ, over the usual: with a discrepancy or without, it is summed over."""
 
+_SEEN = 1e-5
+"""Length of a direction of the unused terms, over the records, down to which it is seen."""
+
 _MODES = 20
 _AFTER_A_STEP = 10.0
 """Samples of a run over those that the logarithm leaves as they are."""
@@ -126,9 +129,8 @@ class Discrepancy:
 
     Attributes
     ----------
-    names, shares
-        Effects and terms that are not in the hypothesis, and the amplitude of each that changes
-        the records by a third.
+    names
+        Effects and terms that are not in the hypothesis.
     log_factor
         Log of how many times likelier the records are with a discrepancy than without.
     members
@@ -144,10 +146,13 @@ class Discrepancy:
         self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.usual_widths])
         self.offset = np.concatenate([fit.coordinates - fit.priors.centres, fit.linear])
         self.names, self._steps = self._others()
-        unused = self.signatures(fitter, fit.predicted)
-        size = np.sqrt(np.mean((unused / rows.size[:, None]) ** 2, axis=0))
-        self.shares = np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
-        self.columns = np.column_stack([fit.jacobian * self.widths, unused * self.shares])
+        unused = self.signatures(fitter, fit.predicted) / rows.size[:, None]
+        size = np.sqrt(np.mean(unused**2, axis=0))
+        unused *= np.where(size > 0, _THIRD / np.maximum(size, 1e-300), 0.0)
+        # many are alike: amplitudes that are as likely in all directions are so along these too
+        directions, lengths, _ = np.linalg.svd(unused, full_matrices=False)
+        unused = (directions * lengths)[:, TERMS[-1] * lengths > _SEEN] * rows.size[:, None]
+        self.columns = np.column_stack([fit.jacobian * self.widths, unused])
         self.left = rows.recorded - self.record + fit.jacobian @ self.offset
         self.growth = np.log(rows.fastest / np.max(rows.fastest))
         self._curves = _cosines(rows) * rows.size[:, None]  # of each row's own run
