@@ -25,7 +25,7 @@ _STEP = 1e-4
 _MOVED = 0.1
 """Standard deviations by which moduli are moved; records at a given rate are linear in them."""
 
-_TRIALS = ((0.1, 0.0), (0.1, 10.0), (3.0, 0.0), (100.0, 0.0))
+_TRIALS = ((0.1, 0.0), (0.1, 10.0))
 """What is tried side by side: multiples of the last damping, and the least size over the usual one
 by which runs may differ, for from where they do not, it takes a leap to where they do."""
 
@@ -340,7 +340,7 @@ class Fitter:
 
     # fits ---------------------------------------------------------------------------------------
 
-    def fit(self, starts: Sequence[Fit], rounds: int = 14, derivatives: bool = True) -> list[Fit]:
+    def fit(self, starts: Sequence[Fit], rounds: int = 20, derivatives: bool = True) -> list[Fit]:
         """Return hypotheses at their likeliest constants; all take their steps side by side."""
         fits = list(starts)
         with _running_away():
@@ -383,7 +383,8 @@ class Fitter:
             self._set_jacobian(fit)
         if k:
             usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
-            self._set(usable, np.array([fit.predicted for fit in usable]))
+            known = np.array([fit.predicted for fit in usable])
+            self._set(usable, known.reshape(-1, len(self.rows)))
 
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
@@ -439,7 +440,7 @@ class Fitter:
             gains = np.where(values > fit.log_posterior, values - fit.log_posterior, 0.0)
             best = int(np.argmax(gains))
             if not gains[best]:
-                fit.damping *= 1e3
+                fit.damping *= 30.0
                 if fit.damping < 1e4:
                     going_on.append(fit)
                 continue
