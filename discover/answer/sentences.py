@@ -72,6 +72,8 @@ def description(answer: Any) -> str:
     ends = f" (95 %: {low}–{high} %)" if low != high else ""
     # of fitted runs it is no error that a prediction could have
     of = "Model error on unseen runs" if found.unseen else "Residual of the fitted runs"
+    if answer.is_empirical:  # behind the best classical law
+        of = f"Empirical fit: {of[:1].lower()}{of[1:]}"
     subtracted = f", noise {noise} subtracted" if noise else ""
     return f"{of} {percent_of(found.size)}{ends}{subtracted}."
 

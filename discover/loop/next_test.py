@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from discover.answer.sentences import A_TRANSIENT
-from discover.loop.asked import several, untested_by
+from discover.loop.asked import several, suspected, untested_by
 from discover.loop.by_quantity import MUCH, differing, measured
 from discover.loop.parts import Stage
 from discover.words import (
@@ -64,13 +64,11 @@ def _worst(result: Any) -> str:
 
 def _of_the_instrument(result: Any) -> str:
     """Return how to check what is suspected of the instrument; empty where nothing is."""
-    suspects = [stage for stage in result.stages if stage.kind != "constitutive"]
-    if not suspects:
+    first = next(iter(suspected(result)), None)
+    if first is None:
         return ""
-    first = max(suspects, key=lambda stage: stage.evidence)
-    return (
-        f"To confirm {effect_title(first.effect)} in {_worst(result)}, {_as_clause(first.check)}."
-    )
+    place = f" (worst run: {_worst(result)})"
+    return f"To confirm {effect_title(first.effect)}{place}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:
@@ -93,9 +91,8 @@ _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
 
 def _by_geometry(result: Any) -> str:
     """Return which run to repeat where nothing says whether instrument or fluid is amiss."""
-    return (
-        f"Repeat {_worst(result)} with another gap or cone angle, to separate instrument and fluid."
-    )
+    run = _worst(result)
+    return f"Repeat {run} in a geometry with another gap, to separate instrument and fluid."
 
 
 def _telling_test(result: Any) -> str:
