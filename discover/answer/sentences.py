@@ -70,12 +70,14 @@ def description(answer: Any) -> str:
         return f"Residual of the fitted runs {residual}." if residual else ""
     low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
     ends = f" (95 %: {low}–{high} %)" if low != high else ""
+    size = f"{percent_of(found.size)}{ends}"
+    subtracted = f", noise {noise} subtracted" if noise else ""
+    if answer.is_empirical and answer.alternative:  # behind the best classical law
+        runs = "unseen" if found.unseen else "fitted"
+        return f"The fit: {size} on {runs} runs{subtracted}."
     # of fitted runs it is no error that a prediction could have
     of = "Model error on unseen runs" if found.unseen else "Residual of the fitted runs"
-    if answer.is_empirical:  # behind the best classical law
-        of = f"Empirical fit: {of[:1].lower()}{of[1:]}"
-    subtracted = f", noise {noise} subtracted" if noise else ""
-    return f"{of} {percent_of(found.size)}{ends}{subtracted}."
+    return f"{of} {size}{subtracted}."
 
 
 def flows(answer: Any) -> str:

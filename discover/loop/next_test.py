@@ -58,8 +58,8 @@ def _worst(result: Any) -> str:
     """Return the fitted run that is missed most, by its own size."""
     by_run = (result.discrepancy or {}).get("by_run", {})
     fitted = [record for record in result.records if not record.held_out]
-    worst = max(fitted, key=lambda r: by_run.get(r.name, float(r.errors[-1])))
-    return worst.name
+    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in fitted}
+    return max(errors, key=lambda name: errors[name], default="one run")
 
 
 def _of_the_instrument(result: Any) -> str:
