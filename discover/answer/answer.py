@@ -18,6 +18,9 @@ TOLERANCE = 0.05
 QUANTITIES = ("sigma12", "N1", "N2", "uniaxial")
 """Quantities of which an expected error is given, in the order of the table."""
 
+EMPIRICAL = "empirical fit: "
+"""Begin of the title of a sum of effects that the field has no name for."""
+
 Span = tuple[float, float]
 """Least and largest value."""
 
@@ -44,6 +47,21 @@ class Constant:
         return "sigma" in self.name or "gammadot" in self.name
 
     @property
+    def reciprocal(self) -> "Constant":
+        """Its reciprocal, where the letter is that of one over it: γ̇c rather than 1/γ̇c."""
+        ends = self.ci95 or (self.value, self.value)
+        if not self.letter.startswith("1/") or self.unit not in _RECIPROCAL or min(ends) <= 0.0:
+            return self
+        low, high = ends
+        return replace(
+            self,
+            value=1.0 / self.value,
+            ci95=None if self.ci95 is None else (1.0 / high, 1.0 / low),
+            unit=_RECIPROCAL[self.unit],
+            letter=self.letter.removeprefix("1/"),
+        )
+
+    @property
     def symbol(self) -> str:
         """Letter of the field, such as α."""
         if self.is_term:
@@ -51,7 +69,8 @@ class Constant:
         name = self.name.rpartition(".")[2]
         if name in _SYMBOLS:
             return _SYMBOLS[name][0]
-        return plain_signs(self.letter) if self.letter else readable(name.replace("_", " "))
+        letter = self.reciprocal.letter
+        return plain_signs(letter) if letter else readable(name.replace("_", " "))
 
     @property
     def said(self) -> str:
@@ -64,12 +83,16 @@ class Constant:
         """Value to as many digits as the interval leaves it, with its unit."""
         if not self.determined:
             return "not determined"
+        if (other := self.reciprocal) is not self:
+            return other.number
         unit = "" if self.unit in ("", "1") else f" {self.unit.replace('^2', '²')}"
         return f"{self._rounded(self.value) or estimate(self.value, self.ci95)}{unit}"
 
     @property
     def interval(self) -> str:
         """95 % interval, or a dash."""
+        if (other := self.reciprocal) is not self:
+            return other.interval
         low, high = self.ci95 or (math.nan, math.nan)
         first, last = self._rounded(low), self._rounded(high)
         if first and last:
@@ -101,11 +124,23 @@ class Constant:
         """Return symbol, value and interval, with what stands before the interval."""
         if not self.determined:
             return f"{self.symbol} not determined"
+        if self.at_end:
+            return f"{self.symbol} {self.at_end}"
         ends = f" ({level}{self.interval})" if self.has_interval else ""
         return f"{self.symbol} = {self.number}{ends}"
 
+    @property
+    def at_end(self) -> str:
+        """Bound that remains of a value at an end of its range; empty of one inside."""
+        if not self.has_interval or self.ci95[0] < self.value < self.ci95[1]:
+            return ""
+        low, high = self.ci95
+        bound = replace(self, value=low if self.value >= high else high).number
+        return f"{'≥' if self.value >= high else '≤'} {bound}, at the end of its range"
+
 
 _MINUS = "−"
+_RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
@@ -152,8 +187,25 @@ class Suspect:
             amplitude = replace(amplitude, value=value, ci95=ends, unit="%")
         if not amplitude.determined:
             return f"{title} not determined"
+        if not self.is_established:
+            return f"{title} {amplitude.number} (95 %: {amplitude.interval}), not established"
+        if amplitude.at_end:
+            return f"{title} {amplitude.at_end}"
         ends = f" (95 %: {amplitude.interval})" if amplitude.has_interval else ""
         return f"{title} {amplitude.number}{share}{ends}"
+
+    @property
+    def is_established(self) -> bool:
+        """Whether the interval of its amplitude excludes zero."""
+        if not self.constants:
+            return True
+        first = self.constants[0]
+        return first.determined and (first.ci95 is None or first.ci95[0] * first.ci95[1] > 0.0)
+
+    @property
+    def is_separate(self) -> bool:
+        """Whether the runs give it a size of its own."""
+        return self.is_established and not any(one.at_end for one in self.constants[:1])
 
 
 @dataclass(frozen=True)
@@ -188,9 +240,10 @@ class ExpectedError:
 
     inside: float | None = None
     beyond: float | None = None
-    missing: Literal["untested", "not determined"] = "untested"
+    missing: Literal["untested", "not determined", "not modelled"] = "untested"
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
+    is_residual: bool = False  # of fitted runs, which is no error to expect
 
     @property
     def is_known(self) -> bool:
@@ -200,9 +253,9 @@ class ExpectedError:
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """Size of what no law describes, over the root mean square of the records.
+    """Size of what no law describes, over the root mean square of the records, without noise.
 
-    `size`, `ci95`: of all fitted runs.
+    `size`, `ci95`: of all runs in the range.
     `grows_with_rate`: power of the shear rate with which it grows; None where the data do not tell.
     """
 
@@ -210,6 +263,7 @@ class Discrepancy:
     ci95: Span
     by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
     grows_with_rate: float | None = None
+    unseen: str = ""  # which runs the law had not seen, such as ``left out in turn``; empty: none
 
 
 @dataclass(frozen=True)
@@ -221,7 +275,7 @@ class Answer:
     `constants`: of the law, dimensionless or with units; moduli and times that were fitted among
         them.
     `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
-    `error`, `noise`: relative misfit of the fitted runs, and relative noise, mean over runs.
+    `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
     `discrepancy`: size of what it leaves beside noise; None where unknown.
     `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
     `equation`: law written out; None where it cannot be.
@@ -266,6 +320,11 @@ class Answer:
     alternative: str = ""
     instead: str = ""  # first line where there is no law to use, such as for pure noise
     tolerance: float = TOLERANCE  # relative discrepancy that is good enough
+
+    @property
+    def is_empirical(self) -> bool:
+        """Whether it is a sum of effects that the field has no name for."""
+        return self.title.startswith(EMPIRICAL)
 
     @property
     def size(self) -> float | None:

@@ -337,7 +337,7 @@ class Comparison(PageView, SummaryView):
                     if (band := self.bands.get(flow.key)) is not None
                 },
             },
-            "discrepancy": posterior.discrepancy,
+            "discrepancy": posterior.answer.discrepancy,
             "nearest_law": posterior.nearest_law,
             **posterior.answer.to_json(),
             "answer_law": None if law is None else equation_to_json(law),

@@ -18,7 +18,8 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS
 from discover.laws.multimode import Fluid
-from discover.loop.answering import measured, range_of
+from discover.loop.answering import range_of
+from discover.loop.by_quantity import beyond_noise, measured
 from discover.loop.run_record import RunRecord
 from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView
@@ -183,10 +184,12 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
         """The law with its constants, how well it describes the runs, and where."""
         equation = self.written and self.equation()
         law = LAWS[self.law]
-        size = self.misfit.misfit
-        by_run = {one.name: float(one.errors[0]) for one in self.records if not one.held_out}
+        noise = self.misfit.noise
+        size = beyond_noise(self.misfit.misfit, noise)
+        fitted = [one for one in self.records if not one.held_out]
+        by_run = {one.name: beyond_noise(float(one.errors[0]), noise) for one in fitted}
         exact = self.fits_to_the_noise or not np.isfinite(size)
-        expected = {name: measured(self.records, name) for name in QUANTITIES}
+        expected = {name: measured(self.records, name, noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
             law.title,
@@ -198,7 +201,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
             tuple(Mode(float(modulus), float(time)) for modulus, time in zip(*modes, strict=True)),
             float(self.fluid.solvent_viscosity),
             self.error,
-            self.misfit.noise,
+            noise,
             self.fits_to_the_noise,
             None if exact else Discrepancy(size, (size, size), by_run),
             range_of(self.records, equation),

@@ -17,35 +17,35 @@ from discover.answer import (
     Suspect,
     sentences,
 )
+from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
 from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
+from discover.equations.equation import flow_numbers
 from discover.equations.formats.rheotool import DENSITY
 from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
-from discover.loop.asked import EXPLAINED, untested_by
+from discover.loop.asked import EXPLAINED, suspected, untested_by
+from discover.loop.by_quantity import beyond_noise, errors_by_quantity, of_stress, with_unseen
 from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
 from discover.words import effect_title, effects_title, listed, percent_of, readable
 
-_APART = 0.2
-"""Relative difference between laws from which on a quantity is not determined."""
-
-_WORTH_SAYING = 0.05
-"""Relative difference between laws that is told of a quantity that nothing tested."""
-
-_MUCH = 2.0
-"""Relative difference from which on its size says nothing."""
-
-_FASTER = 1.01
-"""Rate over the fastest fitted one, from which on a run lies beyond the range."""
+_MOST_ADDED = 2
+"""Effects added to a law, up to which their sum is told as that law with these."""
 
 _SETTLED = 0.95
 """Probability from which on nothing is said of other laws."""
+
+_ABOVE = 1.1
+"""Residual over noise from which on it is told as larger than noise."""
+
+_TURNS = 0.5
+"""Share of the largest rate that a flow reaches in the other direction, if it oscillates."""
 
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
@@ -89,14 +89,13 @@ def loop_answer(result: Any) -> Answer:
         result.error_after.fit,
         result.noise_floor,
         result.verdict in EXPLAINED,
-        None if result.discrepancy is None else Discrepancy(**result.discrepancy),
+        with_unseen(result),
         range_of(result.records, equation),
-        _expected(result, title.partition(" with ")[0] if law else "this law"),
+        errors_by_quantity(result, title.partition(" with ")[0] if law else "this law"),
         following,
         tuple(
             Suspect(stage.effect, _constants(stage.parameters, stage.left_open, stage.effect))
-            for stage in result.stages
-            if stage.kind != "constitutive"
+            for stage in suspected(result)
         ),
         failed=_failed(result),
         alternative=_alternative(result),
@@ -152,20 +151,21 @@ def rest_of_h(equations: Sequence[str]) -> str:
 def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
-    inelastic = ExpectedError(missing="not determined", note="this law has no normal stress")
+    inelastic = ExpectedError(missing="not modelled")
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
-    size = result.error_after.fit
-    by_run = {r.name: float(r.errors[-1]) for r in result.records if not r.held_out}
+    size = beyond_noise(result.error_after.fit, result.noise_floor)
+    fitted = [record for record in result.records if not record.held_out]
+    by_run = {r.name: beyond_noise(float(r.errors[-1]), result.noise_floor) for r in fitted}
     answer = Answer(
         material.title,
         material.law,
         material.constants,
-        error=size,
+        error=result.error_after.fit,
         noise=result.noise_floor,
         fits_to_the_noise=to_noise,
         discrepancy=None if to_noise else Discrepancy(size, (size, size), by_run),
         range=found,
-        expected_error={"sigma12": _of_stress(result), "N1": inelastic, "N2": inelastic},
+        expected_error={"sigma12": of_stress(result), "N1": inelastic, "N2": inelastic},
         next_test=following,
         failed=_failed(result),
         tolerance=result.tolerance,
@@ -182,6 +182,8 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
+        if result.error_after.fit < _ABOVE * result.noise_floor:
+            return f"The residual is systematic (p {p})."
         return f"No law reaches the noise (p {p})."
     return ""
 
@@ -202,7 +204,7 @@ def _alternative(result: Any) -> str:
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *sentences.constants(constants)]
-    return f"Best classical law: {', '.join(said)}, to {percent_of(near.size)}."
+    return f"Best classical law: {', '.join(said)}, model error {percent_of(near.size)}."
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -229,7 +231,11 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _beside(base[1], found)
-        return None, f"{title} with {listed(added)}" if added else title, tuple(found)
+        if added:
+            title = f"{title} with {listed(added)}"
+        if len(added) > _MOST_ADDED or any(one.is_term for one in found):
+            title = EMPIRICAL + title
+        return None, title, tuple(found)
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
     return name, title, tuple(_beside(values, found))
@@ -305,102 +311,19 @@ def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> 
     rates = [
         float(rate)
         for r in fitted
-        for rate in ([_fastest(r)] if r.is_transient else np.abs(r.rate))
+        for rate in ([r.fastest] if r.is_transient else np.abs(r.rate))
         if rate > 0.0 and r.control != "oscillation"
     ]
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
+    # one that turns has a frequency besides its rate
+    turned = [r for r in fitted if r.is_transient and np.min(r.rate) < -_TURNS * r.fastest]
+    found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
     return Range(
         None if box is None else box.weissenberg,
         None if box is None else box.deborah,
         strain,
         (min(rates), max(rates)) if rates else None,
-        None,
+        (min(found), max(found)) if found else None,
         flows,
-        any(np.min(r.rate) < 0.0 < np.max(r.rate) for r in fitted),
+        bool(turned),
     )
-
-
-def _fastest(record: RunRecord) -> float:
-    return float(np.max(np.abs(record.rate)))
-
-
-def _expected(result: Any, name: str) -> dict[str, ExpectedError]:
-    """Return expected errors: of what was measured, else by how far equally good laws differ."""
-    found = {"sigma12": _of_stress(result)}
-    for kind in ("N1", "N2", "uniaxial"):
-        own = measured(result.records, kind)
-        if own is not None:
-            found[kind] = own
-            continue
-        spread = result.spread_of_laws.get(kind)
-        apart = None if spread is None else spread.inside
-        differ = "" if apart is None else f"laws differ by {_at_most(apart)}"
-        if kind == "N1" and apart is not None and apart < _APART and not _only(result, kind):
-            beyond = None if spread is None else spread.beyond
-            note = f"if {name}; not measured"
-            found[kind] = ExpectedError(apart, beyond, note=note, is_measured=False)
-        elif kind == "N1":
-            found[kind] = ExpectedError(missing="not determined", note=differ)
-        elif kind == "N2":
-            told = (
-                f"{differ} of N1"
-                if apart and apart > _WORTH_SAYING
-                else "shear stress does not fix it"
-            )
-            found[kind] = ExpectedError(missing="not determined", note=told)
-        else:
-            found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
-    return found
-
-
-def _at_most(apart: float) -> str:
-    """Return by how much laws differ; of laws that diverge only that it is much."""
-    return percent_of(apart) if apart <= _MUCH else f"more than {percent_of(_MUCH)}"
-
-
-def _only(result: Any, kind: str) -> bool:
-    """Return whether nothing but linear response was measured."""
-    return all(record.control == "oscillation" for record in result.records)
-
-
-def _of_stress(result: Any) -> ExpectedError:
-    fastest = max((_fastest(r) for r in result.records if not r.held_out), default=0.0)
-    held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    slow = [r for r in held if _fastest(r) <= _FASTER * fastest]
-    fast = [r for r in held if _fastest(r) > _FASTER * fastest]
-    inside, beyond = _mean(slow), _mean(fast)
-    spread = result.spread_of_laws.get("sigma12")
-    if beyond is None and spread is not None and spread.beyond is not None:
-        beyond = max(spread.beyond, inside or result.left_out_error or 0.0)
-    if result.folds and result.error_after.held_out is not None:
-        return ExpectedError(result.error_after.held_out, beyond, note="runs left out in turn")
-    if inside is None and result.material is not None:
-        return ExpectedError(result.error_after.fit, beyond, note="fitted runs, noise included")
-    if inside is None and result.left_out_error is not None:
-        return ExpectedError(result.left_out_error, beyond, note="runs left out, noise removed")
-    return ExpectedError(inside, beyond, note="unseen runs, noise included" if held else "")
-
-
-def measured(records: Sequence[RunRecord], kind: str) -> ExpectedError | None:
-    """Return the error of what was measured, of unseen runs if there are any; None without."""
-    own = [record for record in records if _is(record, kind)]
-    if not own:
-        return None
-    held = [record for record in own if record.held_out]
-    fastest = max((_fastest(r) for r in records if not r.held_out), default=0.0)
-    fast = [record for record in held if _fastest(record) > _FASTER * fastest]
-    slow = [record for record in (held or own) if _fastest(record) <= _FASTER * fastest]
-    return ExpectedError(_mean(slow), _mean(fast), note="unseen runs" if held else "fitted runs")
-
-
-def _is(record: RunRecord, kind: str) -> bool:
-    if kind == "uniaxial":
-        return record.flow == "uniaxial" and record.quantity == "tensile_stress"
-    if kind == "sigma12":
-        return record.flow == "shear" and record.quantity in ("sigma12", "strain")
-    return record.flow == "shear" and record.quantity == kind
-
-
-def _mean(records: Sequence[RunRecord]) -> float | None:
-    errors = [float(record.errors[-1]) for record in records]
-    return float(np.mean(errors)) if errors and np.all(np.isfinite(errors)) else None

@@ -23,6 +23,17 @@ def untested_by(result: Any) -> str:
     return str(result.remaining.get("untested") or "") if result.verdict in EXPLAINED else ""
 
 
+def suspected(result: Any) -> list[Any]:
+    """Return the effects that are no part of the fluid, those with a size and the surest first."""
+    own = [stage for stage in result.stages if stage.kind != "constitutive"]
+    return sorted(own, key=lambda stage: (_may_be_zero(stage), -stage.evidence))
+
+
+def _may_be_zero(stage: Any) -> bool:
+    ends = next((one.ci95 for one in stage.parameters.values()), None)
+    return ends is not None and ends[0] * ends[1] <= 0.0
+
+
 def doubted(result: Any) -> float | None:
     """Return the probability of what was added, where that is less than even; None otherwise.
 

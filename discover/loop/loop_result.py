@@ -399,7 +399,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
             "held_out_in_band": self.held_in_band,
             "laws": self.laws,
             "free_form": self.free_form,
-            "discrepancy": self.discrepancy,
+            "discrepancy": self.answer.discrepancy,
             "spread_of_laws": self.spread_of_laws,
             "nearest_law": self.nearest_law,
             **self.answer.to_json(),

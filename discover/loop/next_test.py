@@ -6,9 +6,16 @@ from typing import Any
 import numpy as np
 
 from discover.answer.sentences import A_TRANSIENT
-from discover.loop.asked import EXPLAINED, several, untested_by
+from discover.loop.asked import several, suspected, untested_by
+from discover.loop.by_quantity import MUCH, differing, measured
 from discover.loop.parts import Stage
-from discover.words import FIGURE_SYMBOLS, effect_title, effects_title, significant
+from discover.words import (
+    FIGURE_SYMBOLS,
+    effect_title,
+    effects_title,
+    percent_of,
+    significant,
+)
 
 
 def what_to_measure_next(result: Any) -> str:
@@ -25,23 +32,67 @@ def what_to_measure_next(result: Any) -> str:
     untested = untested_by(result)
     if untested == "states":
         return A_TRANSIENT
-    if result.verdict in EXPLAINED and (told := _telling_test(result)):
+    if told := _telling_test(result):
         return told
     if untested:
         return "Fit another run, or hold one out: at another rate, or of another test."
     if result.verdict == "unexplained":
-        return "Repeat one run with another geometry, to separate instrument and fluid."
+        return _of_the_instrument(result) or _of_another_stress(result) or _by_geometry(result)
     doubtful = _most_doubtful(result.stages)
     if doubtful is None:
         return f"Measure {faster}: it tests the model hardest."
-    check = doubtful.check.rstrip(". ")
-    if not check[1:2].isdigit():  # N2 keeps its capital
-        check = check[:1].lower() + check[1:]
-    title = effect_title(doubtful.effect)
+    check, title = _as_clause(doubtful.check), effect_title(doubtful.effect)
     if not doubtful.aliases:
         return f"To confirm {title}, {check}."
     others = several([*map(effect_title, doubtful.aliases)], "and")
     return f"To distinguish {title} from {others}, {check}."
+
+
+def _as_clause(check: str) -> str:
+    """Return the check of an effect as it goes on in a sentence; N2 keeps its capital."""
+    check = check.rstrip(". ")
+    return check if check[1:2].isdigit() else check[:1].lower() + check[1:]
+
+
+def _worst(result: Any) -> str:
+    """Return the fitted run that is missed most, by its own size."""
+    by_run = (result.discrepancy or {}).get("by_run", {})
+    fitted = [record for record in result.records if not record.held_out]
+    errors = {r.name: by_run.get(r.name, float(r.errors[-1])) for r in fitted}
+    return max(errors, key=lambda name: errors[name], default="one run")
+
+
+def _of_the_instrument(result: Any) -> str:
+    """Return how to check what is suspected of the instrument; empty where nothing is."""
+    first = next(iter(suspected(result)), None)
+    if first is None:
+        return ""
+    place = f" (worst run: {_worst(result)})"
+    return f"To confirm {effect_title(first.effect)}{place}, {_as_clause(first.check)}."
+
+
+def _of_another_stress(result: Any) -> str:
+    """Return the stress that laws differ in which fit as well; empty where none is open."""
+    shear = [r for r in result.records if r.flow == "shear" and not r.held_out]
+    for kind, title in _OTHERS.items():
+        apart = differing(result, kind)
+        if apart is None or not result.tolerance < apart <= MUCH or not shear:
+            continue
+        if measured(result.records, kind, None) is None:
+            fastest = significant(max(record.fastest for record in shear), 2)
+            says = f"laws that fit as well differ by {percent_of(apart)}"
+            return f"{title} at {fastest} 1/s: {says}."
+    return ""
+
+
+_OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
+"""Stresses that tell laws apart which agree in σ12, the easier measurement first."""
+
+
+def _by_geometry(result: Any) -> str:
+    """Return which run to repeat where nothing says whether instrument or fluid is amiss."""
+    run = _worst(result)
+    return f"Repeat {run} in a geometry with another gap, to separate instrument and fluid."
 
 
 def _telling_test(result: Any) -> str:

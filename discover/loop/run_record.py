@@ -73,6 +73,11 @@ class RunRecord:
         return {"run": self.name, "held_out": self.held_out, **errors}
 
     @property
+    def fastest(self) -> float:
+        """Largest rate, in 1/s."""
+        return float(np.max(np.abs(self.rate)))
+
+    @property
     def is_transient(self) -> bool:
         """Whether it goes on in time, and is no steady or periodic state."""
         return self.control not in STATES

@@ -19,6 +19,7 @@ from discover.answer import Answer
 from discover.answer.sentences import (
     SYMBOLS,
     description,
+    error_title,
     expected,
     further,
     law,
@@ -33,7 +34,7 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import estimate, interval, readable, significant
+from discover.words import estimate, interval, listed, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -164,12 +165,15 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
     if answer is None:
         return None
+    behind = answer.alternative if answer.is_empirical else ""
     found: dict[str, Any] = {
         "headline": _unbroken(law(answer)),
-        "quality": _unbroken(" ".join(filter(None, [description(answer), where(answer)]))),
+        "quality": _unbroken(" ".join(filter(None, [behind, description(answer), where(answer)]))),
+        "level": "95 % CI" if answer.adequate and answer.fits_to_the_noise else "95 %, statistical",
+        "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": "",
-        "copies": (),
+        "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
         "next_test": _unbroken(answer.next_test),
@@ -206,13 +210,24 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         ],
         "linear": _unbroken(linear_part(answer)),
         "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
-        "copies": _copies(answer),
+        "copies": (copies := _copies(answer)),
+        "missing": _not_there(copies),
     }
 
 
+def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
+    """Return why buttons are grey, in one sentence."""
+    grey = [one for one in copies if not one["text"]]
+    if not grey:
+        return ""
+    reason = grey[0]["reason"].partition(". ")[0].rstrip(".")
+    names = listed([one["name"] for one in grey])
+    return f"{names} not available: {reason[:1].lower()}{reason[1:]}."
+
+
 _TOGETHER = re.compile(
-    r" (?=[=≤] )|(?<=[=≤]) |(?<=\d) (?=(?:%|Pa|1/s|s|rad/s|modes?)\b|%)|(?<=Pa) (?=s)"
-    r"|(?<=[\d)]) (?=×)|(?<=×) "
+    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/)|(?<=Pa) (?=s)"
+    r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=%:) |(?<=\() "
 )
 
 

@@ -1,0 +1,185 @@
+"""Expected error of each quantity: of unseen runs without noise, else how far laws differ."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from discover.answer import Discrepancy, ExpectedError
+from discover.loop.run_record import RunRecord
+from discover.words import percent_of
+
+MUCH = 2.0
+"""Relative difference from which on its size says nothing."""
+
+_APART = 0.2
+"""Relative difference between laws from which on a quantity is not determined."""
+
+_WORTH_SAYING = 0.05
+"""Relative difference between laws that is told of a quantity that nothing tested."""
+
+_FASTER = 1.01
+"""Rate over the fastest fitted one, from which on a run lies beyond the range."""
+
+_UNSEEN, _FITTED = "unseen runs, noise subtracted", "fitted runs, residual"
+
+
+def beyond_noise(error: float, noise: float | None) -> float:
+    """Return what an error holds besides noise."""
+    return float(np.sqrt(max(error**2 - (noise or 0.0) ** 2, 0.0)))
+
+
+def with_unseen(result: Any) -> Discrepancy | None:
+    """Return the discrepancy of a closed loop, of all unseen runs in the range if there are any."""
+    if result.discrepancy is None:
+        return None
+    found = Discrepancy(**result.discrepancy)
+    errors = unseen_errors(result)
+    if not found.size or not errors:
+        return found
+    size, count = _rms(errors), len(errors)
+    # of few runs the size is uncertain, as that of normal misses is
+    ends = np.sqrt(count / chi2.ppf((0.975, 0.025), count)) if count > 1 else np.ones(2)
+    held = {r.name: _missed(r, result) for r in _held_inside(result)}
+    left = {fold.run: beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds}
+    return replace(
+        found,
+        size=size,
+        ci95=(float(ends[0]) * size, float(ends[1]) * size),
+        by_run={**found.by_run, **left, **held},
+        unseen=_UNSEEN,
+    )
+
+
+def unseen_errors(result: Any) -> list[float]:
+    """Return errors without noise of runs that were left out in turn, and of those held out.
+
+    Of runs left out in turn only the root mean square is known, which each has then.
+    """
+    if result.folds:
+        return [beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds]
+    fitted = sum(not record.held_out for record in result.records)
+    left = result.left_out_error
+    own = [] if left is None else [float(left)] * fitted
+    return own + [_missed(record, result) for record in _held_inside(result)]
+
+
+def _held_inside(result: Any) -> list[RunRecord]:
+    """Return runs held out of flows, quantities and rates that were fitted."""
+    fitted = [record for record in result.records if not record.held_out]
+    kinds = {(record.flow, record.quantity) for record in fitted}
+    fastest = max((record.fastest for record in fitted), default=0.0)
+    return [
+        record
+        for record in result.records
+        if record.held_out
+        and (record.flow, record.quantity) in kinds
+        and record.fastest <= _FASTER * fastest
+        and np.isfinite(record.errors[-1])
+    ]
+
+
+def _missed(record: RunRecord, result: Any) -> float:
+    return beyond_noise(float(record.errors[-1]), result.noise_floor)
+
+
+def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
+    """Return expected errors: of what was measured, else by how far equally good laws differ.
+
+    `name`: law on which they rest.
+    """
+    found = {"sigma12": of_stress(result)}
+    n1 = differing(result, "N1")
+    settled = n1 is not None and n1 < _APART and not _only_linear(result)
+    for kind in ("N1", "N2", "uniaxial"):
+        own = measured(result.records, kind, result.noise_floor)
+        if own is not None:
+            found[kind] = own
+            continue
+        apart = differing(result, kind)
+        differ = "" if apart is None else f"laws that fit as well differ by {_at_most(apart)}"
+        if kind == "N1" and settled:
+            beyond = result.spread_of_laws[kind].beyond
+            note = f"if {name}; not measured"
+            found[kind] = ExpectedError(apart, beyond, note=note, is_measured=False)
+        elif kind == "N1":
+            found[kind] = ExpectedError(missing="not determined", note=differ)
+        elif kind == "N2":
+            told = f"follows only if {name}; not measured" if settled else "not measured"
+            if apart and apart > _WORTH_SAYING:
+                told = f"{differ} of N1"
+            found[kind] = ExpectedError(missing="not determined", note=told)
+        elif apart is not None and apart >= _APART:
+            found[kind] = ExpectedError(missing="not determined", note=differ)
+        else:
+            found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
+    return found
+
+
+def differing(result: Any, kind: str) -> float | None:
+    """Return by how much laws that fit as well differ in a quantity in the range."""
+    spread = result.spread_of_laws.get(kind)
+    return None if spread is None else spread.inside
+
+
+def _at_most(apart: float) -> str:
+    """Return by how much laws differ; of laws that diverge only that it is much."""
+    return percent_of(apart) if apart <= MUCH else f"more than {percent_of(MUCH)}"
+
+
+def _only_linear(result: Any) -> bool:
+    """Return whether nothing but linear response was measured."""
+    return all(record.control == "oscillation" for record in result.records)
+
+
+def of_stress(result: Any) -> ExpectedError:
+    """Return the expected error of σ12: that of unseen runs, as the first line has it."""
+    fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
+    held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
+    fast = [_missed(r, result) for r in held if r.fastest > _FASTER * fastest]
+    errors = unseen_errors(result)
+    inside, beyond = _rms(errors), _rms(fast)
+    spread = result.spread_of_laws.get("sigma12")
+    if beyond is None and spread is not None and spread.beyond is not None:
+        beyond = max(spread.beyond, inside or 0.0)
+    if inside is None and result.material is not None:
+        inside = beyond_noise(result.error_after.fit, result.noise_floor)
+        return ExpectedError(inside, beyond, note=_FITTED, is_residual=True)
+    return ExpectedError(inside, beyond, note=_UNSEEN if errors or fast else "")
+
+
+def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
+    """Return the error of what was measured, of unseen runs if there are any; None without.
+
+    `noise`: relative, which is subtracted.
+    """
+    own = [record for record in records if _is(record, kind)]
+    if not own:
+        return None
+    held = [record for record in own if record.held_out]
+    fastest = max((r.fastest for r in records if not r.held_out), default=0.0)
+    inside, beyond = (
+        _rms([beyond_noise(float(r.errors[-1]), noise) for r in some])
+        for some in (
+            [r for r in (held or own) if r.fastest <= _FASTER * fastest],
+            [r for r in held if r.fastest > _FASTER * fastest],
+        )
+    )
+    return ExpectedError(inside, beyond, note=_UNSEEN if held else _FITTED, is_residual=not held)
+
+
+def _is(record: RunRecord, kind: str) -> bool:
+    if kind == "uniaxial":
+        return record.flow == "uniaxial" and record.quantity == "tensile_stress"
+    if kind == "sigma12":
+        return record.flow == "shear" and record.quantity in ("sigma12", "strain")
+    return record.flow == "shear" and record.quantity == kind
+
+
+def _rms(errors: Sequence[float]) -> float | None:
+    """Return a root mean square; None of nothing, or where a law diverges."""
+    if not errors or not np.all(np.isfinite(errors)):
+        return None
+    return float(np.sqrt(np.mean(np.square(errors))))

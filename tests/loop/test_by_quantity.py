@@ -1,0 +1,104 @@
+"""Expected errors and the next test of a closed loop, from results that are made up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from discover.loop.by_quantity import errors_by_quantity, with_unseen
+from discover.loop.expected_errors import Spread
+from discover.loop.next_test import what_to_measure_next
+from discover.loop.run_record import RunRecord
+
+NOISE = 0.03
+
+
+def record(name, rate, error, held_out=False, quantity="sigma12"):
+    time = np.linspace(0.0, 1.0, 5)
+    return RunRecord(
+        name, held_out, time, rate * time, time, np.full(5, rate), np.ones(5), np.ones((1, 5)),
+        np.array([error]), quantity=quantity,
+    )  # fmt: skip
+
+
+def result(records, left=0.06, **more):
+    by_run = {r.name: left for r in records if not r.held_out}
+    found = {
+        "records": records, "left_out_error": left, "noise_floor": NOISE, "folds": (),
+        "discrepancy": {"size": left, "ci95": (0.04, 0.1), "by_run": by_run,
+                        "grows_with_rate": None},
+        "spread_of_laws": {"N1": Spread(0.6, 0.8), "uniaxial": Spread(1.2, 1.3)},
+        "verdict": "unexplained", "material": None, "stages": (), "tolerance": 0.05,
+        "next_tests": SimpleNamespace(best=None), "error_after": SimpleNamespace(fit=0.05),
+        "remaining": {},
+    }  # fmt: skip
+    return SimpleNamespace(**(found | more))
+
+
+FITTED = [record("slow", 0.1, 0.02), record("middle", 0.3, 0.03), record("fast", 1.0, 0.05)]
+
+
+def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
+    held = record("seen not", 0.5, float(np.hypot(0.12, NOISE)), held_out=True)
+    found = result([*FITTED, held])
+    size = np.sqrt((3 * 0.06**2 + 0.12**2) / 4)
+    told = with_unseen(found)
+    assert told.size == pytest.approx(size)
+    assert errors_by_quantity(found, "Giesekus")["sigma12"].inside == pytest.approx(size)
+    # deviation of four normal draws
+    assert told.ci95 == pytest.approx(size * np.sqrt(4 / chi2.ppf((0.975, 0.025), 4)))
+    assert told.by_run["seen not"] == pytest.approx(0.12)
+    assert told.unseen
+
+
+def test_a_run_beyond_the_rates_does_not_count_inside():
+    held = record("faster", 3.0, 0.5, held_out=True)
+    found = result([*FITTED, held])
+    errors = errors_by_quantity(found, "Giesekus")["sigma12"]
+    assert errors.inside == pytest.approx(0.06)
+    assert errors.beyond == pytest.approx(np.sqrt(0.5**2 - NOISE**2))
+
+
+def test_fitted_runs_alone_are_a_residual():
+    found = result([FITTED[0]], left=None)
+    found.discrepancy = {"size": 0.02, "ci95": (0.01, 0.03), "by_run": {}, "grows_with_rate": None}
+    assert not with_unseen(found).unseen
+    assert errors_by_quantity(found, "Giesekus")["sigma12"].inside is None
+    normal = record("slow", 0.1, 0.05, quantity="N1")
+    told = errors_by_quantity(result([*FITTED, normal]), "Giesekus")["N1"]
+    assert told.is_residual
+    assert told.inside == pytest.approx(0.04)  # 0.05² = 0.04² + 0.03²
+
+
+def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
+    close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001)}
+    told = errors_by_quantity(result(FITTED, spread_of_laws=close), "Giesekus")
+    assert "if Giesekus" in told["N1"].note
+    assert "if Giesekus" in told["N2"].note
+    assert not told["N2"].is_known
+    apart = errors_by_quantity(result(FITTED), "Giesekus")
+    assert apart["N1"].note == "laws that fit as well differ by 60 %"
+    assert {apart[kind].missing for kind in ("N1", "uniaxial")} == {"not determined"}
+
+
+def stage(effect, ends, evidence, check):
+    return SimpleNamespace(
+        effect=effect, kind="signal", evidence=evidence, check=check, aliases=(),
+        parameters={"amplitude": SimpleNamespace(ci95=ends)},
+    )  # fmt: skip
+
+
+def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
+    edge = stage("edge_fracture", (0.01, 0.03), 5.0, "Watch the edge; repeat with another cone.")
+    slip = stage("wall_slip", (0.0, 0.03), 9.0, "Repeat with another gap.")
+    told = what_to_measure_next(result(FITTED, stages=(slip, edge)))
+    assert told.startswith("To confirm edge fracture (worst run: ")
+    assert told.endswith("watch the edge; repeat with another cone.")
+    told = what_to_measure_next(result(FITTED))
+    assert told == "Measure N1 at 1 1/s: laws that fit as well differ by 60 %."
+    normal = record("slow", 0.1, 0.05, quantity="N1")
+    assert "uniaxial extension" in what_to_measure_next(result([*FITTED, normal]))
+    same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
+    again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
+    assert again.startswith("Repeat fast in a geometry with another gap")
