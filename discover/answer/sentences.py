@@ -199,7 +199,7 @@ def suspects(answer: Any) -> str:
     apart = len(several) == 1 or all(one.is_separate for one in answer.suspects)
     if apart:
         return f"Suspect {listed(several)}."
-    names = [effect_title(one.effect) for one in answer.suspects[: len(several)]]
+    names = [effect_title(one.effect) for one in answer.suspects[:_MOST_CONSTANTS]]
     return f"Suspects, not separable: {listed(names + several[_MOST_CONSTANTS:])}."
 
 
