@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from discover.words import counted, listed, percent_of, significant
+from discover.words import counted, effect_title, listed, percent_of, significant
 
 _MOST_CONSTANTS = 3
 """Constants that a first line names; the table has all."""
@@ -199,7 +199,8 @@ def suspects(answer: Any) -> str:
     apart = len(several) == 1 or all(one.is_separate for one in answer.suspects)
     if apart:
         return f"Suspect {listed(several)}."
-    return f"Suspects, not separable: {'; '.join(several)}."
+    names = [effect_title(one.effect) for one in answer.suspects[:_MOST_CONSTANTS]]
+    return f"Suspects, not separable: {listed(names + several[_MOST_CONSTANTS:])}."
 
 
 def further(answer: Any) -> list[str]:

@@ -37,9 +37,9 @@ def with_unseen(result: Any) -> Discrepancy | None:
         return None
     found = Discrepancy(**result.discrepancy)
     errors = unseen_errors(result)
-    if not found.size or not errors:
-        return found
     size, count = _rms(errors), len(errors)
+    if not found.size or size is None:
+        return found
     # of few runs the size is uncertain, as that of normal misses is
     ends = np.sqrt(count / chi2.ppf((0.975, 0.025), count)) if count > 1 else np.ones(2)
     held = {r.name: _missed(r, result) for r in _held_inside(result)}

@@ -44,6 +44,7 @@ def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     found = result([*FITTED, held])
     size = np.sqrt((3 * 0.06**2 + 0.12**2) / 4)
     told = with_unseen(found)
+    assert told is not None
     assert told.size == pytest.approx(size)
     assert errors_by_quantity(found, "Giesekus")["sigma12"].inside == pytest.approx(size)
     # deviation of four normal draws
