@@ -124,15 +124,9 @@ def _shown(result: Any) -> tuple[Equation | None, list[str]]:
     if isinstance(law, AugmentedLaw):
         law, others = law.of_terms()
     try:
-        named, terms = law_parts(law)
+        equation = Equation.of_fluid(fluid, law_parts(law), states=tuple(result.states))
     except InputError:
         return result.declared_law, added
-    modulus, time = (tuple(map(float, one)) for one in (fluid.modulus, fluid.relaxation_time))
-    solvent = float(fluid.solvent_viscosity)
-    relaxes = fluid.law.linear_relaxation
-    equation = Equation(
-        terms, modulus, time, relaxes, solvent, named=named, states=tuple(result.states)
-    )
     return equation, [one.equation for one in others]
 
 
