@@ -27,9 +27,8 @@ from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
-from discover.loop.asked import EXPLAINED, untested_by
-from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
+from discover.loop.sentences import EXPLAINED, untested_by, what_to_measure_next
 from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _APART = 0.2
