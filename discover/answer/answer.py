@@ -354,3 +354,22 @@ class Answer:
     def lines(self) -> list[str]:
         """Answer in a few lines of text, for a terminal and for headers of exported files."""
         return sentences.lines(self)
+
+
+class HasAnswer:
+    """A result with an `answer`, and what follows from it."""
+
+    @property
+    def answer(self) -> Answer:
+        """The law that one can use."""
+        raise NotImplementedError
+
+    @property
+    def use(self) -> dict[str, Any] | None:
+        """What a simulation needs: law, constants, modes, range, expected error."""
+        return self.answer.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
+        return self.answer.adequate

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from discover.answer import TOLERANCE, Answer
+from discover.answer import TOLERANCE, Answer, HasAnswer
 from discover.answer.simple_material import SimpleMaterial
 from discover.equations import (
     AugmentedLaw,
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LoopResult(PageView, HasEquation, SummaryView):
+class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     """The outcome of a closed loop.
 
     Attributes
@@ -175,16 +175,6 @@ class LoopResult(PageView, HasEquation, SummaryView):
     def answer(self) -> Answer:
         """The law that one can use, how good it is, where, and what to measure next."""
         return loop_answer(self)
-
-    @property
-    def use(self) -> dict[str, Any] | None:
-        """What a simulation needs: law, constants, modes, range, expected error."""
-        return self.answer.use
-
-    @property
-    def adequate(self) -> bool | None:
-        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
-        return self.answer.adequate
 
     def equation(self) -> Equation:
         """Return the augmented fluid as an equation, with its error and range in the notes.

@@ -230,14 +230,12 @@ def is_sound(problem: Problem) -> bool:
     return bool(np.all(np.isfinite(predicted)))
 
 
-def with_law(
-    declared: DeclaredModel, name: str, values: Mapping[str, float] | None = None
-) -> DeclaredModel:
+def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
     """Return the declared model with another law, all of whose constants are fitted."""
     factors = {MODULUS: declared.fit_modulus, RELAXATION_TIME: declared.fit_relaxation_time}
     return DeclaredModel.named(
         name,
-        starting_values(name) if values is None else values,
+        starting_values(name),
         declared.modulus,
         declared.relaxation_time,
         free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
