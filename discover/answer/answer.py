@@ -132,7 +132,7 @@ class Constant:
     @property
     def at_end(self) -> str:
         """Bound that remains of a value at an end of its range; empty of one inside."""
-        if not self.has_interval or self.ci95[0] < self.value < self.ci95[1]:
+        if self.ci95 is None or not self.has_interval or self.ci95[0] < self.value < self.ci95[1]:
             return ""
         low, high = self.ci95
         bound = replace(self, value=low if self.value >= high else high).number
@@ -413,3 +413,22 @@ class Answer:
     def lines(self) -> list[str]:
         """Answer in a few lines of text, for a terminal and for headers of exported files."""
         return sentences.lines(self)
+
+
+class HasAnswer:
+    """A result with an `answer`, and what follows from it."""
+
+    @property
+    def answer(self) -> Answer:
+        """The law that one can use."""
+        raise NotImplementedError
+
+    @property
+    def use(self) -> dict[str, Any] | None:
+        """What a simulation needs: law, constants, modes, range, expected error."""
+        return self.answer.use
+
+    @property
+    def adequate(self) -> bool | None:
+        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
+        return self.answer.adequate

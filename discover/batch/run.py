@@ -158,7 +158,7 @@ def run_close_loop(
         return there
     part = FollowedBy(progress, _DRAWING)
     from discover.dataset.run_table import material_and_temperature
-    from discover.loop.each_run import run_loop_on
+    from discover.loop.loop import run_loop_on
     from discover.report.loop.report import write_loop
     from discover.report.overlay import loop_overlays, read_overlays
     from discover.study.data import load_study_data

@@ -15,7 +15,8 @@ from discover.inference.engine.problem import Problem
 from discover.laws import LAWS
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.loop.answering import LAW_OF_EFFECT
-from discover.loop.loop import Found, with_law
+from discover.loop.loop import Found
+from discover.loop.task import with_law
 
 _AS_EFFECTS = {"ucm": (), **{law: (effect,) for effect, law in LAW_OF_EFFECT.items()}}
 """Effects that make each law of upper convected Maxwell."""

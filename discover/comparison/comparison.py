@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from discover.answer import Answer
+from discover.answer import Answer, HasAnswer
 from discover.comparison.bands import Band
 from discover.comparison.classical import ClassicalFit
 from discover.comparison.flows import Flow, Stresses, of_recorded, relative_errors
@@ -53,7 +53,7 @@ class SweepPoint:
 
 
 @dataclass(frozen=True)
-class Comparison(PageView, SummaryView):
+class Comparison(PageView, HasAnswer, SummaryView):
     """Both learners and the posterior of the same runs, in the same flows.
 
     Attributes
@@ -153,16 +153,6 @@ class Comparison(PageView, SummaryView):
     def answer(self) -> Answer:
         """The law that one can use, with the errors to be expected of it."""
         return self.posterior.answer
-
-    @property
-    def use(self) -> dict[str, Any] | None:
-        """What a simulation needs of that law."""
-        return self.posterior.use
-
-    @property
-    def adequate(self) -> bool | None:
-        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
-        return self.posterior.adequate
 
     @property
     def determined_terms(self) -> bool:

@@ -14,7 +14,8 @@ from discover.effects.library_term import library_term
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.learners.results import RecoveredTerm
-from discover.loop.loop import Found, Say, search_runs
+from discover.loop.loop import Found, search
+from discover.loop.task import Say, Task
 from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model
@@ -63,7 +64,7 @@ def search_hypotheses(
         for term in library.terms
         if term.closed_form is None and term.name not in _EFFECTS
     ]
-    return search_runs(
+    task = Task.of_runs(
         dataset,
         forward_model(declared),
         fit,
@@ -76,6 +77,7 @@ def search_hypotheses(
         loading=study.compare.loading,
         computed=study.data.synthetic is not None,
     )
+    return search(task)
 
 
 @dataclass(frozen=True)

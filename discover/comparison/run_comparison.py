@@ -38,6 +38,7 @@ from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found
 from discover.loop.loop_result import LoopResult
 from discover.loop.simple import simple_result
+from discover.loop.task import Task
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
@@ -196,7 +197,7 @@ def compare(
 
     if made is None:
         model = forward_model(declared)
-        simple = simple_result(model, data.fit.runs, data.held_out.runs, {}, 0.0)
+        simple = simple_result(Task(model, (), data.fit.runs, data.held_out.runs))
         if simple is not None:
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)

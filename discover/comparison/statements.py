@@ -14,7 +14,7 @@ from discover.comparison.bands import Band
 from discover.comparison.flows import MEASURED, QUANTITIES, Flow, relative_errors
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import law_structure
-from discover.equations import Equation, Tested, combined, law_parts
+from discover.equations import Equation, Tested, combined
 from discover.equations.equation import box_of, flow_numbers
 from discover.errors import InputError
 from discover.identify import Structure
@@ -190,17 +190,9 @@ _PROJECTION = (
 def known_equation(model: DeclaredModel) -> Equation | None:
     """Return the known part of a study as an equation; None where it cannot be written out."""
     try:
-        named, terms = law_parts(model.law)
+        return Equation.of_fluid(model.fluid)
     except InputError:
         return None
-    return Equation(
-        terms,
-        tuple(float(g) for g in model.modulus),
-        tuple(float(time) for time in model.relaxation_time),
-        model.law.linear_relaxation,
-        float(model.solvent_viscosity),
-        named=named,
-    )
 
 
 def outcome_equation(

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from jaxtyping import Real
+from numpy.typing import ArrayLike
 
-from discover.equations.parts import NamedPart, StatePart
+from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.equations.spelling.markup import SEPARATOR, law_element, law_latex
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw
@@ -130,6 +131,24 @@ class Equation(NotebookView):
         if self.named and len(self.named.constants) not in (1, len(self.modulus)):
             raise ValueError("An equation needs constants once for all modes, or once for each.")
 
+    @classmethod
+    def of_fluid(cls, fluid: Fluid, parts: LawParts | None = None, **stated: Any) -> "Equation":
+        """Return the equation of a fluid.
+
+        `parts`: those of its law, where they are known. `stated`: what else an equation states.
+        Raises InputError if the law has no name and is no sum of terms.
+        """
+        named, terms = parts or law_parts(fluid.law)
+        return cls(
+            terms,
+            tuple(map(float, fluid.modulus)),
+            tuple(map(float, fluid.relaxation_time)),
+            fluid.law.linear_relaxation,
+            float(fluid.solvent_viscosity),
+            named=named,
+            **stated,
+        )
+
     @property
     def mean_relaxation_time(self) -> float:
         """λ̄ = Σ G λ² / Σ G λ in s, the time in Wi and De."""
@@ -224,7 +243,7 @@ class Equation(NotebookView):
 
 
 def mean_relaxation_time(
-    modulus: Sequence[float] | np.ndarray, relaxation_time: Sequence[float] | np.ndarray
+    modulus: Sequence[float] | ArrayLike, relaxation_time: Sequence[float] | ArrayLike
 ) -> float:
     """Return λ̄ = Σ G λ² / Σ G λ in s: each mode weighs as its share of the viscosity."""
     g, time = np.asarray(modulus), np.asarray(relaxation_time)

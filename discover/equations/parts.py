@@ -289,10 +289,11 @@ class AugmentedLaw(AbstractExtendedLaw):
         )
 
 
-_Named = tuple[str, dict[str, float]]
+LawParts = tuple[NamedPart | None, tuple[LawTerm, ...]]
+"""A law with a name, where one is needed, and a sum of terms."""
 
 
-def law_parts(law: AbstractConstitutiveLaw) -> tuple[NamedPart | None, tuple[LawTerm, ...]]:
+def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
     """Return h of a law as a law with a name, where it is no sum of terms, and a sum of terms.
 
     A law with constants of its own in each mode needs a name.

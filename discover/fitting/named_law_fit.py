@@ -10,7 +10,7 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.answer import QUANTITIES, TOLERANCE, Answer, Discrepancy, Mode
+from discover.answer import QUANTITIES, TOLERANCE, Answer, Discrepancy, HasAnswer, Mode
 from discover.answer import Constant as Fitted
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
@@ -63,7 +63,7 @@ class Constant:
 
 
 @dataclass(frozen=True, eq=False)
-class NamedLawFit(SummaryView, PageView, HasEquation):
+class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     """One named law fitted to runs by least squares.
 
     Attributes
@@ -222,16 +222,6 @@ class NamedLawFit(SummaryView, PageView, HasEquation):
         if bound:
             said.append(f"At an end of its range: {', '.join(bound)}.")
         return " ".join(said)
-
-    @property
-    def use(self) -> dict[str, Any] | None:
-        """What a simulation needs: the law, its constants, modes, range and expected error."""
-        return self.answer.use
-
-    @property
-    def adequate(self) -> bool | None:
-        """Whether the discrepancy is within the tolerance."""
-        return self.answer.adequate
 
     def to_json(self) -> dict[str, Any]:
         """Return the fit as ``fit.json`` holds it."""

@@ -29,10 +29,9 @@ from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
-from discover.loop.asked import EXPLAINED, suspected, untested_by
 from discover.loop.by_quantity import beyond_noise, errors_by_quantity, of_stress, with_unseen
-from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
+from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import effect_title, effects_title, listed, percent_of, readable
 
 _MOST_ADDED = 2
@@ -123,15 +122,9 @@ def _shown(result: Any) -> tuple[Equation | None, list[str]]:
     if isinstance(law, AugmentedLaw):
         law, others = law.of_terms()
     try:
-        named, terms = law_parts(law)
+        equation = Equation.of_fluid(fluid, law_parts(law), states=tuple(result.states))
     except InputError:
         return result.declared_law, added
-    modulus, time = (tuple(map(float, one)) for one in (fluid.modulus, fluid.relaxation_time))
-    solvent = float(fluid.solvent_viscosity)
-    relaxes = fluid.law.linear_relaxation
-    equation = Equation(
-        terms, modulus, time, relaxes, solvent, named=named, states=tuple(result.states)
-    )
     return equation, [one.equation for one in others]
 
 

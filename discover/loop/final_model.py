@@ -81,19 +81,11 @@ def declared_law(
     if by_mode and declared.added_modes:
         return None  # one of the modes is that of an effect
     try:
-        named, terms = law_parts(law)
-        if by_mode:
-            named, terms = _named_by_mode(declared, theta, by_mode), ()
+        parts = (_named_by_mode(declared, theta, by_mode), ()) if by_mode else law_parts(law)
     except InputError:
         return None
-    return Equation(
-        terms,
-        tuple(map(float, declared.modulus * np.exp(theta[0]))),
-        tuple(map(float, declared.relaxation_time * np.exp(theta[1]))),
-        law.linear_relaxation,
-        float(declared.solvent_viscosity),
-        named=named,
-    )
+    moduli, times = np.exp(theta[:2, None]) * (declared.modulus, declared.relaxation_time)
+    return Equation.of_fluid(Fluid(law, moduli, times, declared.solvent_viscosity), parts)
 
 
 def _named_by_mode(

@@ -301,7 +301,6 @@ def result_of(
     laws: tuple[LawFit, ...],
     spikes: Mapping[str, Sequence[float]],
     of_rates: str,
-    seconds: float,
 ) -> LoopResult:
     """Return the result of a loop.
 
@@ -315,8 +314,6 @@ def result_of(
         Times of samples set aside as outliers, by run.
     of_rates
         That rates were read with noise which the fluid did not feel, in words; empty where not.
-    seconds
-        Time taken.
     """
     problem, theta = ended.posterior.problem, ended.theta
     declared, model, by_mode = problem.declared, problem.model, ended.by_mode
@@ -356,7 +353,6 @@ def result_of(
         fluid=None if whole else fluid,
         fluid_at_mean=fluid if whole else None,
         states=states or (),
-        seconds=seconds,
     )
 
 

@@ -10,7 +10,7 @@ from discover.answer import TOLERANCE
 from discover.dataset import Dataset
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
-from discover.loop.each_run import run_loop_on
+from discover.loop.loop import run_loop_on
 from discover.loop.loop_result import LoopResult
 from discover.progress import Progress, checked
 from discover.study.declared_model import forward_model

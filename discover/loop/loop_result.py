@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from discover.answer import TOLERANCE, Answer
+from discover.answer import TOLERANCE, Answer, HasAnswer
 from discover.answer.simple_material import SimpleMaterial
 from discover.equations import (
     AugmentedLaw,
@@ -22,6 +22,7 @@ from discover.equations import (
     law_parts,
 )
 from discover.equations.equation import box_of, flow_numbers, mean_relaxation_time
+from discover.equations.parts import LawParts
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests
@@ -46,14 +47,13 @@ from discover.loop.run_record import RunRecord
 from discover.plain_numbers import json_text, plain
 from discover.summary_view import Estimate, PageView, SummaryView, table_of
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm
 
 if TYPE_CHECKING:
     import xarray
 
 
 @dataclass(frozen=True)
-class LoopResult(PageView, HasEquation, SummaryView):
+class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     """The outcome of a closed loop.
 
     Attributes
@@ -176,16 +176,6 @@ class LoopResult(PageView, HasEquation, SummaryView):
         """The law that one can use, how good it is, where, and what to measure next."""
         return loop_answer(self)
 
-    @property
-    def use(self) -> dict[str, Any] | None:
-        """What a simulation needs: law, constants, modes, range, expected error."""
-        return self.answer.use
-
-    @property
-    def adequate(self) -> bool | None:
-        """Whether the discrepancy is within the tolerance; None where nothing is said of it."""
-        return self.answer.adequate
-
     def equation(self) -> Equation:
         """Return the augmented fluid as an equation, with its error and range in the notes.
 
@@ -218,9 +208,7 @@ class LoopResult(PageView, HasEquation, SummaryView):
                 f"The loop added {', '.join(states) or 'an effect'}, which gives the fluid a "
                 "state without a written form. Give the effect's class the method `written`."
             )
-        modulus = tuple(float(g) for g in fluid.modulus)
-        relaxation_time = tuple(float(time) for time in fluid.relaxation_time)
-        time = mean_relaxation_time(modulus, relaxation_time)
+        time = mean_relaxation_time(fluid.modulus, fluid.relaxation_time)
         learned_in = box_of(_numbers(r, time) for r in self.records if not r.held_out)
         judged_in = box_of(_numbers(r, time) for r in self.records if r.held_out)
         notes = [f"Verdict of the loop: {self.verdict}."]
@@ -233,21 +221,16 @@ class LoopResult(PageView, HasEquation, SummaryView):
             )
         held_out = self.error_after.held_out
         errors = {} if held_out is None else {"sigma12 (mean over runs)": held_out}
-        named, terms = self._parts(fluid)
-        return Equation(
-            terms,
-            modulus,
-            relaxation_time,
-            fluid.law.linear_relaxation,
-            float(fluid.solvent_viscosity),
+        return Equation.of_fluid(
+            fluid,
+            self._parts(fluid),
             title=f"Declared law{' with the constitutive effects' * added} of a closed loop.",
             notes=tuple(notes),
             tested=None if learned_in is None else Tested(learned_in, judged_in, errors),
-            named=named,
             states=self.states,
         )
 
-    def _parts(self, fluid: Fluid) -> tuple[NamedPart | None, tuple[LawTerm, ...]]:
+    def _parts(self, fluid: Fluid) -> LawParts:
         """Return the law of the fluid with a name, if it needs one, and its terms."""
         differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
         if not differing:

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.answer.naming import named_law
-from discover.equations import Equation, law_parts
+from discover.equations import Equation
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine import Posterior
@@ -78,15 +78,9 @@ def _nearest(posterior: Posterior, fit: Fit) -> NearestLaw:
     assert found is not None
     name, values = found
     size = rms(posterior.missed(fit))
-    named, terms = law_parts(fluid.law)
-    equation = Equation(
-        terms,
-        tuple(map(float, fluid.modulus)),
-        tuple(map(float, fluid.relaxation_time)),
-        fluid.law.linear_relaxation,
-        float(fluid.solvent_viscosity),
+    equation = Equation.of_fluid(
+        fluid,
         title=f"Best classical law of a closed loop: misses runs left out by {percent_of(size)}.",
-        named=named,
     )
     constants = {}
     for key, value in values.items():
@@ -112,11 +106,9 @@ def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | Non
     if states_of(model, fit.theta, _present(posterior, fit)) != ():
         return None
     try:
-        named, terms = law_parts(fluid.law)
+        return named_law(Equation.of_fluid(fluid))
     except InputError:
         return None
-    relaxes = fluid.law.linear_relaxation
-    return named_law(Equation(terms, linear_relaxation=relaxes, named=named))
 
 
 def _present(posterior: Posterior, fit: Fit) -> list[str]:

@@ -1,18 +1,19 @@
 """A closed loop that needs no search: a yield stress, a viscous fluid, a solid."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from discover.answer.simple_material import SimpleMaterial, material_of, recognise
 from discover.dataset import Run
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
+from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine.inelastic import Inelastic
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage
 from discover.loop.run_record import RunRecord, errors_of, record_runs
 from discover.loop.runs import why_untested
+from discover.loop.task import Task
 from discover.statistics.residual import fast_part
 
 _EFFECT = {"herschel_bulkley": "yield_stress", "newtonian": "solvent_viscosity"}
@@ -24,68 +25,35 @@ _ALREADY = ("saramito",)
 _AS_WELL = 1.1
 
 
-def simple_result(
-    declared: DeclaredModel,
-    fitted: Sequence[Run],
-    held_out: Sequence[Run],
-    spikes: Mapping[str, Sequence[float]],
-    seconds: float,
-) -> LoopResult | None:
-    """Return the result for runs of a simple material; None where a law that relaxes is needed.
-
-    Parameters
-    ----------
-    declared
-        The model to start from.
-    fitted, held_out
-        Runs that are fitted, and runs that only test.
-    spikes
-        Times of samples set aside as outliers, by run.
-    seconds
-        Time taken so far.
-    """
-    material = None if declared.law_name in _ALREADY else recognise(fitted)
+def simple_result(task: Task) -> LoopResult | None:
+    """Return the result for runs of a simple material; None where a law that relaxes is needed."""
+    material = None if task.declared.law_name in _ALREADY else recognise(task.fitted)
     if material is None:
         return None
-    said = f"Recognised as a {material.title} before any search."
-    return _result(declared, material, fitted, held_out, spikes, seconds, 1.0, said)
+    return _result(task, material, 1.0, f"Recognised as a {material.title} before any search.")
 
 
-def inelastic_result(
-    declared: DeclaredModel,
-    found: Inelastic,
-    fitted: Sequence[Run],
-    held_out: Sequence[Run],
-    spikes: Mapping[str, Sequence[float]],
-    seconds: float,
-) -> LoopResult | None:
+def inelastic_result(task: Task, found: Inelastic) -> LoopResult | None:
     """Return the result where a law without elasticity is likelier than all that relax.
 
-    None where the declared law has this viscosity. Parameters as in `simple_result`.
+    None where the declared law has this viscosity.
     """
     material = material_of(found.law, found.values, found.ci95, found.error)
     probability = 1.0 / (1.0 + float(np.exp(-found.log_odds)))
     said = f"A {material.title} is likelier than all laws that relax."
-    return _result(declared, material, fitted, held_out, spikes, seconds, probability, said)
+    return _result(task, material, probability, said)
 
 
 def _result(
-    declared: DeclaredModel,
-    material: SimpleMaterial,
-    fitted: Sequence[Run],
-    held_out: Sequence[Run],
-    spikes: Mapping[str, Sequence[float]],
-    seconds: float,
-    probability: float,
-    said: str,
+    task: Task, material: SimpleMaterial, probability: float, said: str
 ) -> LoopResult | None:
     """Return the result for a material; None if it is no better than the declared law."""
-    if any(material.predict(run) is None for run in held_out):
+    if any(material.predict(run) is None for run in task.held_out):
         return None
     records: list[RunRecord] = []
-    for runs, held in ((fitted, False), (held_out, True)):
+    for runs, held in ((task.fitted, False), (task.held_out, True)):
         if runs:
-            records += record_runs(runs, _predicted(declared, material, fitted, runs), held)
+            records += record_runs(runs, _predicted(task, material, runs), held)
     before, after = errors_of(records, 0), errors_of(records, 1)
     if material.kind == "viscous" and before.fit <= _AS_WELL * after.fit:
         return None  # the declared law has this viscosity, and may have more
@@ -106,8 +74,8 @@ def _result(
         "effects_added", before, after, noise or after.fit, (stage,),
         {
             "structured": False, "error": after.fit, "noise_floor": noise or after.fit,
-            "outliers": sum(map(len, spikes.values())), "outlier_times_s": spikes,
-            "untested": why_untested(len(values), fitted, held_out),
+            "outliers": sum(map(len, task.spikes.values())), "outlier_times_s": task.spikes,
+            "untested": why_untested(len(values), task.fitted, task.held_out),
             "description": said,
         },
         records=tuple(records),
@@ -115,15 +83,12 @@ def _result(
             (explanation,), 1.0 - probability, {effect: probability}, {"constitutive": probability}
         ),
         material=material,
-        seconds=seconds,
     )  # fmt: skip
 
 
-def _predicted(
-    declared: DeclaredModel, material: SimpleMaterial, fitted: Sequence[Run], runs: Sequence[Run]
-) -> np.ndarray:
+def _predicted(task: Task, material: SimpleMaterial, runs: Sequence[Run]) -> np.ndarray:
     batch = make_batch(runs)
-    model = AugmentedModel(declared, [], data_scales(fitted))
+    model = AugmentedModel(task.declared, [], data_scales(task.fitted))
     with np.errstate(all="ignore"):
         first = model.predictions([model.zero()], batch)[0]
     second = np.zeros_like(first)

@@ -1,25 +1,10 @@
 """A data folder of a Giesekus fluid that scipy integrated, in plain numbers."""
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from independent import Giesekus, start_up
 
 MODULUS, TIME, MOBILITY = 100.0, 2.0, 0.3
 RATES = {"slow.csv": 0.4, "medium.csv": 1.0, "fast.csv": 2.0}
-
-
-def start_up_stress(rate, times):
-    """Shear stress in Pa: λ dσ/dt = Gλγ̇ + λ(L·σ + σ·Lᵀ) − σ − (α/G) σ·σ, by components."""
-
-    def field(_, s):
-        s11, s22, s12 = s
-        return [
-            2.0 * rate * s12 - (s11 + MOBILITY / MODULUS * (s11**2 + s12**2)) / TIME,
-            -(s22 + MOBILITY / MODULUS * (s22**2 + s12**2)) / TIME,
-            MODULUS * rate + rate * s22 - (s12 + MOBILITY / MODULUS * s12 * (s11 + s22)) / TIME,
-        ]
-
-    found = solve_ivp(field, (0.0, times[-1]), np.zeros(3), t_eval=times, rtol=1e-10, atol=1e-10)
-    return found.y[2]
 
 
 def write_folder(folder, samples=40, noise=0.005):
@@ -29,7 +14,7 @@ def write_folder(folder, samples=40, noise=0.005):
     times = np.linspace(0.0, 8.0, samples)
     (folder / "runs.csv").write_text("file\n" + "\n".join(RATES) + "\n")
     for name, rate in RATES.items():
-        stress = start_up_stress(rate, times)
+        stress = Giesekus(MOBILITY, MODULUS, TIME).respond(start_up(rate), times).sigma12
         stress += noise * np.sqrt(np.mean(stress**2)) * generator.standard_normal(samples)
         columns = np.column_stack([times, np.full(samples, rate), stress])
         header = "time_s,shear_rate_1_s,stress_Pa"

@@ -11,7 +11,7 @@ from discover.effects.base import AbstractEffect, EffectParameter, SignalEffect
 from discover.effects.registry import EFFECTS, make_effect, named_effects
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, name_of
-from discover.loop.candidates import candidates_of
+from discover.loop.task import candidates_of
 from discover.study.data import load_study_data, parse_study
 from discover.study.declared_model import declared_model
 from tensor_library.algebra import trace

@@ -11,7 +11,7 @@ from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.loop.candidates import candidates_of
+from discover.loop.task import candidates_of
 from discover.protocols import (
     after_alternation,
     in_flow,

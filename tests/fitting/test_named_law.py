@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.integrate import solve_ivp
+from independent import Giesekus, start_up
 from typer.testing import CliRunner
 
 import discover as dc
@@ -16,19 +16,7 @@ NOISE = 0.01
 
 
 def giesekus_start_up(rate, times):
-    """σ12 in Pa by scipy, of σ' + σ/λ + α σ·σ/(Gλ) = G γ̇ + convection."""
-
-    def change(_, s):
-        first, second, shear = s
-        extra = MOBILITY / (MODULUS * TIME)
-        return [
-            2 * rate * shear - first / TIME - extra * (first**2 + shear**2),
-            -second / TIME - extra * (second**2 + shear**2),
-            rate * (MODULUS + second) - shear / TIME - extra * shear * (first + second),
-        ]
-
-    found = solve_ivp(change, (0, times[-1]), [0, 0, 0], t_eval=times, rtol=1e-9, atol=1e-9)
-    return found.y[2]
+    return Giesekus(MOBILITY, MODULUS, TIME).respond(start_up(rate), times).sigma12
 
 
 def data_of(stress_of, rates, seed=0, sweep=None):

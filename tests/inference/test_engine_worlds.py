@@ -13,8 +13,8 @@ from discover.forward import DeclaredModel
 from discover.inference.engine import Problem, explain
 from discover.inference.engine.design import design
 from discover.inference.engine.free_functions import free_functions
-from discover.loop.candidates import candidates_of
 from discover.loop.runs import split_runs
+from discover.loop.task import candidates_of
 
 GIESEKUS, MAXWELL, POM_POM = (1, 2), (1, 14), (2, 3)
 """Seed and index of worlds of the development seeds, all with a sound instrument."""

@@ -14,7 +14,7 @@ from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import Fluid, make_law
 from discover.laws.textbook.pom_pom import _FADES
-from discover.loop.loop import Task
+from discover.loop.task import Task
 from discover.protocols import in_flow, oscillations, start_up, steady_rates
 from discover.simulate import simulate
 
@@ -189,8 +189,8 @@ def test_of_several_laws_the_records_of_a_pom_pom_fluid_ask_for_it():
     unseen = [record("uniaxial", 3.0), record("shear", 15.0)]
     declared = DeclaredModel.named("ucm", {}, np.ones(1), np.ones(1))
     names = ["giesekus", "xpp", "pom_pom_drag_strain"]
-    task = Task((), fitted, unseen, None, 0.0, 0, lambda line: None)
-    taken, found = task.choose(declared, names)
+    task = Task(declared, (), fitted, unseen, most=0)
+    taken, found = task.choose(names)
     tried = task.lines(found)
     assert taken.law_name == "pom_pom_drag_strain"
     assert tried[0].probability > 0.99

@@ -5,7 +5,7 @@ import pytest
 
 from discover.dataset import Run
 from discover.effects import make_effect
-from discover.loop.candidates import EXTRAPOLATION, admission, candidates_of
+from discover.loop.task import EXTRAPOLATION, admission, candidates_of
 from discover.protocols import start_up
 
 TIMES = np.linspace(0.1, 2.0, 20)

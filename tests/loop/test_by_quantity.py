@@ -8,8 +8,8 @@ from scipy.stats import chi2
 
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread
-from discover.loop.next_test import what_to_measure_next
 from discover.loop.run_record import RunRecord
+from discover.loop.sentences import what_to_measure_next
 
 NOISE = 0.03
 

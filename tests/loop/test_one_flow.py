@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from independent import Giesekus
+from independent import start_up as flow_at
 
 import discover as dc
 from discover.dataset.records.repeats import count_flows
@@ -14,22 +15,8 @@ TIMES = np.linspace(0.1, 6.0, 40)
 BASE = dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
 
 
-def giesekus(rate: float) -> np.ndarray:
-    """Return σ12/G of a Giesekus fluid in start-up, α = 0.3, λ = 1 s, by components."""
-
-    def change(t, s):
-        first, second, shear = s
-        return [
-            2 * rate * shear - first - 0.3 * (first**2 + shear**2),
-            -second - 0.3 * (second**2 + shear**2),
-            rate * (1 + second) - shear - 0.3 * shear * (first + second),
-        ]
-
-    return solve_ivp(change, (0, 6), [0, 0, 0], t_eval=TIMES, rtol=1e-9, atol=1e-11).y[2]
-
-
 def run(name: str, rate: float, seed: int) -> dc.Run:
-    stress = 100.0 * giesekus(rate)
+    stress = Giesekus(0.3, 100.0).respond(flow_at(rate), TIMES).sigma12
     noise = np.sqrt(np.mean(stress**2)) * np.random.default_rng(seed).normal(0, 0.01, len(TIMES))
     return dc.Run(name, TIMES, dc.start_up(rate), np.full(len(TIMES), rate), stress + noise)
 

@@ -1,11 +1,20 @@
-"""Numbers, letters and axes as readers see them."""
+"""Numbers, letters, axes, terms and effects as readers see them: in words and as formulas."""
+
+from xml.etree import ElementTree
 
 import pytest
 from matplotlib.figure import Figure
 
+from discover.effects import library_effects, named_effects
+from discover.effects.library_term import library_term
+from discover.equations.spelling.markup import law_element, term_element
+from discover.learners import RecoveredTerm
+from discover.report.mathtext import formula, plain
 from discover.report.plots.style import make_percentage
 from discover.report.wording import percent, percent_range
 from discover.words import estimate, interval, percent_of, readable, significant
+from tensor_library.library import build_library
+from tensor_library.terms import parse_term
 
 
 def test_numbers_keep_what_tells_them_apart():
@@ -52,5 +61,54 @@ def test_axes_of_per_cents_have_plain_numbers_and_more_of_them_where_they_are_sh
     assert "20" not in long
 
 
-def test_what_looks_like_a_letter_inside_a_word_stays():
-    assert readable("alpha of the alphabet, xi, maximal") == "α of the alphabet, ξ, maximal"
+def test_every_term_typesets_as_well_formed_mathml():
+    for term in build_library(degree=2, closed_forms=("exp", "saturating")).terms:
+        ElementTree.fromstring(term_element(term.name, {"epsilon": 0.1}))
+    terms = [RecoveredTerm("sigma", 1.0), RecoveredTerm("sigma.sigma", -1e-7)]
+    law = law_element(terms, False)
+    ElementTree.fromstring(law)
+    assert "<mn>-7</mn>" in law
+
+
+def test_a_formula_that_cannot_be_set_is_shown_as_text():
+    assert formula(r"\alpha\,\sigma", "a").startswith("<svg")
+    assert formula(r"\nonsense{<b>}", "b") == "<code>nonsense&lt;b&gt;</code>"
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        *named_effects().values(),
+        *library_effects()[:3],
+        library_term(parse_term("tr(sigma)^2*(sigma.gammadot+gammadot.sigma)")),
+    ],
+    ids=lambda e: e.name,
+)
+def test_every_effect_is_set_as_a_formula_and_no_latex_is_left_of_it(effect):
+    for latex in (effect.equation, *(parameter.symbol for parameter in effect.parameters)):
+        drawn = formula(latex, "a")
+        assert drawn.startswith("<svg")
+        assert "\\" not in drawn
+        assert not set(plain(latex)) & set("\\{}$")
+
+
+def test_a_formula_is_read_aloud_as_it_is_written():
+    assert plain(r"\sigma \mathrel{+}= \frac{Y}{t_\mathrm{b}}\,\dot\gamma") == "σ += Y/(t_b) γ̇"
+    assert (
+        plain(r"h - (e^{\varepsilon\,\mathrm{tr}\,\boldsymbol{\sigma}} - 1)")
+        == "h - (e^(ε tr σ) - 1)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("alpha of the alphabet, xi, maximal", "α of the alphabet, ξ, maximal"),
+        (
+            "0.5 tr(sigma.gammadot)*I + sigma.sigma, whatever the law.",
+            "0.5 tr(σ·γ̇) I + σ·σ, whatever the law.",
+        ),
+    ],
+)
+def test_words_keep_their_letters_full_stops_and_decimal_points(words, said):
+    assert readable(words) == said

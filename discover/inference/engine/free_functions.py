@@ -132,6 +132,11 @@ class FreeFunction:
         """Whether it stands out so far that the runs have a curve of this shape."""
         return self.log_odds > _TOLD
 
+    @property
+    def weight(self) -> float:
+        """Log odds by which it counts: held-out runs may show it, and need not have it too."""
+        return max(self.log_odds, self.log_odds_in_all)
+
 
 class WithFunction(Fitter):
     """Fits of hypotheses with a function of one variable beside them.
@@ -201,22 +206,22 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     prior, found = posterior.problem.log_odds_of(TERM_ODDS), []
     everywhere = {one.slot: one for one in _variables(whole.fitter)}
     for variable in _variables(search.fitter):
-        possible = [
+        fitted = [
             (fit.log_evidence + posterior.problem.log_prior(fit.names) + prior, fitter, fit)
             for fitter, starts in _starts(search.fitter, bases, variable)
             for fit in fitter.fit(starts)
         ]
-        if not possible:
+        if not fitted:
             continue
-        rank, fitter, fit = max(possible, key=lambda one: one[0])
+        rank, fitter, fit = max(fitted, key=lambda one: one[0])
         if rank - other < _WORTH_IT:
             continue
         again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
         (refit,) = again.fit([again.start(fit.names, fit.theta)])
         odds = refit.log_evidence - fit.log_evidence + rank - in_all
-        if max(odds, rank - other) > _POSSIBLE:
-            found.append(_described(fitter, fit, float(rank - other), float(odds)))
-    return sorted(found, key=lambda one: -one.log_odds)
+        found.append(_described(fitter, fit, float(rank - other), float(odds)))
+    possible = [one for one in found if one.weight > _POSSIBLE]
+    return sorted(possible, key=lambda one: -one.log_odds)
 
 
 def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:

@@ -9,9 +9,9 @@ import numpy as np
 from discover.effects.registry import parameters_of
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
-from discover.loop.asked import EXPLAINED, MOST_NAMES, doubted, several, untested_by
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import CandidateScore, Fold, LawFit, Stage
+from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.mathtext import formula
 from discover.report.overlay import Overlay

@@ -150,7 +150,6 @@ def least_squares_covariance(
     columns: Float[np.ndarray, "rows p"],
     residual: Float[np.ndarray, " rows"],
     sequences: Sequence[Int[np.ndarray, " _"]],
-    shared: Float[np.ndarray, "rows k"] | None = None,
     sizes: Sequence[float] | None = None,
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
@@ -159,8 +158,7 @@ def least_squares_covariance(
     (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C is far larger than any finding.
 
     `columns`: sensitivities S. `sequences`: rows of each sequence of observations, in the order of
-    time. `shared`: Z of errors Z u that all rows share, u of unit variance, beside the noise; None
-    for none. `sizes`: of the noise of each sequence, if it is taken to be the same in all, as
+    time. `sizes`: of the noise of each sequence, if it is taken to be the same in all, as
     `noise_model` takes them.
     """
     if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
@@ -180,9 +178,6 @@ def least_squares_covariance(
     middle = sum(
         scaled[rows].T @ noise.covariance_times(i, scaled[rows]) for i, rows in enumerate(sequences)
     )
-    if shared is not None:
-        common = scaled.T @ shared
-        middle = middle + common @ common.T
     squares = np.outer(norms, norms)
     return (inverse @ middle @ inverse + unseen) / squares, inverse / squares, noise
 

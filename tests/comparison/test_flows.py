@@ -1,20 +1,116 @@
-"""Of a long record, learners are given as many samples as a study allows, and the page says so."""
+"""Flows of a comparison: within the fitted range or beyond it, without spikes, thinned."""
 
 from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent import Giesekus
+from independent import start_up as flow_at
+from independent.noise import white
 from scipy.integrate import cumulative_trapezoid
 
 from discover.comparison import compare
-from discover.comparison.flows import thinned_to
+from discover.comparison.flows import Flow, thinned_to, without_spikes_in_fit
+from discover.comparison.outcome import place
 from discover.comparison.run_comparison import data_in_words
 from discover.dataset import Dataset, Run
 from discover.dataset.records.thinning import evenly_chosen, followed_rate, thin_run
-from discover.protocols import measured_rate
+from discover.protocols import measured_rate, start_up
+from discover.protocols.protocol import in_flow, oscillatory_shear
 from discover.study import parse_study
 from discover.study.data import StudyData
+
+TIME = np.linspace(0.0, 20.0, 201)
+
+
+def oscillation(weissenberg, deborah):
+    rate = weissenberg * np.cos(deborah * TIME)
+    return Flow("osc", "test", oscillatory_shear(weissenberg, deborah), TIME, rate, {})
+
+
+def started(rate, duration=20.0):
+    times = np.linspace(0.0, duration, 201)
+    return Flow("start", "test", start_up(rate), times, np.full(201, rate), {})
+
+
+PAPER = [oscillation(wi, de) for de in (0.25, 0.5, 0.75, 1.0) for wi in (1.0, 2.0)]
+
+
+def test_a_fitted_flow_is_inside():
+    assert place(PAPER[3], PAPER).inside
+    assert place(oscillation(0.1, 0.9), PAPER).inside
+
+
+def test_a_faster_oscillation_is_beyond_in_rate_and_frequency():
+    placed = place(oscillation(3.0, 1.5), PAPER)
+    assert placed.beyond == pytest.approx({"shear rate": 1.5, "frequency": 1.5})
+    assert placed.text.startswith("beyond the fitted range: shear rate (Wi) 1.5 times")
+
+
+def test_a_start_up_is_beyond_in_strain_though_its_rate_was_fitted():
+    # strain 40 against the largest of the eight series, 2/0.25
+    placed = place(started(2.0), PAPER)
+    assert placed.beyond == pytest.approx({"strain": 5.0}, rel=0.01)
+    assert place(started(2.0, duration=3.0), PAPER).inside
+
+
+def test_a_step_of_the_rate_excites_every_frequency():
+    assert place(oscillation(1.0, 5.0), [started(2.0)]).inside
+    assert not place(oscillation(1.0, 5.0), PAPER).inside
+
+
+def test_runs_at_rest_leave_every_flow_beyond():
+    placed = place(started(1.0), [started(0.0)])
+    assert set(placed.beyond) == {"shear rate", "strain"}
+
+
+def test_an_extension_is_beyond_wherever_only_shear_was_fitted():
+    pull = replace(started(0.1), protocol=in_flow(start_up(0.1), "uniaxial"))
+    placed = place(pull, [started(2.0)])
+    assert not placed.inside
+    assert placed.text == (
+        "beyond the fitted range: uniaxial extension, of which nothing was fitted"
+    )
+    assert placed.to_json()["new_flow"] == "uniaxial"
+    # among extensions of its own kind it is held against those, whatever the shear was
+    faster = replace(started(0.3), protocol=in_flow(start_up(0.3), "uniaxial"))
+    assert place(pull, [started(0.01), faster]).inside
+    assert place(faster, [started(9.0), pull]).beyond["Hencky rate"] == pytest.approx(3.0)
+
+
+SAMPLED = np.linspace(0.1, 8.0, 80)
+KNOCKS = [20, 45]
+
+
+def knocked_start_up(rate, knocked):
+    exact = Giesekus(0.3, 100.0).respond(flow_at(rate), SAMPLED).sigma12
+    stress = white(exact, 0.01, np.random.default_rng(int(10 * rate)))
+    stress[KNOCKS] += knocked * np.sqrt(np.mean(exact**2)) * np.array([1.0, -0.6])
+    return Run(f"{rate}.csv", SAMPLED, start_up(rate), np.full(80, rate), stress)
+
+
+def with_knocks(knocked):
+    runs = tuple(knocked_start_up(rate, knocked) for rate in (0.5, 2.0, 3.0))
+    fit, held = Dataset("fit", runs[:2]), Dataset("held", runs[2:])
+    return StudyData(Dataset("all", runs), fit, held)
+
+
+def test_knocks_are_left_out_of_the_fitted_runs_and_told():
+    left, told = without_spikes_in_fit(with_knocks(0.8))
+    for one in left.fit.runs:
+        np.testing.assert_array_equal(one.time, np.delete(SAMPLED, KNOCKS))
+    assert "2 of 0.5.csv, 2 of 2.0.csv" in told
+    # what judges is whole
+    assert len(left.held_out.runs[0]) == len(SAMPLED)
+
+
+@pytest.mark.parametrize("knocked", [0.0, 0.01])
+def test_of_a_record_without_a_knock_nothing_is_left_out(knocked):
+    whole = with_knocks(knocked)
+    left, told = without_spikes_in_fit(whole)
+    assert left is whole
+    assert told == ""
 
 
 class _Seen(Exception):

@@ -1,0 +1,352 @@
+"""The task of a closed loop: among which effects to search, in which runs, beside which law."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from discover.dataset import Dataset, Run
+from discover.dataset.records.repeats import with_loadings
+from discover.effects import (
+    AbstractEffect,
+    ConstitutiveEffect,
+    KinematicEffect,
+    library_effects,
+    make_effect,
+    named_effects,
+)
+from discover.errors import InputError
+from discover.forward import MODULUS, RELAXATION_TIME, DeclaredModel
+from discover.forward.declared import may_differ_by_mode
+from discover.inference.engine import Posterior, Problem, explain
+from discover.inference.engine.fits import Fitter
+from discover.inference.engine.search import Search
+from discover.inference.scattered_rates import smoothed, unfelt_scatter
+from discover.inference.step_instants import with_places
+from discover.laws import LAWS
+from discover.laws.registry import starting_values
+from discover.loop.parts import LawFit
+from discover.loop.path import predicted
+from discover.loop.run_record import errors_of, record_runs
+from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.words import unknown_name
+
+Say = Callable[[str], None]
+
+EXTRAPOLATION = 10.0
+"""Ratio of held-out to fitted shear rates beyond which a law must stay well-posed."""
+
+_AT_END = 1e-3
+"""Share of its range within which a constant stands at an end."""
+
+_DIVERGES = "its stress diverges. Check its parameters, modes and units."
+
+
+@dataclass(frozen=True)
+class Task:
+    """Among which effects to search, in which runs, beside which law.
+
+    Attributes
+    ----------
+    declared
+        The model to start from.
+    fitted, held_out
+        Runs to fit, and runs that only test.
+    noise, loading
+        Relative noise where it is known, and deviation of loadings, zero where there are none.
+    most
+        Largest number of effects.
+    say
+        Called with a line of text now and then.
+    computed
+        Whether runs were computed: they know no instrument, a sound one either.
+    order
+        Names of the runs of the data set.
+    spikes
+        Times of samples set aside as outliers, by run.
+    of_rates
+        That rates were read with noise which the fluid did not feel; empty where not.
+    """
+
+    declared: DeclaredModel
+    candidates: Sequence[AbstractEffect]
+    fitted: Sequence[Run]
+    held_out: Sequence[Run]
+    noise: float | None = None
+    loading: float = 0.0
+    most: int = 3
+    say: Say = lambda line: None
+    computed: bool = False
+    order: Sequence[str] = ()
+    spikes: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    of_rates: str = ""
+
+    @classmethod
+    def of_runs(
+        cls,
+        dataset: Dataset,
+        declared: DeclaredModel,
+        fit: Sequence[str] | None = None,
+        held_out: Sequence[str] = (),
+        effects: Sequence[str | AbstractEffect] | str | None = None,
+        max_effects: int = 3,
+        strain: tuple[float, float] | None = None,
+        noise: float | None = None,
+        most_samples: int = MOST_SAMPLES,
+        progress: Say | None = None,
+        loading: float | None = None,
+        computed: bool = False,
+    ) -> "Task":
+        """Return the task that runs, model and candidates make; parameters as in `run_loop`."""
+        if max_effects < 0:
+            raise InputError(f"max_effects must be 0 or more; got {max_effects}.")
+        fitted, held, spikes = split_runs(dataset, fit, held_out, strain, most_samples)
+        for some in (fitted, held):
+            with_loadings(some, loading, noise)  # for what it refuses
+        declared, every, _ = with_places(declared, [*fitted, *held], [])
+        fitted, held = every[: len(fitted)], every[len(fitted) :]
+        require_samples(fitted, declared)
+        candidates = candidates_beside(declared, effects, [*fitted, *held])
+        of_rates = unfelt_scatter(declared, fitted)
+        if of_rates:
+            fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
+        return cls(
+            declared, candidates, fitted, held, noise, loading or 0.0, max_effects,
+            progress or (lambda line: None), computed, dataset.names, spikes, of_rates,
+        )  # fmt: skip
+
+    def problem(self, declared: DeclaredModel) -> Problem:
+        """Return the problem that a declared model makes of the runs."""
+        admitted = admission(self.fitted, self.held_out)
+        known = {effect.name for effect in declared.effects}
+        candidates = [e for e in self.candidates if admitted(e) and e.name not in known]
+        return Problem(
+            declared, candidates, self.fitted, self.held_out, self.loading, self.noise,
+            self.computed,
+        )  # fmt: skip
+
+    def explained(self, declared: DeclaredModel) -> Posterior:
+        """Return the posterior over what a declared model lacks.
+
+        Raises
+        ------
+        InputError
+            If it cannot be integrated through the fitted runs.
+        """
+        problem = self.problem(declared)
+        self.say(f"search among {len(problem.candidates)} effects")
+        if not is_sound(problem):
+            raise InputError(
+                "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
+            )
+        return explain(problem, self.most, self.say)
+
+    def explained_by_mode(self, declared: DeclaredModel) -> Posterior:
+        """Return the posterior with constants that differ from mode to mode, if it is likelier.
+
+        Of a model with several modes: those that it declares so, or else what was found and may
+        differ. Raises InputError as `explained`.
+        """
+        first = self.explained(declared)
+        declared = first.problem.declared
+        if len(declared.modulus) < 2 or not first.explanations:
+            return first
+        names = ()
+        if not declared.by_mode:
+            found = first.explanations[0].members[0]
+            names = tuple(n for n in found if may_differ_by_mode(first.problem.effects[n]))
+            if not names:
+                return first
+        self.say("constants that may differ from mode to mode")
+        second = self.explained(replace(declared, by_mode=names))
+        gain = 2.0 * (log_evidence(second.search) - log_evidence(first.search))
+        first.memory["by_mode"] = second.memory["by_mode"] = abs(gain)
+        return second if gain > 0.0 else first
+
+    def choose(self, laws: Sequence[str]) -> tuple[DeclaredModel, dict[str, Search]]:
+        """Return the declared model with the likeliest of some laws, and the search with each.
+
+        Raises
+        ------
+        InputError
+            If a name is none, or no law can be integrated through the fitted runs.
+        """
+        unknown = [name for name in laws if name not in LAWS]
+        if unknown:
+            raise InputError(unknown_name("law", unknown[0], LAWS))
+        found: dict[str, Search] = {}
+        for name in dict.fromkeys(laws):
+            self.say(f"law {len(found) + 1} of {len(laws)}: {LAWS[name].title}")
+            problem = self.problem(with_law(self.declared, name))
+            found[name] = Search(Fitter(problem, problem.fitted), self.most).run()
+        if not found:
+            return self.declared, found
+        best = max(found, key=lambda name: log_evidence(found[name]))
+        if not np.isfinite(log_evidence(found[best])):
+            raise InputError(
+                f"None of the laws {', '.join(laws)} can be integrated through the fitted runs: "
+                "their stress diverges. Check modes and units."
+            )
+        return found[best].problem.declared, found
+
+    def lines(self, found: Mapping[str, Search]) -> tuple[LawFit, ...]:
+        """Return the laws that were tried, the likeliest first."""
+        logs = {name: log_evidence(search) for name, search in found.items()}
+        total, lines = float(np.logaddexp.reduce(list(logs.values()))), []
+        for name in sorted(found, key=lambda name: -logs[name]):
+            search = found[name]
+            alive = search.alive()
+            if not alive:
+                lines.append(LawFit(name, starting_values(name)))
+                continue
+            best, declared = alive[0], search.problem.declared
+            values, ends = {}, []
+            for i, parameter in enumerate(declared.free_parameters):
+                value = float(np.clip(best.theta[2 + i], parameter.low, parameter.high))
+                values[parameter.name] = value
+                room = _AT_END * (parameter.high - parameter.low)
+                if min(value - parameter.low, parameter.high - value) < room:
+                    ends.append(parameter.name)
+            problem, records = search.problem, []
+            for rows, held in ((problem.fitted, False), (problem.predicted, True)):
+                if rows is not None:
+                    own = predicted(search, best, rows, held)[None]
+                    records += record_runs(rows.runs, own, held)
+            error = errors_of(records, 0)
+            probability = float(np.exp(logs[name] - total))
+            lines.append(LawFit(name, values, tuple(ends), error, probability, best.names))
+        return tuple(lines)
+
+
+def log_evidence(search: Search) -> float:
+    """Return the log of evidence times prior of all hypotheses of a search together."""
+    alive = search.alive()
+    return float(np.logaddexp.reduce([search.rank(fit) for fit in alive])) if alive else -np.inf
+
+
+def is_sound(problem: Problem) -> bool:
+    """Return whether the model without any effect can be integrated through the fitted runs."""
+    predicted = Fitter(problem, problem.fitted).predict([problem.zero])
+    return bool(np.all(np.isfinite(predicted)))
+
+
+def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
+    """Return the declared model with another law, all of whose constants are fitted."""
+    factors = {MODULUS: declared.fit_modulus, RELAXATION_TIME: declared.fit_relaxation_time}
+    return DeclaredModel.named(
+        name,
+        starting_values(name),
+        declared.modulus,
+        declared.relaxation_time,
+        free=[*LAWS[name].parameters, *(factor for factor, free in factors.items() if free)],
+        solvent_viscosity=declared.solvent_viscosity,
+        linear_error=declared.linear_error,
+        linear_pattern=declared.linear_pattern,
+        modulus_covariance=declared.modulus_covariance,
+        effects=declared.effects,
+        step_instants=declared.step_instants,
+    )
+
+
+def candidates_of(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
+    """Return the effects that are asked for.
+
+    Parameters
+    ----------
+    effects
+        Names, spellings of library terms or objects; ``"named"`` for every effect with a name that
+        is no candidate on request alone; None for these and every library term up to one invariant.
+
+    Raises
+    ------
+    InputError
+        If there is none, one is given twice, or a name is unknown.
+    """
+    named = [effect for effect in named_effects().values() if not effect.on_request]
+    if effects is None:
+        return [*named, *library_effects()]
+    if effects == "named":
+        return named
+    if isinstance(effects, str):
+        raise InputError(
+            f'effects must be a list of names, or "named" for every effect with a name; got '
+            f"{effects!r}. Write [{effects!r}] for this one alone."
+        )
+    if not effects:
+        raise InputError("The loop needs at least one candidate effect; got none.")
+    made = [make_effect(effect) if isinstance(effect, str) else effect for effect in effects]
+    names = [effect.name for effect in made]
+    repeated = [name for name in names if names.count(name) > 1]
+    if repeated:
+        raise InputError(f"The effect {repeated[0]!r} is given twice.")
+    return made
+
+
+def admission(fitted: Sequence[Run], held: Sequence[Run]) -> Callable[[AbstractEffect], bool]:
+    """Return which effects are candidates, given the rates.
+
+    Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
+    command is none where the rate was measured. Rates are set, or measured, apart from the stress,
+    so this looks at no held-out stress.
+    """
+    measured = any(run.rate_is_measured for run in fitted)
+    fastest = max(float(np.max(np.abs(run.rate))) for run in fitted)
+    asked = max((float(np.max(np.abs(run.rate))) for run in held), default=0.0)
+    far = asked > EXTRAPOLATION * fastest
+
+    def admitted(effect: AbstractEffect) -> bool:
+        if isinstance(effect, KinematicEffect):
+            return not (measured and effect.shapes_command)
+        return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
+
+    return admitted
+
+
+def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
+    """Refuse a known effect that the rates of these runs contain already."""
+    measured = [run.name for run in runs if run.rate_is_measured]
+    for known in declared.effects:
+        if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
+            raise InputError(
+                f"The known effect {known.name} lies between the command and the tool, and the "
+                f"rate of {measured[0]} was measured at the tool, so it contains it already. Leave "
+                "the effect out."
+            )
+
+
+def _require_present(declared: DeclaredModel, present: set[str]) -> None:
+    """Refuse an effect by mode that is neither declared nor a candidate."""
+    free = {parameter.name for parameter in declared.free_parameters}
+    absent = [name for name in declared.by_mode if name not in free and name not in present]
+    if absent:
+        raise InputError(
+            f"by_mode names the effect {absent[0]}, which is neither declared nor a candidate. Add "
+            "it to [model] effects or to [loop] effects, or take it out of by_mode."
+        )
+
+
+def candidates_beside(
+    declared: DeclaredModel,
+    effects: Sequence[str | AbstractEffect] | str | None,
+    runs: Sequence[Run],
+) -> list[AbstractEffect]:
+    """Return the effects that are asked for and that the declared model does not know.
+
+    Parameters
+    ----------
+    effects
+        As `candidates_of` takes them.
+    runs
+        Those that are fitted and those that judge.
+
+    Raises
+    ------
+    InputError
+        If they are not as `candidates_of` takes them, an effect by mode is neither declared nor
+        among them, or the rates of the runs contain a known effect already.
+    """
+    candidates = candidates_of(effects)
+    known = {effect.name for effect in declared.effects}
+    _require_present(declared, {*known, *(effect.name for effect in candidates)})
+    _require_possible(declared, runs)
+    return [effect for effect in candidates if effect.name not in known]
