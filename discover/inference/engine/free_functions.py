@@ -219,9 +219,9 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
         again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
         (refit,) = again.fit([again.start(fit.names, fit.theta)])
         odds = refit.log_evidence - fit.log_evidence + rank - in_all
-        found.append(_described(fitter, fit, float(rank - other), float(odds)))
-    possible = [one for one in found if one.weight > _POSSIBLE]
-    return sorted(possible, key=lambda one: -one.log_odds)
+        if max(rank - other, odds) > _POSSIBLE:
+            found.append(_described(fitter, fit, float(rank - other), float(odds)))
+    return sorted(found, key=lambda one: -one.log_odds)
 
 
 def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
