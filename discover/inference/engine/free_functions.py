@@ -216,9 +216,11 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
         rank, fitter, fit = max(fitted, key=lambda one: one[0])
         if rank - other < _WORTH_IT:
             continue
-        again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
-        (refit,) = again.fit([again.start(fit.names, fit.theta)])
-        odds = refit.log_evidence - fit.log_evidence + rank - in_all
+        odds = -np.inf  # where runs held out have no such variable
+        if variable.slot in everywhere:
+            again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
+            (refit,) = again.fit([again.start(fit.names, fit.theta)])
+            odds = refit.log_evidence - fit.log_evidence + rank - in_all
         if max(rank - other, odds) > _POSSIBLE:
             found.append(_described(fitter, fit, float(rank - other), float(odds)))
     return sorted(found, key=lambda one: -one.log_odds)
