@@ -138,7 +138,8 @@ def flow_run(flow: Flow, found: Found, runs: Mapping[str, Run]) -> Run:
 def run_of(flow: Flow) -> Run:
     """Return a flow as a run of which nothing is recorded."""
     nothing = np.zeros(len(flow.times))
-    return Run(flow.name, flow.times, flow.protocol, flow.rate, nothing)
+    strain = nothing if flow.records_strain else None
+    return Run(flow.name, flow.times, flow.protocol, flow.rate, nothing, strain=strain)
 
 
 def _bands(

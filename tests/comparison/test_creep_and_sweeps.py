@@ -164,7 +164,7 @@ def test_small_stress_and_small_strain_give_no_term_and_determine_nothing(runs):
 @pytest.mark.slow
 def test_an_oscillation_of_the_stress_is_explained_by_the_law_that_made_it():
     found = compared([oscillation_of_stress(GIESEKUS, stress) for stress in (30.0, 80.0)])
-    assert found.explanation.verdict == "explained"
+    assert found.verdict == "explained"
     assert [term.term for term in found.outcomes["tensor_sindy"].terms] == ["sigma.sigma"]
 
 
@@ -175,7 +175,7 @@ def test_creep_held_out_judges_what_two_start_ups_give(held_out):
     # the control is the creep of another fluid
     judge = creep(GIESEKUS if own else modes(PhanThienTanner, 0.2), 40.0)
     found = compared([start(GIESEKUS, 1.0), start(GIESEKUS, 3.0), judge], held_out=[judge.name])
-    assert found.explanation.verdict == ("explained" if own else "unexplained")
+    assert found.verdict == ("explained" if own else "unexplained")
     if own:
         table = comparison_predictions(found)
         lines = table[(table["run"] == judge.name) & (table["source"] == "tensor_sindy")]

@@ -38,7 +38,7 @@ def compared(runs, **options):
 @pytest.mark.slow
 def test_a_flow_curve_alone_gives_a_law_and_leaves_its_second_normal_stress_open():
     found = compared([curve(Giesekus(MOBILITY))])
-    assert found.explanation.verdict == "explained"
+    assert found.verdict == "explained"
     terms = {term.term: term for term in found.outcomes["tensor_sindy"].terms}
     low, high = terms["sigma.sigma"].ci95
     assert low <= MOBILITY <= high
@@ -62,4 +62,4 @@ def test_a_flow_curve_held_out_refutes_what_two_start_ups_allow(held_out):
     judge = curve(material if own else PhanThienTanner(0.2))
     runs = [start(material, 1.0), start(material, 4.0), judge]
     found = compared(runs, held_out=[judge.name])
-    assert found.explanation.verdict == ("explained" if own else "unexplained")
+    assert found.verdict == ("explained" if own else "unexplained")

@@ -71,7 +71,7 @@ def test_a_known_effect_of_the_fluid_becomes_its_law_its_modes_and_its_solvent()
         ({"transducer_lag": {"tau": 0.1}}, "mixes the stress of earlier times"),
         ({"time_delay": {"delay": 0.1}}, "mixes the stress of earlier times"),
         ({"viscous_heating": {"heating": 1e-7, "heat_loss_time": 1.0}}, "a state that no law"),
-        ({"yield_stress": {"yield_strain": 0.1}}, "no sum of library terms"),
+        ({"yield_stress": {"yield_strain": 0.1}}, "not a sum of library terms"),
     ],
 )
 def test_what_a_learner_cannot_be_told_is_refused(effects, words):
