@@ -128,12 +128,12 @@ class NoiseModel:
         runs = len(self._count)
         values = np.full(len(residual), -np.inf)
         noises = [Noise(np.ones(runs), 1.0, 0.0, 0.0)] * len(residual)
-        off = residual[:, self.kept] / self._size
+        off = residual / self.rows.size
         # a number that is none compares as false
-        usable = np.flatnonzero(np.max(np.abs(residual / self.rows.size), axis=1) < _FAR)
+        usable = np.flatnonzero(np.max(np.abs(off), axis=1) < _FAR)
         if not len(usable):
             return values, noises
-        off = off[usable, None]
+        off = off[usable][:, None, self.kept]
         relative = (predicted[usable][:, None, self.kept] / self._size) ** 2
         variance = 1.0 + _SHARES[:, None] * (relative - 1.0)
         scaled = off / np.sqrt(variance)
