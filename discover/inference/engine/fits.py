@@ -32,6 +32,12 @@ by which runs may differ, for from where they do not, it takes a leap to where t
 _ENOUGH = 0.01
 """Gain of log posterior of a step below which a fit has ended."""
 
+_FAR = 40.0
+"""Log posterior behind the best from which on a fit does not count, and the rounds of as much gain
+again that must bring it nearer."""
+
+_ROUNDS_TO_GO = 10
+
 _NEXT_TO_NONE = 1e-9
 """Width of what there is none of."""
 
@@ -340,24 +346,63 @@ class Fitter:
 
     # fits ---------------------------------------------------------------------------------------
 
-    def fit(self, starts: Sequence[Fit], rounds: int = 20, derivatives: bool = True) -> list[Fit]:
-        """Return hypotheses at their likeliest constants; all take their steps side by side."""
+    def fit(
+        self,
+        starts: Sequence[Fit],
+        rounds: int = 20,
+        derivatives: bool = True,
+        wanted: int | None = None,
+    ) -> list[Fit]:
+        """Return hypotheses at their likeliest constants; all take their steps side by side.
+
+        Parameters
+        ----------
+        starts
+            Hypotheses before their first step.
+        rounds
+            Steps of each at most.
+        derivatives
+            Whether each ends with derivatives, covariance and evidence.
+        wanted
+            So many of the best matter: one that cannot come near them is given up, without these.
+        """
         fits = list(starts)
         with _running_away():
             self._set(fits, self.predict([fit.theta for fit in fits]))
-        active = [fit for fit in fits if np.isfinite(fit.log_posterior)]
+        active, given_up = [fit for fit in fits if np.isfinite(fit.log_posterior)], set()
         for _ in range(rounds):
             if not active:
                 break
             self.linearise([fit for fit in active if fit.slopes is None])
+            before = [fit.log_posterior for fit in active]
             with _running_away():
-                active = self._stepped(active)
+                going_on = self._stepped(active)
+            if wanted is not None:
+                gains = [fit.log_posterior - one for fit, one in zip(active, before, strict=True)]
+                hopeless = self._hopeless(fits, active, gains, wanted)
+                going_on = [fit for fit in going_on if id(fit) not in hopeless]
+                given_up |= hopeless
+            active = going_on
         if derivatives:
-            usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
+            usable = [
+                fit for fit in fits if np.isfinite(fit.log_posterior) and id(fit) not in given_up
+            ]
             self.linearise([fit for fit in usable if fit.slopes is None])
             for fit in usable:
                 self._judge(fit)
         return fits
+
+    @staticmethod
+    def _hopeless(
+        fits: Sequence[Fit], active: Sequence[Fit], gains: Sequence[float], wanted: int
+    ) -> set[int]:
+        """Return which fits rounds of the gain of the last one do not bring near the best."""
+        near = sorted((fit.log_posterior for fit in fits), reverse=True)[:wanted][-1] - _FAR
+        return {
+            id(fit)
+            for fit, gain in zip(active, gains, strict=True)
+            if 0.0 < gain < (near - fit.log_posterior) / _ROUNDS_TO_GO
+        }
 
     def linearise(self, fits: Sequence[Fit]) -> None:
         """Set the derivatives of fits, all of whose vectors are predicted side by side.

@@ -54,9 +54,12 @@ class Search:
         usable = (fit for fit in self.found.values() if np.isfinite(fit.log_evidence))
         return sorted(usable, key=self.rank, reverse=True)
 
-    def add(self, starts: Iterable[Fit]) -> list[Fit]:
-        """Fit hypotheses side by side and keep them; of one set the likeliest."""
-        fits = self.fitter.fit(list(starts))
+    def add(self, starts: Iterable[Fit], wanted: int | None = None) -> list[Fit]:
+        """Fit hypotheses side by side and keep them; of one set the likeliest.
+
+        `wanted`: so many of the best are asked for; what cannot come near them is given up.
+        """
+        fits = self.fitter.fit(list(starts), wanted=wanted)
         for fit in fits:
             key = frozenset(fit.names)
             known = self.found.get(key)
@@ -87,7 +90,7 @@ class Search:
             if not starts:
                 break
             best = max(map(self.rank, self.found.values()))
-            self.add(starts)
+            self.add(starts, wanted=_BEAM)
             self.say(f"sets of {depth + 1}: {len(new)} fitted")
             level = sorted((self.found[key] for key in new), key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
@@ -178,6 +181,12 @@ class Search:
                 return
             seen.add(frozenset(best.names))
             starts: dict[Key, Fit] = {}
+            smaller = [self.found.get(frozenset(best.names) - {name}) for name in best.names]
+            self.add(
+                self.fitter.start(f.names, f.theta, f.linear)
+                for f in smaller
+                if f and f.root is None
+            )
             for name in best.names:
                 rest = self.found.get(frozenset(best.names) - {name})
                 if rest is None or not np.isfinite(rest.log_posterior):
