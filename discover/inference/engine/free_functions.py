@@ -7,37 +7,40 @@ hypothesis like any other: changes of slope at a few knots, each normal about ze
 by the same evidence.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset import Run
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.posterior import Posterior
-from discover.inference.engine.priors import Deviations
+from discover.inference.engine.priors import Deviations, Prior
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.search import Search
+from discover.inference.engine.slip import SLIP_CURVE
+from discover.inference.engine.variables import KNOTS, Variable, closed_forms, variables
 from discover.linear_algebra_threads import in_one_thread
-
-_LATE = (0.0, 0.15, 0.3, 0.45, 0.6, 0.7, 0.8, 0.9, 1.0)
-_EARLY = (0.0, 0.02, 0.05, 0.1, 0.18, 0.3, 0.45, 0.65, 0.85)
-"""Where the slope changes, over the largest value: what saturates does so at the end of a range,
-what settles at its beginning."""
-
-_KNOTS = len(_LATE)
+from discover.statistics import HALF_BAND
 
 _WIDTHS = (0.03, 0.1, 0.3, 1.0, 3.0)
 """Standard deviations of a change of slope, both axes over their size."""
+
+_SLIPS = (0.1, 0.3)
+"""The same of slip, over the typical rate and stress: it takes a tenth of the deformation or a
+third."""
 
 _BASES = 12
 """Hypotheses of each size beside which a function is tried to first order."""
 
 _LARGEST_BASE = 2
 _REFITTED = 4
+_SLIPPING = 4
+"""Hypotheses of each size beside which slip is fitted."""
+
 _TOLD = 15.0
 """Log odds against all that has a name and any other discrepancy, from which on a curve is shown.
 On development seeds one that is there has 35 and more; one that stands for a law of no dictionary,
@@ -53,48 +56,6 @@ _POINTS = 61
 _TRIED = 60
 _USUAL = 0.95
 _RESOLVED = 0.05
-
-
-@dataclass(frozen=True)
-class Variable:
-    """What a function depends on, and what it does to a record.
-
-    Attributes
-    ----------
-    slot, name, unit
-        Of the function, as the contract names it: ``recorded_stress``, ``rate``, ``drift`` or
-        ``network``.
-    values
-        At each row; None for the stress, which is that of the fluid as predicted.
-    largest
-        In the fitted runs.
-    is_factor
-        Whether the stress is multiplied.
-    """
-
-    slot: str
-    name: str
-    unit: str
-    values: Float[np.ndarray, " rows"] | None
-    largest: float
-    is_factor: bool = False
-
-    @property
-    def is_odd(self) -> bool:
-        """Whether the function changes its sign with that of its variable."""
-        return self.slot in ("recorded_stress", "rate")
-
-    def basis(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n knots"]:
-        """Return what one change of slope at each knot is at some values."""
-        x = np.abs(values) / self.largest
-        hinges = np.maximum(x[:, None] - np.array(_LATE if self.is_odd else _EARLY), 0.0)
-        return hinges * np.sign(values)[:, None] if self.is_odd else hinges
-
-    def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
-        """Return what one of each does to the records, in Pa."""
-        along = predicted if self.values is None else self.values
-        scale = predicted if self.is_factor else np.sqrt(np.mean(size**2))
-        return self.basis(along) * np.broadcast_to(scale, predicted.shape)[:, None]
 
 
 @dataclass(frozen=True)
@@ -153,7 +114,27 @@ class WithFunction(Fitter):
         self.__dict__.update(vars(fitter))
         self.variable, self.width = variable, width
         first = fitter.linear_count
-        self.deviations = [*fitter.deviations, (slice(first, first + _KNOTS), Deviations(width))]
+        self.deviations = [*fitter.deviations, (slice(first, first + KNOTS), Deviations(width))]
+
+    def on(self, fitter: Fitter) -> "WithFunction | None":
+        """Return the same on other rows; None where these have no such variable."""
+        for variable in variables(fitter.rows):
+            if variable.slot == self.variable.slot:
+                return WithFunction(fitter, variable, self.width)
+        return None
+
+    def curve(self, fit: Fit) -> tuple[Variable, list[np.ndarray], str | None]:
+        """Return the function, its grid, values and half band, and its closed form."""
+        assert fit.covariance is not None
+        variable, k = self.variable, KNOTS
+        along = fit.predicted if variable.values is None else variable.values
+        low = 0.0 if variable.is_odd else float(np.min(np.abs(along)))
+        grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
+        size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(self.rows.size**2)))
+        basis = size * variable.basis(grid)
+        half = _half_band(basis, fit.covariance[-k:, -k:])
+        nearest = _nearest(variable, fit, grid, size)
+        return variable, [grid, basis @ fit.linear[-k:], half], nearest
 
     def linear_columns(
         self,
@@ -172,19 +153,65 @@ class WithFunction(Fitter):
     ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of trials of a fit; the function last."""
         own = [
-            self.variable.columns(one, self.rows.size) @ values[-_KNOTS:]
+            self.variable.columns(one, self.rows.size) @ values[-KNOTS:]
             for one, values in zip(predicted, linear, strict=True)
         ]
         return super().records(fit, predicted, linear) + own
 
     def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return by how much a record changes with the stress of the fluid."""
-        gain, own, step = super().gain(fit), fit.linear[-_KNOTS:], 1e-6
+        gain, own, step = super().gain(fit), fit.linear[-KNOTS:], 1e-6
         if self.variable.values is None or self.variable.is_factor:
             moved = self.variable.columns(fit.predicted * (1.0 + step), self.rows.size)
             change = (moved - self.variable.columns(fit.predicted, self.rows.size)) @ own
             gain = gain + change / np.where(fit.predicted == 0.0, np.inf, step * fit.predicted)
         return gain
+
+
+class WithSlip(Fitter):
+    """Fits of hypotheses with slip beside them that is a function of the stress.
+
+    Parameters
+    ----------
+    fitter
+        What fits them without.
+    width
+        How much the slope of the curve changes at a bend, over the typical rate and stress.
+    """
+
+    def __init__(self, fitter: Fitter, width: float):
+        self.__dict__.update(vars(fitter))
+        self._priors, self.width = {}, width
+        self._at = list(self.problem.model.positions(SLIP_CURVE.name)[:-1])
+
+    def on(self, fitter: Fitter) -> "WithSlip":
+        """Return the same on other rows."""
+        return WithSlip(fitter, self.width)
+
+    def priors(self, names: Sequence[str]) -> Mapping[int, Prior]:
+        """Return the priors of all that is free, those of the curve last."""
+        own = Prior("normal", 0.0, self.width * self.problem.scales["fluidity"])
+        return {**self.problem.priors(names), **dict.fromkeys(self._at, own)}
+
+    def curve(self, fit: Fit) -> tuple[Variable, list[np.ndarray], str | None]:
+        """Return the function, its grid, values and half band, and its closed form."""
+        assert fit.covariance is not None
+        grid = np.linspace(0.0, float(np.max(np.abs(fit.predicted))), _POINTS)
+        basis = SLIP_CURVE.basis(grid, self.problem.scales["stress"])
+        at = [fit.free.index(position) for position in self._at]
+        half = _half_band(basis, fit.covariance[np.ix_(at, at)])
+        variable = Variable("slip", "stress", "Pa", None, float(grid[-1]))
+        return variable, [grid, basis @ fit.theta[self._at], half], None
+
+
+def _half_band(basis: Float[np.ndarray, "n k"], covariance: Float[np.ndarray, "k k"]):
+    """Return half of the 95 % band of a sum of columns."""
+    spread = basis @ np.linalg.cholesky(covariance)
+    return HALF_BAND * np.sqrt(np.sum(spread**2, axis=1))
+
+
+Tried = Sequence[tuple[WithFunction | WithSlip, list[Fit]]]
+"""Hypotheses to be fitted with a function, by what fits them."""
 
 
 @in_one_thread
@@ -193,37 +220,52 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
 
     They are tried beside hypotheses of few effects: a larger one may have taken up what they are.
     """
-    search = posterior.search
-    left, fits = posterior.left, list(search.found.values())
-    if left is None:
+    search, problem, left = posterior.search, posterior.problem, posterior.left
+    rows = search.fitter.rows
+    if left is None or not all(
+        r.protocol.control == "rate" and r.flow == "shear" for r in rows.runs
+    ):
         return []
-    usable = [f for f in fits if f.covariance is not None and not f.at_an_end]
-    usable.sort(key=lambda fit: -fit.log_likelihood)
-    sizes = range(_LARGEST_BASE + 1)
-    bases = [f for size in sizes for f in [f for f in usable if len(f.names) == size][:_BASES]]
+    fits = [f for f in search.found.values() if f.covariance is not None and not f.at_an_end]
+    fits.sort(key=lambda fit: -fit.log_likelihood)
+    bases = [
+        [fit for fit in fits if len(fit.names) == size][:_BASES]
+        for size in range(_LARGEST_BASE + 1)
+    ]
     whole, _, discrepancies = posterior.memory["whole"]
     other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
-    prior, found = posterior.problem.log_odds_of(TERM_ODDS), []
-    everywhere = {one.slot: one for one in _variables(whole.fitter)}
-    for variable in _variables(search.fitter):
+    prior, found = problem.log_odds_of(TERM_ODDS), []
+    tried: list[Tried] = [_starts(search.fitter, [*chain(*bases)], one) for one in variables(rows)]
+    tried.append(_slipping(search.fitter, bases))
+    for one in tried:
         fitted = [
-            (fit.log_evidence + posterior.problem.log_prior(fit.names) + prior, fitter, fit)
-            for fitter, starts in _starts(search.fitter, bases, variable)
-            for fit in fitter.fit(starts)
+            (fit.log_evidence + problem.log_prior(fit.names) + prior, fitter, fit)
+            for fitter, starts in one
+            for fit in fitter.fit(starts, wanted=1)
         ]
         if not fitted:
             continue
         rank, fitter, fit = max(fitted, key=lambda one: one[0])
         if rank - other < _WORTH_IT:
             continue
-        odds = -np.inf  # where runs held out have no such variable
-        if variable.slot in everywhere:
-            again = WithFunction(whole.fitter, everywhere[variable.slot], fitter.width)
+        odds, again = -np.inf, fitter.on(whole.fitter)
+        if again is not None:
             (refit,) = again.fit([again.start(fit.names, fit.theta)])
             odds = refit.log_evidence - fit.log_evidence + rank - in_all
         if max(rank - other, odds) > _POSSIBLE:
-            found.append(_described(fitter, fit, float(rank - other), float(odds)))
+            variable, (grid, value, half), nearest = fitter.curve(fit)
+            own = variable, fit.names, float(rank - other), float(odds)
+            found.append(FreeFunction(*own, grid, value, value - half, value + half, nearest))
     return sorted(found, key=lambda one: -one.log_odds)
+
+
+def _slipping(fitter: Fitter, bases: Sequence[Sequence[Fit]]) -> Tried:
+    """Return hypotheses with slip, by its width."""
+    some = [fit for of_size in bases for fit in of_size[:_SLIPPING]]
+    return [
+        (own, [own.start(fit.names, fit.theta, fit.linear) for fit in some])
+        for own in (WithSlip(fitter, width) for width in _SLIPS)
+    ]
 
 
 def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
@@ -232,36 +274,7 @@ def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
     return max(*beside, *(search.rank(fit) for fit in search.alive()[:1]))
 
 
-def _variables(fitter: Fitter) -> Iterator[Variable]:
-    rows, runs = fitter.rows, fitter.rows.runs
-    if any(run.protocol.control != "rate" or run.flow != "shear" for run in runs):
-        return
-
-    def of(slot: str, name: str, unit: str, values, is_factor: bool = False) -> Variable:
-        return Variable(slot, name, unit, values, float(np.max(np.abs(values))), is_factor)
-
-    largest = float(np.max(np.abs(rows.recorded)))
-    yield Variable("recorded_stress", "stress", "Pa", None, largest)
-    rates, times, strains = (
-        np.concatenate([one(run) for run in runs])
-        for one in (lambda r: np.asarray(r.rate), lambda r: np.asarray(r.time), _strain)
-    )
-    if len(np.unique(np.abs(rates))) > _KNOTS:
-        yield of("rate", "shear rate", "1/s", rates)
-    yield of("drift", "time", "s", times)
-    yield of("network", "strain", "", strains, True)
-
-
-def _strain(run: Run) -> Float[np.ndarray, " n"]:
-    """Return the strain at each sample, from rest."""
-    time, rate = np.asarray(run.time), np.asarray(run.rate)
-    steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(time)
-    return rate[0] * time[0] + np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def _starts(
-    fitter: Fitter, bases: Sequence[Fit], variable: Variable
-) -> list[tuple[WithFunction, list[Fit]]]:
+def _starts(fitter: Fitter, bases: Sequence[Fit], variable: Variable) -> Tried:
     """Return the most promising hypotheses with a function, scored to first order, by its width."""
     scored = []
     for width in _WIDTHS:
@@ -272,7 +285,7 @@ def _starts(
             columns = np.column_stack(
                 [fit.jacobian, variable.columns(fit.predicted, fitter.rows.size)]
             )
-            record, k = fitter.record(fit), _KNOTS
+            record, k = fitter.record(fit), KNOTS
             both = np.column_stack([columns, fitter.rows.recorded - record])
             white = fitter.noise.whitened(both, record, fit.noise)
             curvature = white[:, :-1].T @ white[:, :-1]
@@ -298,38 +311,12 @@ def _starts(
     return list(chosen.values())
 
 
-def _described(fitter: WithFunction, fit: Fit, odds: float, odds_in_all: float) -> FreeFunction:
-    """Return a function that was fitted, with its band and its closed form."""
-    assert fit.covariance is not None
-    variable, k = fitter.variable, _KNOTS
-    along = fit.predicted if variable.values is None else variable.values
-    low = 0.0 if variable.is_odd else float(np.min(np.abs(along)))
-    grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
-    size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(fitter.rows.size**2)))
-    basis = size * variable.basis(grid)
-    value, spread = basis @ fit.linear[-k:], basis @ np.linalg.cholesky(fit.covariance[-k:, -k:])
-    half = 1.96 * np.sqrt(np.sum(spread**2, axis=1))
-    nearest = _nearest(variable, fit, grid, size)
-    return FreeFunction(
-        variable, fit.names, odds, odds_in_all, grid, value, value - half, value + half, nearest
-    )  # fmt: skip
-
-
-def _forms(slot: str, x: Float[np.ndarray, " n"], inner: float) -> dict[str, np.ndarray]:
-    """Return closed forms of a slot, x and their inner constant over the largest value."""
-    if slot == "recorded_stress":
-        return {"clipped": np.maximum(x - inner, 0.0), "cubic": x**3}
-    if slot == "rate":
-        return {"linear": x, "quadratic": x**2}
-    return {"exponential": -np.expm1(-x / max(inner, 1e-3)), "linear": x}
-
-
 def _nearest(variable: Variable, fit: Fit, grid: np.ndarray, size: float) -> str | None:
     """Return the closed form with the least misfit, if that is usual of the uncertain function.
 
     Where it stands at the knots decides, inside of what was measured, weighed by its covariance.
     """
-    k = _KNOTS
+    k = KNOTS
     x = np.linspace(grid[0], grid[-1], k + 1)[1:]
     basis = size * variable.basis(x)
     assert fit.covariance is not None
@@ -339,7 +326,7 @@ def _nearest(variable: Variable, fit: Fit, grid: np.ndarray, size: float) -> str
     root = np.linalg.inv(np.linalg.cholesky(covariance))
     target, best = root @ basis @ fit.linear[-k:], (np.inf, "")
     for inner in np.linspace(0.02, 1.2, _TRIED):
-        for name, form in _forms(variable.slot, x / variable.largest, inner).items():
+        for name, form in closed_forms(variable.slot, x / variable.largest, inner).items():
             own = root @ form
             square = float(own @ own)
             left = target - own * (own @ target) / square if square else target

@@ -14,6 +14,7 @@ from discover.forward.batches import data_scales
 from discover.forward.declared import LARGEST
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
+from discover.inference.engine.slip import SLIP_CURVE
 from discover.statistics import root_of
 
 _TYPICAL = 0.2
@@ -119,10 +120,11 @@ class Problem:
         self.loading = loading or (0.0 if computed else SCATTER_OF_RUNS)
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
-        effects = [*candidates, *beside]
+        effects = [*candidates, *beside, SLIP_CURVE]
         self.model = AugmentedModel(declared, effects, self.scales)
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
         self.zero, self.moduli = self.model.zero(), self.model.moduli
+        self.zero[self.model.positions(SLIP_CURVE.name)[:-1]] = 0.0
         self._priors = self._known()
         self._widths = self._signatures()
         self._odds = sum(self.odds(effect.name) for effect in candidates)
