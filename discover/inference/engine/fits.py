@@ -1,6 +1,6 @@
 """Likeliest constants of hypotheses, by Gauss-Newton steps of many fits side by side."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -352,6 +352,7 @@ class Fitter:
         rounds: int = 20,
         derivatives: bool = True,
         wanted: int | None = None,
+        known: Iterable[Fit] = (),
     ) -> list[Fit]:
         """Return hypotheses at their likeliest constants; all take their steps side by side.
 
@@ -363,10 +364,11 @@ class Fitter:
             Steps of each at most.
         derivatives
             Whether each ends with derivatives, covariance and evidence.
-        wanted
-            So many of the best matter: one that cannot come near them is given up, without these.
+        wanted, known
+            So many of the best matter, those fitted before among them: one that cannot come near is
+            given up, without these.
         """
-        fits = list(starts)
+        fits, known = list(starts), tuple(known)
         with _running_away():
             self._set(fits, self.predict([fit.theta for fit in fits]))
         active, given_up = [fit for fit in fits if np.isfinite(fit.log_posterior)], set()
@@ -379,7 +381,7 @@ class Fitter:
                 going_on = self._stepped(active)
             if wanted is not None:
                 gains = [fit.log_posterior - one for fit, one in zip(active, before, strict=True)]
-                hopeless = self._hopeless(fits, active, gains, wanted)
+                hopeless = self._hopeless([*known, *fits], active, gains, wanted)
                 going_on = [fit for fit in going_on if id(fit) not in hopeless]
                 given_up |= hopeless
             active = going_on

@@ -59,7 +59,7 @@ class Search:
 
         `wanted`: so many of the best are asked for; what cannot come near them is given up.
         """
-        fits = self.fitter.fit(list(starts), wanted=wanted)
+        fits = self.fitter.fit(list(starts), wanted=wanted, known=self.found.values())
         for fit in fits:
             key = frozenset(fit.names)
             known = self.found.get(key)
@@ -194,7 +194,8 @@ class Search:
                 for start in self.scored(rest)[:_EXCHANGED]:
                     if frozenset(start.names) not in self.found:
                         starts.setdefault(frozenset(start.names), start)
-            self.add(one for start in starts.values() for one in self.at_several_times(start))
+            timed = [one for start in starts.values() for one in self.at_several_times(start)]
+            self.add(timed, wanted=_BEAM)
 
     def backwards(self) -> "Search":
         """Take effects out of the best sets again, and those that a fit put to zero."""
