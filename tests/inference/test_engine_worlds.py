@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from fewer_hypotheses import FEW
 from independent.folders import write_folder
+from independent.instruments import Instrument
 from independent.worlds import MODULUS, TIME, draw_world
 
 import discover as dc
@@ -145,6 +146,36 @@ def test_a_transducer_that_bends_by_three_per_cent_is_weighed_by_the_runs_held_o
     assert (best.variable.slot, best.beside) == ("recorded_stress", ("giesekus_mobility",))
     assert best.log_odds_in_all > best.log_odds  # held-out runs reach further
     assert posterior.with_something_else(best.log_odds_in_all).verdict == "unexplained"
+
+
+def of_instrument(folder, instrument, effects):
+    """Return the posterior of a Giesekus fluid among some effects or all, on an instrument."""
+    runs = replace(draw_world(*GIESEKUS), instrument=instrument).make(np.random.default_rng(1))
+    data = dc.load_dataset(write_folder(folder / "flawed", runs))
+    held = [name for name in data.names if name.startswith("held_")]
+    fitted, held_out, _ = split_runs(data, None, held, None, 400)
+    declared = DeclaredModel.maxwell([MODULUS], [TIME])
+    return explain(Problem(declared, candidates_of(effects), fitted, held_out))
+
+
+@pytest.mark.parametrize("effects", [FEW, pytest.param(None, marks=pytest.mark.slow)])
+def test_slip_that_goes_with_the_square_of_the_stress_is_told_as_a_curve(tmp_path, effects):
+    slip = 0.3 / (MODULUS * TIME) / MODULUS
+    posterior = of_instrument(tmp_path, Instrument(slip=slip, slip_power=2.0), effects)
+    curve = free_functions(posterior)[0]
+    assert (curve.variable.slot, curve.beside) == ("slip", ("giesekus_mobility",))
+    assert curve.is_shown
+    assert curve.nearest == "quadratic"
+    # straight lines between three stresses are off by a tenth of the curve at most
+    assert np.allclose(curve.value, slip * curve.grid**2, atol=0.1 * slip * curve.grid[-1] ** 2)
+
+
+def test_slip_in_proportion_to_the_stress_is_no_curve(tmp_path):
+    instrument = Instrument(slip=0.2 / (MODULUS * TIME))
+    posterior = of_instrument(tmp_path, instrument, ("giesekus_mobility", "wall_slip"))
+    assert posterior.explanations[0].members[0] == ("giesekus_mobility", "wall_slip")
+    # as for any curve that is not there: less than 1 in 20
+    assert all(one.weight < np.log(0.05) for one in free_functions(posterior))
 
 
 @pytest.mark.slow

@@ -131,10 +131,11 @@ class WithFunction(Fitter):
         low = 0.0 if variable.is_odd else float(np.min(np.abs(along)))
         grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
         size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(self.rows.size**2)))
+        sizes, covariance = fit.linear[-k:], fit.covariance[-k:, -k:]
         basis = size * variable.basis(grid)
-        half = _half_band(basis, fit.covariance[-k:, -k:])
-        nearest = _nearest(variable, fit, grid, size)
-        return variable, [grid, basis @ fit.linear[-k:], half], nearest
+        x = np.linspace(grid[0], grid[-1], k + 1)[1:]
+        nearest = _nearest(variable, x, size * variable.basis(x), sizes, covariance)
+        return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
 
     def linear_columns(
         self,
@@ -197,11 +198,15 @@ class WithSlip(Fitter):
         """Return the function, its grid, values and half band, and its closed form."""
         assert fit.covariance is not None
         grid = np.linspace(0.0, float(np.max(np.abs(fit.predicted))), _POINTS)
-        basis = SLIP_CURVE.basis(grid, self.problem.scales["stress"])
-        at = [fit.free.index(position) for position in self._at]
-        half = _half_band(basis, fit.covariance[np.ix_(at, at)])
         variable = Variable("slip", "stress", "Pa", None, float(grid[-1]))
-        return variable, [grid, basis @ fit.theta[self._at], half], None
+        at = [fit.free.index(position) for position in self._at]
+        sizes, covariance = fit.theta[self._at], fit.covariance[np.ix_(at, at)]
+        basis, x = self._basis(grid), np.linspace(0.0, grid[-1], KNOTS + 1)[1:]
+        nearest = _nearest(variable, x, self._basis(x), sizes, covariance)
+        return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
+
+    def _basis(self, stress: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n bends"]:
+        return SLIP_CURVE.basis(stress, self.problem.scales["stress"])
 
 
 def _half_band(basis: Float[np.ndarray, "n k"], covariance: Float[np.ndarray, "k k"]):
@@ -311,24 +316,26 @@ def _starts(fitter: Fitter, bases: Sequence[Fit], variable: Variable) -> Tried:
     return list(chosen.values())
 
 
-def _nearest(variable: Variable, fit: Fit, grid: np.ndarray, size: float) -> str | None:
+def _nearest(
+    variable: Variable,
+    x: Float[np.ndarray, " n"],
+    basis: Float[np.ndarray, "n k"],
+    sizes: Float[np.ndarray, " k"],
+    covariance: Float[np.ndarray, "k k"],
+) -> str | None:
     """Return the closed form with the least misfit, if that is usual of the uncertain function.
 
-    Where it stands at the knots decides, inside of what was measured, weighed by its covariance.
+    Where it stands at some points decides, inside of what was measured, weighed by its covariance.
     """
-    k = KNOTS
-    x = np.linspace(grid[0], grid[-1], k + 1)[1:]
-    basis = size * variable.basis(x)
-    assert fit.covariance is not None
-    covariance = basis @ fit.covariance[-k:, -k:] @ basis.T
+    values, covariance = basis @ sizes, basis @ covariance @ basis.T
     # a bend between two knots is told to a twentieth of the curve
-    covariance += (_RESOLVED * np.max(np.abs(basis @ fit.linear[-k:]))) ** 2 * np.eye(k)
+    covariance += (_RESOLVED * np.max(np.abs(values))) ** 2 * np.eye(len(x))
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    target, best = root @ basis @ fit.linear[-k:], (np.inf, "")
+    target, best = root @ values, (np.inf, "")
     for inner in np.linspace(0.02, 1.2, _TRIED):
         for name, form in closed_forms(variable.slot, x / variable.largest, inner).items():
             own = root @ form
             square = float(own @ own)
             left = target - own * (own @ target) / square if square else target
             best = min(best, (float(left @ left), name))
-    return best[1] if best[0] < chi2.ppf(_USUAL, k - 2) else None
+    return best[1] if best[0] < chi2.ppf(_USUAL, len(x) - 2) else None

@@ -89,6 +89,8 @@ def closed_forms(slot: str, x: Float[np.ndarray, " n"], inner: float) -> dict[st
     """Return closed forms of a slot, x and their inner constant over the largest value."""
     if slot == "recorded_stress":
         return {"clipped": np.maximum(x - inner, 0.0), "cubic": x**3}
+    if slot == "slip":
+        return {"quadratic": x**2, "cubic": x**3}
     if slot == "rate":
         return {"linear": x, "quadratic": x**2}
     return {"exponential": -np.expm1(-x / max(inner, 1e-3)), "linear": x}
