@@ -33,12 +33,13 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     with np.errstate(over="ignore", invalid="ignore"):  # of runs held out it may diverge
         found = problem.model.predictions([fit.theta], rows.batch)[0]
     if held_out:
-        fitter = Fitter(problem, rows)
-        each = 2 + bool(problem.loading)
-        nothing, shared = np.zeros(each * len(rows.runs)), 1 + each * len(problem.fitted.runs)
-        linear = np.concatenate([linear[:1], nothing, linear[shared:]])
-    flat = rows.flat(found[None])[0]
-    found[rows.seen] = flat + fitter.linear_columns(flat, fitter.shifts_at(fit.theta)) @ linear
+        fitted, fitter = fitter.errors.of_runs, Fitter(problem, rows)
+        ahead = np.zeros(len(fitter.errors))
+        ahead[0], ahead[fitter.errors.of_runs.stop :] = linear[0], linear[fitted.stop :]
+        linear = ahead
+    own, flat = fitter.start(fit.names, fit.theta), rows.flat(found[None])
+    own.shifts = fitter.shifts_at(fit.theta)
+    found[rows.seen] = fitter.records(own, flat, linear[None])[0]
     return found
 
 

@@ -31,7 +31,7 @@ def width_of_zeros(off):
     problem = Problem(DeclaredModel.maxwell([1.0], [1.0]), [], start_ups(off))
     fitter = Fitter(problem, problem.fitted)
     (fit,) = fitter.fit([fitter.start((), problem.zero)])
-    return fitter.widths(fit.linear)[1]
+    return fitter.errors.widths(fit.linear)[1]
 
 
 def test_deviations_of_unknown_size_have_the_density_of_student_and_of_a_known_one_of_gauss():

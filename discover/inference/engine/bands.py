@@ -91,20 +91,16 @@ class Predictions:
         assert ahead.jacobian is not None
         own = ahead.jacobian[:, : len(fit.priors)]
         # of what is linear, only the gain and the moduli are those of the fitted runs
-        runs, q = len(self.problem.fitted.runs), len(fit.linear)
-        linear, each = (
-            self.fitter.linear_columns(predicted, ahead.shifts),
-            2 + bool(self.problem.loading),
-        )
-        shared = np.zeros((len(self.rows), q))
+        linear = ahead.jacobian[:, len(fit.priors) :]
+        fitted, alone = self.posterior.search.fitter.errors.of_runs, self.fitter.errors.of_runs
+        shared = np.zeros((len(self.rows), len(fit.linear)))
         shared[:, 0] = linear[:, 0]
-        shared[:, 1 + each * runs :] = linear[:, 1 + each * len(self.rows.runs) :]
-        alone = slice(1, 1 + each * len(self.rows.runs))
+        shared[:, fitted.stop :] = linear[:, alone.stop :]
         # zero, drift and loading of another run are as large as those of the fitted runs
         assert fit.covariance is not None
-        at = slice(1, 1 + each * runs)
-        own_variance = np.diag(fit.covariance)[len(fit.priors) :][at]
-        seen = np.mean((fit.linear[at] ** 2 + own_variance).reshape(each, runs), axis=1)
+        own_variance = np.diag(fit.covariance)[len(fit.priors) :][fitted]
+        each = (fit.linear[fitted] ** 2 + own_variance).reshape(-1, len(self.problem.fitted.runs))
+        seen = np.mean(each, axis=1)
         apart = linear[:, alone] ** 2 @ np.repeat(seen, len(self.rows.runs))
         found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
         fit.memory["jacobian"] = found

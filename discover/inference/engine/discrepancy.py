@@ -143,7 +143,7 @@ class Discrepancy:
         rows = fitter.rows
         self.record = fitter.record(fit)
         stiff = fit.priors.pulls(fit.coordinates)[:, 1]
-        self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.usual_widths])
+        self.widths = np.concatenate([1.0 / np.sqrt(stiff), fitter.errors.usual_widths])
         self.offset = np.concatenate([fit.coordinates - fit.priors.centres, fit.linear])
         self.names, self._steps = self._others()
         unused = self.signatures(fitter, fit.predicted) / rows.size[:, None]
@@ -192,7 +192,7 @@ class Discrepancy:
         And the log of how likely it is that runs differ by that.
         """
         scale, first, log = np.ones(self.columns.shape[1]), len(self.fit.priors), 0.0
-        for at, known in self.fitter.deviations:
+        for at, known in self.fitter.errors.deviations:
             if np.isfinite(known.known):
                 scale[first + at.start : first + at.stop] = scatter
                 log += known.log_odds_of_size(scatter * known.size)

@@ -8,14 +8,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
+from discover.inference.engine.linear_errors import LinearErrors
 from discover.inference.engine.noise import Noise, NoiseModel
-from discover.inference.engine.priors import Deviations, Prior, Priors
-from discover.inference.engine.problem import (
-    SCATTER_KNOWN,
-    SCATTER_OF_RUNS,
-    SOUND_GAIN,
-    Problem,
-)
+from discover.inference.engine.priors import Prior, Priors
+from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
 from discover.statistics import HALF_BAND
 
@@ -37,9 +33,6 @@ _FAR = 40.0
 again that must bring it nearer."""
 
 _ROUNDS_TO_GO = 10
-
-_NEXT_TO_NONE = 1e-9
-"""Width of what there is none of."""
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 
@@ -147,10 +140,7 @@ class Fitter:
         self._priors: dict[tuple[str, ...], Priors] = {}
         self._moduli = self._moved_moduli()
         self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
-        self._own = (rows.run[:, None] == np.arange(len(rows.runs))).astype(float)
-        level = self._own * rows.size[:, None]
-        self._zeros = np.column_stack([level, level * (rows.time - 0.5)[:, None]])
-        self.deviations = self._deviations()
+        self.errors = LinearErrors(problem, rows, self._shifts.shape[1])
 
     def noise_of(self, fit: Fit) -> NoiseModel:
         """Return the likelihood of the rows that a fit sees."""
@@ -158,7 +148,7 @@ class Fitter:
             self._without[fit.without] = NoiseModel(self.rows, fit.without, self.problem.noise)
         return self._without[fit.without]
 
-    # what is linear ---------------------------------------------------------------------------
+    # errors of moduli -------------------------------------------------------------------------
 
     def _moved_moduli(self) -> Float[np.ndarray, "k c"]:
         """Return the moduli, moved by each independent error of theirs, up and down."""
@@ -178,62 +168,6 @@ class Fitter:
         up, down = np.split(found, 2)
         with _running_away():
             return np.nan_to_num((up - down).T / (2.0 * _MOVED))
-
-    def _deviations(self) -> list[tuple[slice, Deviations]]:
-        """Return what is known of what is linear, all about zero, with the place of each."""
-        runs, problem = len(self.rows.runs), self.problem
-        own = Deviations(SCATTER_OF_RUNS, SCATTER_KNOWN)
-        gain, zeros = Deviations(SOUND_GAIN), own
-        if problem.computed:
-            gain = zeros = Deviations(_NEXT_TO_NONE)
-        parts = [(1, gain), (2 * runs, zeros)]
-        if problem.loading:
-            parts.append((runs, Deviations(problem.loading) if problem.loads_anew else own))
-        parts.append((self._shifts.shape[1], Deviations(1.0)))
-        ends = np.cumsum([0, *[count for count, _ in parts]])
-        return [
-            (slice(low, high), one)
-            for low, high, (_, one) in zip(ends, ends[1:], parts, strict=False)
-        ]
-
-    @property
-    def linear_count(self) -> int:
-        """How much is linear in the records."""
-        return int(self.deviations[-1][0].stop)
-
-    @property
-    def usual_widths(self) -> Float[np.ndarray, " q"]:
-        """Standard deviations of what is linear, as they usually are."""
-        counts = [at.stop - at.start for at, _ in self.deviations]
-        return np.repeat([known.size for _, known in self.deviations], counts)
-
-    def widths(self, linear: Float[np.ndarray, " q"], least: Any = 0.0) -> Float[Any, "*least q"]:
-        """Return the standard deviations of what is linear, as far as it tells of them itself.
-
-        `least`: times the usual size, for what does not tell yet; one or several.
-        """
-        found = np.empty((len(linear), *np.shape(least)))
-        for at, known in self.deviations:
-            found[at] = known.width(linear[at], least)
-        return found.T
-
-    def linear_columns(
-        self,
-        predicted: Float[np.ndarray, " rows"],
-        shifts: Float[np.ndarray, "rows k"] | None = None,
-    ) -> Float[np.ndarray, "rows q"]:
-        """Return what one of each does to the records, in Pa.
-
-        Parameters
-        ----------
-        predicted
-            Records as the model alone predicts them.
-        shifts
-            What errors of the moduli do to these; by default nothing.
-        """
-        shifts = self._shifts if shifts is None else shifts
-        loadings = self._own * predicted[:, None] if self.problem.loading else self._own[:, :0]
-        return np.column_stack([predicted, self._zeros, loadings, shifts])
 
     # predictions ------------------------------------------------------------------------------
 
@@ -266,7 +200,7 @@ class Fitter:
         absent = np.setdiff1d(np.arange(len(theta)), priors.positions)
         theta[absent] = self.problem.zero[absent]
         theta[priors.positions] = np.clip(theta[priors.positions], *priors.range.T)
-        linear = np.zeros(self.linear_count) if linear is None else linear
+        linear = np.zeros(len(self.errors)) if linear is None else linear
         nothing = np.full(len(self.rows), np.nan)
         empty = Noise(np.ones(len(self.rows.runs)), 1.0, 0.0, 0.0)
         return Fit(tuple(sorted(names)), theta, linear, priors, nothing, -np.inf, -np.inf, empty)
@@ -296,7 +230,7 @@ class Fitter:
     def _log_prior(self, fit: Fit, theta: np.ndarray, linear: np.ndarray) -> Any:
         """Return the log density of constants before the data, and of what is linear."""
         known = fit.priors.log_density(fit.priors.coordinates(theta))
-        return known + sum(one.log_density(linear[..., at]) for at, one in self.deviations)
+        return known + self.errors.log_density(linear)
 
     def _steps(self, fit: Fit) -> Float[np.ndarray, " free"]:
         """Return by how much each coordinate is moved for a derivative, away from an upper end."""
@@ -310,15 +244,12 @@ class Fitter:
     def _set_jacobian(self, fit: Fit) -> None:
         """Set the derivatives of the records, of those of the predictions."""
         assert fit.slopes is not None
-        linear = self.linear_columns(fit.predicted, fit.shifts)
-        fit.jacobian = np.column_stack([fit.slopes * self.gain(fit)[:, None], linear])
+        gain = self.errors.gain(fit.predicted, fit.linear)
+        linear = self.errors.columns(fit.predicted, self._shifts_in(fit))
+        fit.jacobian = np.column_stack([fit.slopes * gain[:, None], linear])
 
-    def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
-        """Return by how much a record changes with the stress of the fluid."""
-        gain = np.full(len(self.rows), 1.0 + fit.linear[0])
-        if self.problem.loading:
-            gain += fit.linear[1 + 2 * len(self.rows.runs) :][self.rows.run]
-        return gain
+    def _shifts_in(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
+        return self._shifts if fit.shifts is None else fit.shifts
 
     def record(self, fit: Fit) -> Float[np.ndarray, " rows"]:
         """Return the records as predicted, with what is linear."""
@@ -331,13 +262,7 @@ class Fitter:
         linear: Float[np.ndarray, "trials q"],
     ) -> Float[np.ndarray, "trials rows"]:
         """Return the records of trials of a fit, as the model predicts them and what is linear."""
-        runs = len(self.rows.runs)
-        gain, zeros, rest = linear[:, :1], linear[:, 1 : 1 + 2 * runs], linear[:, 1 + 2 * runs :]
-        shifts = self._shifts if fit.shifts is None else fit.shifts
-        if self.problem.loading:
-            gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
-        found = predicted * (1.0 + gain) + zeros @ self._zeros.T
-        return found + rest[:, : shifts.shape[1]] @ shifts.T if shifts.shape[1] else found
+        return self.errors.recorded(predicted, linear, self._shifts_in(fit))
 
     def misfit(self, fit: Fit) -> float:
         """Return the root mean square of what a fit leaves, over the size of each record."""
@@ -445,7 +370,7 @@ class Fitter:
         gradient[:n] += own[:, 0]
         curvature[np.arange(n), np.arange(n)] += own[:, 1]
         at = np.arange(n, len(gradient))
-        widths = self.widths(fit.linear)
+        widths = self.errors.widths(fit.linear)
         gradient[n:] -= fit.linear / widths**2
         curvature[at, at] += 1.0 / widths**2
         return gradient, curvature
@@ -458,7 +383,7 @@ class Fitter:
         stays = ((now <= ends[:, 0]) & (slope < 0)) | ((now >= ends[:, 1]) & (slope > 0))
         at = np.flatnonzero(np.append(~stays, np.ones(len(gradient) - n, bool)))
         multiples, least = np.array(_TRIALS).T
-        widths = self.widths(fit.linear, least)  # the first as they are
+        widths = self.errors.widths(fit.linear, least)  # the first as they are
         known = np.zeros((len(_TRIALS), len(gradient)))
         known[:, n:] = 1.0 / widths**2 - 1.0 / widths[0] ** 2
         place = np.append(np.zeros(n), fit.linear)
@@ -512,7 +437,7 @@ class Fitter:
         _, curvature = self._normal_equations(fit)
         pulls = fit.priors.pulls(fit.coordinates)
         # over the widths of the priors no eigenvalue is less than one, however alike columns are
-        scale = np.append(1.0 / np.sqrt(pulls[:, 1]), self.widths(fit.linear))
+        scale = np.append(1.0 / np.sqrt(pulls[:, 1]), self.errors.widths(fit.linear))
         factor = np.linalg.cholesky(scale[:, None] * curvature * scale)
         root = scale[:, None] * solve_triangular(factor, np.eye(len(scale)), lower=True).T
         fit.root, fit.covariance = root, root @ root.T

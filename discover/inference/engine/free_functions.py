@@ -17,6 +17,7 @@ from scipy.stats import chi2
 
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fit, Fitter
+from discover.inference.engine.linear_errors import LinearErrors
 from discover.inference.engine.posterior import Posterior
 from discover.inference.engine.priors import Deviations, Prior
 from discover.inference.engine.problem import TERM_ODDS
@@ -99,6 +100,37 @@ class FreeFunction:
         return max(self.log_odds, self.log_odds_in_all)
 
 
+class _WithColumns(LinearErrors):
+    """Linear errors of a bench and a function of one variable, the function last."""
+
+    def __init__(self, errors: LinearErrors, variable: Variable, width: float):
+        self.__dict__.update(vars(errors))
+        self.variable, first = variable, len(errors)
+        self.deviations = [*errors.deviations, (slice(first, first + KNOTS), Deviations(width))]
+
+    def columns(self, predicted, shifts):
+        """Return what one of each does to the records, in Pa."""
+        own = self.variable.columns(predicted, self.rows.size)
+        return np.column_stack([super().columns(predicted, shifts), own])
+
+    def recorded(self, predicted, sizes, shifts):
+        """Return records of trials, of what the model predicts of each."""
+        own = [
+            self.variable.columns(one, self.rows.size) @ values[-KNOTS:]
+            for one, values in zip(predicted, sizes, strict=True)
+        ]
+        return super().recorded(predicted, sizes, shifts) + own
+
+    def gain(self, predicted, sizes):
+        """Return by how much a record changes with the stress of the fluid."""
+        gain, own, step = super().gain(predicted, sizes), sizes[-KNOTS:], 1e-6
+        if self.variable.values is None or self.variable.is_factor:
+            moved = self.variable.columns(predicted * (1.0 + step), self.rows.size)
+            change = (moved - self.variable.columns(predicted, self.rows.size)) @ own
+            gain = gain + change / np.where(predicted == 0.0, np.inf, step * predicted)
+        return gain
+
+
 class WithFunction(Fitter):
     """Fits of hypotheses with a function of one variable beside them.
 
@@ -113,8 +145,7 @@ class WithFunction(Fitter):
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
         self.__dict__.update(vars(fitter))
         self.variable, self.width = variable, width
-        first = fitter.linear_count
-        self.deviations = [*fitter.deviations, (slice(first, first + KNOTS), Deviations(width))]
+        self.errors = _WithColumns(fitter.errors, variable, width)
 
     def on(self, fitter: Fitter) -> "WithFunction | None":
         """Return the same on other rows; None where these have no such variable."""
@@ -132,41 +163,9 @@ class WithFunction(Fitter):
         grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
         size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(self.rows.size**2)))
         sizes, covariance = fit.linear[-k:], fit.covariance[-k:, -k:]
-        basis = size * variable.basis(grid)
-        x = np.linspace(grid[0], grid[-1], k + 1)[1:]
+        basis, x = size * variable.basis(grid), np.linspace(grid[0], grid[-1], k + 1)[1:]
         nearest = _nearest(variable, x, size * variable.basis(x), sizes, covariance)
         return variable, [grid, basis @ sizes, _half_band(basis, covariance)], nearest
-
-    def linear_columns(
-        self,
-        predicted: Float[np.ndarray, " rows"],
-        shifts: Float[np.ndarray, "rows k"] | None = None,
-    ) -> Float[np.ndarray, "rows q"]:
-        """Return what one of each does to the records, in Pa; the function last."""
-        own = self.variable.columns(predicted, self.rows.size)
-        return np.column_stack([super().linear_columns(predicted, shifts), own])
-
-    def records(
-        self,
-        fit: Fit,
-        predicted: Float[np.ndarray, "trials rows"],
-        linear: Float[np.ndarray, "trials q"],
-    ) -> Float[np.ndarray, "trials rows"]:
-        """Return the records of trials of a fit; the function last."""
-        own = [
-            self.variable.columns(one, self.rows.size) @ values[-KNOTS:]
-            for one, values in zip(predicted, linear, strict=True)
-        ]
-        return super().records(fit, predicted, linear) + own
-
-    def gain(self, fit: Fit) -> Float[np.ndarray, " rows"]:
-        """Return by how much a record changes with the stress of the fluid."""
-        gain, own, step = super().gain(fit), fit.linear[-KNOTS:], 1e-6
-        if self.variable.values is None or self.variable.is_factor:
-            moved = self.variable.columns(fit.predicted * (1.0 + step), self.rows.size)
-            change = (moved - self.variable.columns(fit.predicted, self.rows.size)) @ own
-            gain = gain + change / np.where(fit.predicted == 0.0, np.inf, step * fit.predicted)
-        return gain
 
 
 class WithSlip(Fitter):

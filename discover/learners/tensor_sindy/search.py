@@ -149,7 +149,7 @@ class LinearModel:
         columns = np.where(np.all(np.isfinite(columns), axis=0), columns, 0.0)
         record = fitter.record(fit)
         target = fitter.rows.recorded - record + columns @ fit.theta[at]
-        widths = np.concatenate([fit.priors.widths, fitter.widths(fit.linear)])
+        widths = np.concatenate([fit.priors.widths, fitter.errors.widths(fit.linear)])
         amplitudes = set(at)
         other = [
             i
