@@ -142,6 +142,7 @@ _MOST_NAMED = 8
 _WHAT = {
     "recorded_stress": "a function of the recorded stress alone",
     "drift": "a function of the time alone",
+    "response": "a transducer that answers late, by a function of the lag alone",
     "rate": "a function of the shear rate alone",
     "network": "a factor that depends on the strain alone",
     "position": "a function of the tool's position alone",

@@ -170,6 +170,27 @@ def test_slip_that_goes_with_the_square_of_the_stress_is_told_as_a_curve(tmp_pat
     assert np.allclose(curve.value, slip * curve.grid**2, atol=0.1 * slip * curve.grid[-1] ** 2)
 
 
+def test_a_transducer_that_rings_is_told_by_its_response(tmp_path):
+    frequency, damping = 9.0, 0.2
+    instrument = Instrument(resonance=frequency, damping=damping)
+    posterior = of_instrument(tmp_path, instrument, FEW)
+    curve = free_functions(posterior)[0]
+    assert (curve.variable.slot, curve.beside) == ("response", ("giesekus_mobility",))
+    assert curve.is_shown
+    # of a resonator: ω² e^(-ζωs) sin(ω's)/ω', which a prior of decaying weights follows to a fifth
+    damped = frequency * np.sqrt(1.0 - damping**2)
+    exact = frequency**2 / damped * np.exp(-damping * frequency * curve.grid)
+    exact *= np.sin(damped * curve.grid)
+    assert np.sqrt(np.mean((curve.value - exact) ** 2)) < 0.2 * np.max(exact)
+
+
+def test_a_transducer_that_lags_is_named_and_no_curve(tmp_path):
+    candidates = ("giesekus_mobility", "transducer_lag")
+    posterior = of_instrument(tmp_path, Instrument(lag=0.1), candidates)
+    assert posterior.explanations[0].members[0] == candidates
+    assert all(one.weight < np.log(0.05) for one in free_functions(posterior))
+
+
 def test_slip_in_proportion_to_the_stress_is_no_curve(tmp_path):
     instrument = Instrument(slip=0.2 / (MODULUS * TIME))
     posterior = of_instrument(tmp_path, instrument, ("giesekus_mobility", "wall_slip"))

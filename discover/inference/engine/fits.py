@@ -244,9 +244,9 @@ class Fitter:
     def _set_jacobian(self, fit: Fit) -> None:
         """Set the derivatives of the records, of those of the predictions."""
         assert fit.slopes is not None
-        gain = self.errors.gain(fit.predicted, fit.linear)
+        slopes = self.errors.through(fit.slopes, fit.predicted, fit.linear)
         linear = self.errors.columns(fit.predicted, self._shifts_in(fit))
-        fit.jacobian = np.column_stack([fit.slopes * gain[:, None], linear])
+        fit.jacobian = np.column_stack([slopes, linear])
 
     def _shifts_in(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
         return self._shifts if fit.shifts is None else fit.shifts

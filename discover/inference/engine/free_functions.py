@@ -39,6 +39,9 @@ _BASES = 12
 
 _LARGEST_BASE = 2
 _REFITTED = 4
+_BEHIND = 10.0
+"""Log odds behind the likeliest to first order from which on a hypothesis is not fitted."""
+
 _SLIPPING = 4
 """Hypotheses of each size beside which slip is fitted."""
 
@@ -121,14 +124,10 @@ class _WithColumns(LinearErrors):
         ]
         return super().recorded(predicted, sizes, shifts) + own
 
-    def gain(self, predicted, sizes):
-        """Return by how much a record changes with the stress of the fluid."""
-        gain, own, step = super().gain(predicted, sizes), sizes[-KNOTS:], 1e-6
-        if self.variable.values is None or self.variable.is_factor:
-            moved = self.variable.columns(predicted * (1.0 + step), self.rows.size)
-            change = (moved - self.variable.columns(predicted, self.rows.size)) @ own
-            gain = gain + change / np.where(predicted == 0.0, np.inf, step * predicted)
-        return gain
+    def through(self, slopes, predicted, sizes):
+        """Return derivatives of the records, of those of what the model predicts."""
+        own = self.variable.change(slopes, predicted, self.rows.size, sizes[-KNOTS:])
+        return super().through(slopes, predicted, sizes) + own
 
 
 class WithFunction(Fitter):
@@ -158,9 +157,7 @@ class WithFunction(Fitter):
         """Return the function, its grid, values and half band, and its closed form."""
         assert fit.covariance is not None
         variable, k = self.variable, KNOTS
-        along = fit.predicted if variable.values is None else variable.values
-        low = 0.0 if variable.is_odd else float(np.min(np.abs(along)))
-        grid = np.linspace(low, float(np.max(np.abs(along))), _POINTS)
+        grid = variable.grid(fit.predicted, _POINTS)
         size = 1.0 if variable.is_factor else float(np.sqrt(np.mean(self.rows.size**2)))
         sizes, covariance = fit.linear[-k:], fit.covariance[-k:, -k:]
         basis, x = size * variable.basis(grid), np.linspace(grid[0], grid[-1], k + 1)[1:]
@@ -280,39 +277,48 @@ def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
 
 def _starts(fitter: Fitter, bases: Sequence[Fit], variable: Variable) -> Tried:
     """Return the most promising hypotheses with a function, scored to first order, by its width."""
-    scored = []
-    for width in _WIDTHS:
-        own = WithFunction(fitter, variable, width)
-        for fit in bases:
-            assert fit.jacobian is not None
-            assert fit.covariance is not None
-            columns = np.column_stack(
-                [fit.jacobian, variable.columns(fit.predicted, fitter.rows.size)]
-            )
-            record, k = fitter.record(fit), KNOTS
-            both = np.column_stack([columns, fitter.rows.recorded - record])
-            white = fitter.noise.whitened(both, record, fit.noise)
-            curvature = white[:, :-1].T @ white[:, :-1]
-            curvature[:-k, :-k] = np.linalg.inv(fit.covariance)
-            at = np.arange(len(curvature) - k, len(curvature))
-            curvature[at, at] += 1.0 / width**2
-            slope = white[:, :-1].T @ white[:, -1]
-            slope[:-k] = 0.0  # at the maximum of the posterior without the function
-            step = np.linalg.solve(curvature, slope)
-            left = fitter.rows.recorded - record - columns @ step
-            value, _ = fitter.noise.log_likelihood(left, record + columns @ step)
-            inner = np.linalg.inv(np.linalg.inv(curvature)[-k:, -k:].T)
-            value -= 0.5 * np.linalg.slogdet(inner * width**2)[1]
-            value += fitter.problem.log_prior(fit.names) - 0.5 * float(
-                np.sum((step[-k:] / width) ** 2)
-            )
-            linear = np.append(fit.linear, step[-k:])
-            scored.append((value, width, own, own.start(fit.names, fit.theta, linear)))
+    scored, own = [], {width: WithFunction(fitter, variable, width) for width in _WIDTHS}
+    for fit in bases:
+        values, steps = _first_order(fitter, fit, variable)
+        for width, value, step in zip(_WIDTHS, values, steps, strict=True):
+            start = own[width].start(fit.names, fit.theta, np.append(fit.linear, step))
+            scored.append((float(value), width, start))
     scored.sort(key=lambda one: -one[0])
-    chosen: dict[float, tuple[WithFunction, list[Fit]]] = {}
-    for _, width, own, start in scored[: 2 * _REFITTED]:
-        chosen.setdefault(width, (own, []))[1].append(start)
-    return list(chosen.values())
+    chosen: dict[float, list[Fit]] = {}
+    for value, width, start in scored[:_REFITTED]:
+        if value > scored[0][0] - _BEHIND:
+            chosen.setdefault(width, []).append(start)
+    return [(own[width], starts) for width, starts in chosen.items()]
+
+
+def _first_order(
+    fitter: Fitter, fit: Fit, variable: Variable
+) -> tuple[Float[np.ndarray, " widths"], Float[np.ndarray, "widths k"]]:
+    """Return log evidence times prior of a hypothesis with a function of each width, and its sizes.
+
+    By one step from where the hypothesis ended without the function.
+    """
+    assert fit.jacobian is not None
+    assert fit.covariance is not None
+    columns = np.column_stack([fit.jacobian, variable.columns(fit.predicted, fitter.rows.size)])
+    record, k, widths = fitter.record(fit), KNOTS, np.array(_WIDTHS)
+    both = np.column_stack([columns, fitter.rows.recorded - record])
+    white = fitter.noise.whitened(both, record, fit.noise)
+    curvature = white[:, :-1].T @ white[:, :-1]
+    curvature[:-k, :-k] = np.linalg.inv(fit.covariance)
+    curvature = np.tile(curvature, (len(widths), 1, 1))
+    at = np.arange(curvature.shape[1] - k, curvature.shape[1])
+    curvature[:, at, at] += 1.0 / widths[:, None] ** 2
+    slope = white[:, :-1].T @ white[:, -1]
+    slope[:-k] = 0.0  # at the maximum of the posterior without the function
+    inverse = np.linalg.inv(curvature)
+    step = inverse @ slope
+    records = record + step @ columns.T
+    values, _ = fitter.noise.log_likelihoods(fitter.rows.recorded - records, records)
+    known = np.linalg.inv(inverse[:, -k:, -k:])
+    values -= 0.5 * np.linalg.slogdet(known * widths[:, None, None] ** 2)[1]
+    values -= 0.5 * np.sum((step[:, -k:] / widths[:, None]) ** 2, axis=1)
+    return values + fitter.problem.log_prior(fit.names), step[:, -k:]
 
 
 def _nearest(

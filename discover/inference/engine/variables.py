@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from discover.dataset import Run
 from discover.inference.engine.rows import Rows
@@ -15,6 +15,12 @@ _EARLY = (0.0, 0.02, 0.05, 0.1, 0.18, 0.3, 0.45, 0.65, 0.85)
 what settles at its beginning."""
 
 KNOTS = len(_LATE)
+
+_LAGS = 32
+"""Samples over which a transducer may respond."""
+
+_DECAY = 0.25
+"""Of these, within which its response decays."""
 
 
 @dataclass(frozen=True)
@@ -52,11 +58,104 @@ class Variable:
         hinges = np.maximum(x[:, None] - np.array(_LATE if self.is_odd else _EARLY), 0.0)
         return hinges * np.sign(values)[:, None] if self.is_odd else hinges
 
+    def grid(self, predicted: Float[np.ndarray, " rows"], points: int) -> Float[np.ndarray, " n"]:
+        """Return values at which to show the function."""
+        along = np.abs(predicted if self.values is None else self.values)
+        low = 0.0 if self.is_odd else float(np.min(along))
+        return np.linspace(low, float(np.max(along)), points)
+
     def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
         """Return what one of each does to the records, in Pa."""
         along = predicted if self.values is None else self.values
         scale = predicted if self.is_factor else np.sqrt(np.mean(size**2))
         return self.basis(along) * np.broadcast_to(scale, predicted.shape)[:, None]
+
+    def change(
+        self,
+        slopes: Float[np.ndarray, "rows m"],
+        predicted: Float[np.ndarray, " rows"],
+        size: Float[np.ndarray, " rows"],
+        sizes: Float[np.ndarray, " knots"],
+    ) -> Float[np.ndarray, "rows m"]:
+        """Return what becomes of derivatives of the stress, behind those of the stress itself."""
+        if self.values is not None and not self.is_factor:
+            return np.zeros_like(slopes)
+        step = 1e-6
+        moved = self.columns(predicted * (1.0 + step), size) - self.columns(predicted, size)
+        change = moved @ sizes / np.where(predicted == 0.0, np.inf, step * predicted)
+        return change[:, None] * slopes
+
+
+@dataclass(frozen=True)
+class Response(Variable):
+    """The response of a transducer: a record holds the stress of some time ago.
+
+    Weights of lags decay with the lag and change smoothly on the way, as those of a stable linear
+    system do   [Chen, Ohlsson & Ljung 2012, Automatica 48, 1525: the TC kernel].
+
+    Attributes
+    ----------
+    before, after
+        At each row and lag: the rows before and after that time in the same run; -1 is at rest.
+    share
+        How far that time lies on the way to the next row.
+    root
+        What one of each coefficient adds to the weight of each lag.
+    """
+
+    before: Int[np.ndarray, "rows lags"] = None  # type: ignore[assignment]  # `of` sets them
+    after: Int[np.ndarray, "rows lags"] = None  # type: ignore[assignment]
+    share: Float[np.ndarray, "rows lags"] = None  # type: ignore[assignment]
+    root: Float[np.ndarray, "lags knots"] = None  # type: ignore[assignment]
+
+    @classmethod
+    def of(cls, rows: Rows) -> "Response":
+        """Return the response over some samples, of runs that begin at rest."""
+        times = [np.asarray(run.time) / run.clock_factor for run in rows.runs]
+        step = float(np.median(np.concatenate([np.diff(own) for own in times])))
+        lags = step * np.arange(1, _LAGS + 1)
+        before, after, share, first = [], [], [], 0
+        for own in times:
+            asked = own[:, None] - lags
+            known = np.append(0.0, own)  # at rest, and at the samples
+            at = np.clip(np.searchsorted(known, asked, "right") - 1, 0, len(own) - 1)
+            share.append(np.clip((asked - known[at]) / (known[at + 1] - known[at]), 0.0, 1.0))
+            before.append(np.where(at > 0, first + at - 1, -1))
+            after.append(first + at)
+            first += len(own)
+        decay = np.exp(-np.maximum.outer(lags, lags) / (_DECAY * lags[-1]))
+        values, directions = np.linalg.eigh(decay)
+        root = (directions * np.sqrt(np.maximum(values, 0.0)))[:, : -KNOTS - 1 : -1]
+        return cls(
+            "response", "time before", "s", None, float(lags[-1]), True,
+            np.concatenate(before), np.concatenate(after), np.concatenate(share), root,
+        )  # fmt: skip
+
+    def basis(self, values: Float[np.ndarray, " n"]) -> Float[np.ndarray, "n knots"]:
+        """Return the weight of lags in s, over a second, of one of each coefficient."""
+        lags = self.largest * np.arange(1, _LAGS + 1) / _LAGS
+        return np.array([np.interp(values, lags, one) for one in self.root.T]).T / lags[0]
+
+    def grid(self, predicted: Float[np.ndarray, " rows"], points: int) -> Float[np.ndarray, " n"]:
+        """Return lags in s."""
+        del predicted
+        return np.linspace(self.largest / _LAGS, self.largest, points)
+
+    def _lagged(self, values: Float[np.ndarray, "rows m"]) -> Float[np.ndarray, "rows lags m"]:
+        """Return values of some time ago, less those of now."""
+        share = self.share[..., None]
+        earlier = np.where(self.before[..., None] < 0, 0.0, values[self.before])
+        return earlier * (1.0 - share) + values[self.after] * share - values[:, None]
+
+    def columns(self, predicted: Float[np.ndarray, " rows"], size: Float[np.ndarray, " rows"]):
+        """Return what one of each does to the records, in Pa."""
+        del size
+        return self._lagged(predicted[:, None])[..., 0] @ self.root
+
+    def change(self, slopes, predicted, size, sizes):
+        """Return what becomes of derivatives of the stress, behind those of the stress itself."""
+        del predicted, size
+        return np.einsum("rlm,l->rm", self._lagged(slopes), self.root @ sizes)
 
 
 def variables(rows: Rows) -> Iterator[Variable]:
@@ -76,6 +175,8 @@ def variables(rows: Rows) -> Iterator[Variable]:
         yield of("rate", "shear rate", "1/s", rates)
     yield of("drift", "time", "s", times)
     yield of("network", "strain", "", strains, True)
+    if all(float(run.protocol.begins) == 0.0 for run in runs):
+        yield Response.of(rows)
 
 
 def _strain(run: Run) -> Float[np.ndarray, " n"]:
@@ -89,6 +190,8 @@ def closed_forms(slot: str, x: Float[np.ndarray, " n"], inner: float) -> dict[st
     """Return closed forms of a slot, x and their inner constant over the largest value."""
     if slot == "recorded_stress":
         return {"clipped": np.maximum(x - inner, 0.0), "cubic": x**3}
+    if slot == "response":
+        return {"exponential": np.exp(-x / max(inner, 1e-3))}
     if slot == "slip":
         return {"quadratic": x**2, "cubic": x**3}
     if slot == "rate":

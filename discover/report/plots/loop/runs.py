@@ -249,6 +249,7 @@ _AXES = {
     "recorded_stress": ("true stress (Pa)", "recorded less true stress (Pa)"),
     "drift": ("time on the instrument's clock (s)", "recorded less true stress (Pa)"),
     "rate": ("shear rate (1/s)", "recorded less true stress (Pa)"),
+    "response": ("lag (s)", "response of the transducer (1/s)"),
     "network": ("strain", "relative change of the stress"),
     "position": ("strain, as the tool stands", "recorded less true stress (Pa)"),
     "gap": ("strain, as the tool stands", "relative change of the stress"),
