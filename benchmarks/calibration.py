@@ -12,9 +12,9 @@ Seeds of 1 to 9 are for development. Seeds that judge are written down before th
 run, and never used to change anything: 20261130; since each set is fitted from larger ones too
 20261208 for ``close-loop``, and 20261206 and 20261209 for ``compare``; since runs tell how far they
 differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves are weighed in all
-runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve, 20261214
-for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one, 20261216 for
-``close-loop``.
+runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve,
+20261214 for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one,
+20261216 for ``close-loop``.
 """
 
 from collections.abc import Callable
