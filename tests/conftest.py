@@ -13,6 +13,14 @@ import jaxtyping
 import pytest
 from threadpoolctl import threadpool_limits
 
+# Where bytecode may not lie beside its source, each of some hundred processes that tests start
+# compiles JAX and all else anew, three quarters of its time.
+if sys.dont_write_bytecode:
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
+    del os.environ["PYTHONDONTWRITEBYTECODE"]
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+
 # OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
 # a worker on each core that takes ten times the work itself. The variable is for processes begun
 # from here, and for SciPy's library; NumPy's is there already, brought by a plugin of pytest.
