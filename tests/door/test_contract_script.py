@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from fewer_hypotheses import few_candidates, verdict_alone
+from fewer_hypotheses import few_candidates, verdict_alone, without_pictures
 from independent_folder import MOBILITY, write_folder
 
 import discover as dc
@@ -44,6 +44,7 @@ def after(request, tmp_path_factory):
         if not request.param:
             network, loop = {"recipe": SMALL}, {"explanations": 1}
             verdict_alone(patch)
+            without_pictures(patch)
         network["progress"], loop["progress"] = heard["network"], heard["loop"]
         patch.setattr(dc, "TensorSINDy", partial(TensorSINDy, progress=heard["sindy"], **quick))
         patch.setattr(dc, "TBNNUDE", partial(TBNNUDE, **network))
@@ -100,6 +101,7 @@ def test_the_comparison_judges_on_what_no_fit_saw(after):
 
 
 def test_pages_are_whole_and_say_that_no_command_made_them(after):
+    # a formula is a picture too; all others: tests/report
     for name, call in (("comparison", "discover.compare(...)"), ("loop", "discover.close_loop(")):
         page = (after["folder"] / f"{name}.html").read_text("utf-8")
         assert page.lstrip().lower().startswith("<!doctype html>")
