@@ -76,7 +76,6 @@ def test_of_a_transducer_with_a_gain_both_find_the_gain(tmp_path):
         compared.undetermined,
         [(x.quantity, x.text) for x in compared.statements],
     )
-    print(compared.posterior.stages, looped.stages)
     gain = parameter(looped, "stress_gain", "gain_error")
     assert overlap(parameter(compared.posterior, "stress_gain", "gain_error").ci95, gain.ci95)
     assert abs(gain.value - (GAIN - 1.0)) < 1.6 * (gain.ci95[1] - gain.value)
