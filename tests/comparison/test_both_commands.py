@@ -71,11 +71,6 @@ def test_of_a_giesekus_fluid_both_find_the_mobility(tmp_path):
 def test_of_a_transducer_with_a_gain_both_find_the_gain(tmp_path):
     compared, looped = asked(tmp_path, Giesekus(MOBILITY, MODULUS), lambda s, g: GAIN * noisy(s, g))
     assert (compared.verdict, looped.verdict) == ("explained", "effects_added")
-    print(
-        [t for t in compared.outcomes["tensor_sindy"].terms],
-        compared.undetermined,
-        [(x.quantity, x.text) for x in compared.statements],
-    )
     gain = parameter(looped, "stress_gain", "gain_error")
     assert overlap(parameter(compared.posterior, "stress_gain", "gain_error").ci95, gain.ci95)
     assert abs(gain.value - (GAIN - 1.0)) < 1.6 * (gain.ci95[1] - gain.value)
