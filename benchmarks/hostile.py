@@ -56,9 +56,9 @@ GROUPS = {name: [n for n in cases if n != "all"] for name, cases in FILE["sets"]
 
 OPERATIONS: dict[type, Callable] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: operator.pow,
-    ast.BitOr: operator.or_, ast.Lt: operator.lt, ast.Gt: operator.gt, ast.NotEq: operator.ne,
-    ast.Eq: operator.eq, ast.In: lambda one, many: one in many,
+    ast.FloorDiv: operator.floordiv, ast.MatMult: operator.matmul, ast.Mod: operator.mod,
+    ast.Pow: operator.pow, ast.BitOr: operator.or_, ast.Lt: operator.lt, ast.Gt: operator.gt,
+    ast.NotEq: operator.ne, ast.Eq: operator.eq, ast.In: lambda one, many: one in many,
 }  # fmt: skip
 
 

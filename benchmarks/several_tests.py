@@ -14,15 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from independent import (
-    FenePeterlin,
-    Giesekus,
-    Modes,
-    PomPom,
-    RateLaw,
-    RoliePoly,
-    Stresses,
-)
+from independent import FenePeterlin, Giesekus, Modes, PomPom, RateLaw, RoliePoly, Stresses
 from independent.material import differences
 from several_records import MATERIALS, MODULUS, NOISE, SOLVENT, TESTS, TIME, Folder, followed
 

@@ -13,6 +13,14 @@ import jaxtyping
 import pytest
 from threadpoolctl import threadpool_limits
 
+# Where bytecode may not lie beside its source, each of some hundred processes that tests start
+# compiles JAX and all else anew, three quarters of its time.
+if sys.dont_write_bytecode:
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
+    del os.environ["PYTHONDONTWRITEBYTECODE"]
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+
 # OpenBLAS lets a thread for each core spin while it waits for the next of many small products: with
 # a worker on each core that takes ten times the work itself. The variable is for processes begun
 # from here, and for SciPy's library; NumPy's is there already, brought by a plugin of pytest.
@@ -66,7 +74,7 @@ def as_users_run_it() -> Iterator[None]:
 # files of a quarter of a minute and more, with slow tests or without, the longest first; what
 # shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
-    "test_measured.py", "test_notebooks.py", "test_commands.py", "test_contract_script.py",
+    "test_notebooks.py", "test_commands.py", "test_contract_script.py",
     "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
     "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
     "test_modulus_errors.py", "test_flows_of_fluids.py",
@@ -146,22 +154,6 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         items[:] = [item for item in items if not item.get_closest_marker("slow")]
     place = {name: i for i, name in enumerate(_LONG)}
     items.sort(key=lambda item: place.get(item.path.name, len(_LONG)))
-
-
-@pytest.fixture(scope="module")
-def optimised():
-    """Optimise the programs of models: these tests call each some thousand times."""
-    from discover.forward import program
-    from discover.programs import compiled
-
-    def slower_to_compile(function, **options):
-        made = compiled(function, **options)
-        made.ask_for(xla_backend_optimization_level=1)
-        return made
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program, "compiled", slower_to_compile)
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Comparisons that try few effects, where what they find is not what is asked."""
+"""Comparisons that try few effects, and pages without pictures, where these are not asked for."""
 
 from collections.abc import Sequence
 
@@ -26,3 +26,16 @@ def verdict_alone(patch: pytest.MonkeyPatch) -> None:
     patch.setattr("discover.loop.from_posterior.spread_of_laws", lambda *_: {})
     patch.setattr("discover.comparison.run_comparison.exact_twins", lambda *_: [])
     patch.setattr("discover.comparison.learning.physics_of", lambda *_: {"checks": []})
+
+
+def without_pictures(patch: pytest.MonkeyPatch) -> None:
+    """Write pages of words alone, but for the picture of constants by mode: drawing takes longer.
+
+    All pictures stand on the pages of `tests/report/test_reports.py` and `test_loop_report.py`.
+    """
+    from discover.report.loop import report
+
+    for name in vars(report):
+        if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
+            patch.setattr(report, name, lambda *_: None)
+    patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))

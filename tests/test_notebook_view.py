@@ -7,11 +7,7 @@ import pytest
 from discover.comparison import LearnerOutcome
 from discover.equations import Box, Equation
 from discover.equations import Tested as WhereTested
-from discover.identify import (
-    Difference,
-    HiddenStresses,
-    Twin,
-)
+from discover.identify import Difference, HiddenStresses, Twin
 from discover.identify.physics import PhysicsCheck, PhysicsReport
 from discover.identify.structure import LawStructure, QuantityVerdict, Structure
 from discover.learners import RecoveredTerm

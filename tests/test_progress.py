@@ -1,9 +1,9 @@
-"""Progress is that of the time a task takes, as far as it is known."""
+"""Progress is that of the time a task takes, as far as it is known; what a stop still does."""
 
 import pytest
 
 from discover.loop.search_time import SearchTime
-from discover.progress import FollowedBy, by_shares, by_time
+from discover.progress import FollowedBy, by_shares, by_time, on_stop, run_stop_callbacks
 
 
 def test_each_part_of_a_task_moves_on_by_its_share():
@@ -81,3 +81,22 @@ def test_rounds_that_leave_a_run_out_each_take_as_long_as_the_first():
             left = search.heard(f"without a: {line}")
             if after:
                 assert left == pytest.approx(53.4 - now, rel=0.2), (begins, line)
+
+
+def test_last_words_are_said_backwards_and_one_that_fails_stops_none():
+    said = []
+
+    def fail():
+        raise OSError("the disk is full")
+
+    with on_stop(lambda: said.append("first")), on_stop(fail), on_stop(lambda: said.append("last")):
+        run_stop_callbacks()
+    assert said == ["last", "first"]
+
+
+def test_what_ended_by_itself_has_no_last_words():
+    said = []
+    with on_stop(lambda: said.append("too late")):
+        pass
+    run_stop_callbacks()
+    assert said == []

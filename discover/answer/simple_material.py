@@ -295,6 +295,10 @@ def _stands_out(law: str, fit: _Fit, runs: Sequence[Run]) -> bool:
     if law == "herschel_bulkley":
         least = min(float(np.min(np.abs(run.stress))) for run in runs)
         return bool(first > _SEEN * least and fit.values[2] < 1.5)
+    if runs[0].protocol.control == "oscillation":
+        # at one frequency any fluid has a storage modulus
+        omega = np.concatenate([run.angular_frequency for run in runs])
+        return bool(np.ptp(omega) > 0.01 * np.max(omega))
     return True
 
 

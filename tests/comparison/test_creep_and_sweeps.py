@@ -1,4 +1,4 @@
-"""Creep, recovery and amplitude sweeps in learners and comparisons: records by scipy."""
+"""Creep, recovery, amplitude sweeps and flow curves in learners and comparisons: by scipy."""
 
 import equinox as eqx
 import jax
@@ -9,12 +9,15 @@ from independent import Giesekus, Modes, PhanThienTanner, start_up
 from independent.sweeps import modulus_of, strain_at
 
 import discover as dc
+from discover.comparison.records import corrected
+from discover.effects import known_effects
 from discover.errors import InputError
 from discover.learners.tbnn_ude.problem import make_problem as make_training_problem
 from discover.learners.tbnn_ude.session import initial_law
 from discover.learners.tbnn_ude.variational import Rebuild, states_and_jacobian
-from discover.protocols import imposed_stress, oscillations
+from discover.protocols import imposed_stress, oscillations, steady_rates
 from discover.report.predictions import comparison_predictions
+from discover.study.data import StudyData
 from tensor_library.library import build_library
 
 MODULUS, TIME, SOLVENT, NOISE = (100.0, 30.0), (0.3, 3.0), 5.0, 0.01
@@ -70,17 +73,21 @@ def sweep(law, strain):
     )  # fmt: skip
 
 
+def base_of(law):
+    return BASE if isinstance(law, Modes) else dc.Fluid(dc.make_law("ucm"), 100.0, 1.0)
+
+
 def start(law, rate):
     times = np.linspace(0.05, 10.0, 40)
-    stress = law.respond(start_up(rate), times).sigma12 + SOLVENT * rate
-    stress = noisy(stress, int(rate))
+    solvent = float(base_of(law).solvent_viscosity)
+    stress = noisy(law.respond(start_up(rate), times).sigma12 + solvent * rate, int(rate))
     return dc.Run(f"at_{rate:g}", times, dc.start_up(rate), np.full(40, rate), stress)
 
 
-def compared(runs, **options):
+def compared(runs, base=BASE, **options):
     data = dc.Dataset("planted", tuple(runs))
     options = {"learners": ["tensor_sindy"], "library": {"degree": 0}, **options}
-    return dc.compare(data, BASE, **options)
+    return dc.compare(data, base, **options)
 
 
 def found_by_sindy(runs, library=LIBRARY):
@@ -168,22 +175,64 @@ def test_an_oscillation_of_the_stress_is_explained_by_the_law_that_made_it():
     assert [term.term for term in found.outcomes["tensor_sindy"].terms] == ["sigma.sigma"]
 
 
+ONE, RATES = Giesekus(0.3, 100.0), np.geomspace(0.1, 20.0, 40)
+
+
+def curve(material):
+    """Where start-ups of a material end, with noise in proportion."""
+    ends = [material.respond(start_up(rate), np.array([0.0, 20.0, 40.0])) for rate in RATES]
+    stress = np.array([end.sigma12[-1] for end in ends])
+    return dc.Run(
+        "flow_curve.csv", np.arange(1.0, 41.0), steady_rates(RATES), RATES,
+        noisy(stress, 0, stress),
+    )  # fmt: skip
+
+
+# the control is a run of another fluid
 @pytest.mark.slow
-@pytest.mark.parametrize("held_out", ["its own", "another's"])
-def test_creep_held_out_judges_what_two_start_ups_give(held_out):
-    own = held_out == "its own"
-    # the control is the creep of another fluid
-    judge = creep(GIESEKUS if own else modes(PhanThienTanner, 0.2), 40.0)
-    found = compared([start(GIESEKUS, 1.0), start(GIESEKUS, 3.0), judge], held_out=[judge.name])
+@pytest.mark.parametrize("own", [True, False])
+@pytest.mark.parametrize(
+    ("law", "other", "quantity", "of"),
+    [
+        (GIESEKUS, modes(PhanThienTanner, 0.2), "strain", lambda law: creep(law, 40.0)),
+        (ONE, PhanThienTanner(0.2, modulus=100.0), "sigma12", curve),
+    ],
+    ids=["creep", "flow curve"],
+)
+def test_a_test_of_another_kind_held_out_judges_what_two_start_ups_give(
+    law, other, quantity, of, own
+):
+    judge = of(law if own else other)
+    found = compared([start(law, 1.0), start(law, 3.0), judge], base_of(law), held_out=[judge.name])
     assert found.verdict == ("explained" if own else "unexplained")
     if own:
         table = comparison_predictions(found)
         lines = table[(table["run"] == judge.name) & (table["source"] == "tensor_sindy")]
-        assert set(lines["quantity"]) == {"strain"}
-        np.testing.assert_allclose(lines["measured"], judge.strain)
+        lines = lines[lines["quantity"] == quantity]
+        np.testing.assert_allclose(lines["measured"], judge.recorded)
         assert (lines["low95"] <= lines["high95"]).all()
 
 
+@pytest.mark.slow
+def test_a_flow_curve_alone_gives_a_law_and_leaves_its_second_normal_stress_open():
+    found = compared([curve(ONE)], base_of(ONE))
+    assert found.verdict == "explained"
+    terms = {term.term: term for term in found.outcomes["tensor_sindy"].terms}
+    low, high = terms["sigma.sigma"].ci95
+    assert low <= 0.3 <= high
+    # N1 follows where the law is in the library; N2 has twins in it that give the same curve
+    assert "N2" in found.undetermined
+    table = comparison_predictions(found)
+    sparse = table[(table["source"] == "tensor_sindy") & (table["quantity"] == "sigma12")]
+    np.testing.assert_allclose(sparse["rate_1_s"], RATES)
+    assert sparse["strain"].isna().all()  # a steady state does not know it
+    # each sample is missed by its noise, over two decades of stress
+    missed = sparse["value"].to_numpy() / sparse["measured"].to_numpy() - 1.0
+    assert np.sqrt(np.mean(missed**2)) == pytest.approx(NOISE, rel=0.3)
+
+
 def test_an_instrument_is_not_taken_out_of_creep():
+    data = dc.Dataset("planted", (creep(GIESEKUS, 40.0),))
+    effects = known_effects({"stress_gain": {"gain_error": 0.1}})
     with pytest.raises(InputError, match=r"takes effects of an instrument \(stress_gain\)"):
-        compared([creep(GIESEKUS, 40.0)], known_effects={"stress_gain": {"gain_error": 0.1}})
+        corrected(StudyData(data, data, data.select([])), effects)

@@ -24,47 +24,64 @@ HEAVY = ("jax", "numpy", "scipy", "sympy", "pandas", "matplotlib", "pydantic", "
 
 
 def python(code, *arguments, **environment):
-    """What a fresh process prints."""
-    kept = {name: value for name, value in os.environ.items() if "COMPILATION_CACHE" not in name}
+    """What a fresh process prints, and what it writes to standard error."""
+    left = ("COMPILATION_CACHE", "TF_CPP", "JAX_PLATFORM")
+    kept = {k: v for k, v in os.environ.items() if not any(name in k for name in left)}
     command = [sys.executable, "-c", code, *arguments]
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=300, env={**kept, **environment}
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout
+    return done.stdout, done.stderr
 
 
-def test_importing_loads_nothing_heavy():
-    code = f"import discover, sys; print([m for m in {HEAVY} if m in sys.modules])"
-    assert python(code).strip() == "[]"
+# equinox reads once, when it is imported, what becomes of an error inside a program, and diffrax
+# imports it
+FIRST_USE = f"""
+import sys, time
+begin = time.process_time()
+import discover as dc
+ours = time.process_time() - begin
+loaded = lambda: [m for m in {HEAVY} if m in sys.modules]
+print(loaded())
+begin = time.process_time()
+import numpy
+print(ours, time.process_time() - begin)
+dc.synthetic_dataset
+print(loaded())
+import equinox
+print(equinox._config.EQX_ON_ERROR)
+import discover.cli, discover.report
+print(*dir(dc))
+"""
+
+
+@pytest.fixture(scope="module")
+def first_use(tmp_path_factory):
+    """Lines that a process prints which imports the door, then uses it; and its cache folder."""
+    folder = tmp_path_factory.mktemp("cache")
+    return python(FIRST_USE, XDG_CACHE_HOME=str(folder))[0].splitlines(), folder
+
+
+def test_importing_loads_nothing_heavy_and_takes_less_time_than_importing_numpy(first_use):
+    (loaded, seconds, *_), _ = first_use
+    assert loaded == "[]"
+    ours, theirs = map(float, seconds.split())
+    assert ours < max(theirs, 0.3)
 
 
 def test_what_is_used_first_loads_what_it_needs_keeps_programs_and_lets_no_error_call_back(
-    tmp_path,
+    first_use,
 ):
-    # the negative control of the test above; equinox reads once, when it is imported, what becomes
-    # of an error inside a program, and diffrax imports it
-    code = f"""
-import sys
-import discover as dc
-dc.synthetic_dataset
-print([m for m in {HEAVY} if m in sys.modules])
-import equinox
-print(equinox._config.EQX_ON_ERROR)
-"""
-    loaded, on_error = python(code, XDG_CACHE_HOME=str(tmp_path)).splitlines()
+    # the negative control of the test above
+    (_, _, loaded, on_error, _), folder = first_use
     assert "jax" in loaded
     assert on_error == "nan"
-    assert (tmp_path / "discover" / "compiled").is_dir()
+    assert (folder / "discover" / "compiled").is_dir()
 
 
-def test_importing_takes_less_time_than_importing_numpy():
-    code = (
-        "import time; a = time.perf_counter(); import discover; b = time.perf_counter(); "
-        "import numpy; print(b - a, time.perf_counter() - b)"
-    )
-    ours, theirs = map(float, min(python(code) for _ in range(3)).split())
-    assert ours < max(theirs, 0.3)
+def test_the_door_lists_public_names_alone_also_where_submodules_are_loaded(first_use):
+    assert first_use[0][-1].split() == sorted([*dc.__all__, "__version__"])
 
 
 def test_everything_named_is_there_and_listed():
@@ -75,11 +92,6 @@ def test_everything_named_is_there_and_listed():
     with pytest.raises(AttributeError, match="no attribute 'gremlins'"):
         dc.gremlins  # noqa: B018
     assert not hasattr(dc, "gremlins")
-
-
-def test_the_door_lists_public_names_alone_also_where_submodules_are_loaded():
-    code = "import discover as dc, discover.cli, discover.report; print(*dir(dc))"
-    assert python(code).split() == sorted([*dc.__all__, "__version__"])
 
 
 def test_type_checkers_see_what_runs():
@@ -100,15 +112,16 @@ def test_type_checkers_see_what_runs():
 
 
 SINGLE = """
-import jax, jax.numpy as jnp
+import sys, jax, jax.numpy as jnp
 first = jnp.ones(3)
+jax.config.update("jax_compilation_cache_dir", sys.argv[1])
 import discover as dc
 try:
     dc.Fluid
 except dc.InputError as error:
     print("refused:", error)
 jax.config.update("jax_enable_x64", True)
-print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype)
+print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
 with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.disable_x64():
     try:
         dc.TensorSINDy().fit([])
@@ -117,39 +130,25 @@ with jax.enable_x64(False) if hasattr(jax, "enable_x64") else jax.experimental.d
 """
 
 
-def test_arrays_of_single_precision_made_before_are_an_error_with_a_way_on():
-    first, dtype, second = python(SINGLE).strip().splitlines()
+def test_arrays_of_single_precision_made_before_are_an_error_and_a_cache_chosen_before_stays(
+    tmp_path,
+):
+    first, taken, second = python(SINGLE, str(tmp_path))[0].strip().splitlines()
     assert "1 array of single precision" in first
     assert "jax.config.update('jax_enable_x64', True)" in first
-    assert dtype == "float64"
+    assert taken.split() == ["float64", str(tmp_path)]
     assert "single precision here" in second
 
 
-def test_the_user_may_start_jax_before_and_choose_another_cache(tmp_path):
-    # negative control of the error: JAX that ran without leaving an array in single precision
-    code = """
-import sys, jax, jax.numpy as jnp
-jnp.ones(3).sum().block_until_ready(); jnp.arange(3)
-jax.config.update("jax_compilation_cache_dir", sys.argv[1])
-import discover as dc
-print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype, jax.config.jax_compilation_cache_dir)
-"""
-    assert python(code, str(tmp_path)).split() == ["float64", str(tmp_path)]
-
-
-def test_python_m_discover_is_the_command():
-    done = subprocess.run(
-        [sys.executable, "-m", "discover", "--help"], capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0
-    assert "discover [OPTIONS] COMMAND" in done.stdout
-    assert "__main__" not in done.stdout
-
-
+# JAX ran before, and left no array in single precision
 FIRST_CALL = """
+import jax, jax.numpy as jnp
+jnp.ones(3).sum().block_until_ready(); jnp.arange(3)
 import discover as dc
-flows = {"a": dc.start_up(1.0), "b": dc.oscillatory_shear(2.0, 1.0)}
-dc.synthetic_dataset("giesekus", {"alpha": 0.2}, flows, noise=0.01, n_samples=31)
+data = dc.synthetic_dataset(
+    "giesekus", {"alpha": 0.2}, {"a": dc.start_up(1.0)}, noise=0.01, n_samples=31
+)
+print(dc.Fluid(dc.make_law("ucm"), 1.0, 1.0).modulus.dtype)
 """
 
 # XLA raises an alarm where it takes more than a second to compute a constant
@@ -164,41 +163,27 @@ jax.jit(constant)().block_until_ready()
 """
 
 
-def errors_of(code, **environment):
-    """What a fresh process without kept programs writes to standard error."""
-    kept = {k: v for k, v in os.environ.items() if not k.startswith(("TF_CPP", "JAX_COMPILATION"))}
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300,
-        env={**kept, "DISCOVER_NO_CACHE": "1", **environment},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stderr
-
-
 def test_a_first_call_and_an_alarm_of_xla_write_nothing_but_for_those_who_ask_for_it():
-    assert errors_of(FIRST_CALL + SLOW) == ""
+    # the negative control of the error above: JAX may be started before
+    assert python(FIRST_CALL + SLOW, DISCOVER_NO_CACHE="1") == ("float64\n", "")
     # negative control: XLA had something to say
-    assert "Constant folding" in errors_of(SLOW, TF_CPP_MIN_LOG_LEVEL="0")
+    loud = python(SLOW, DISCOVER_NO_CACHE="1", TF_CPP_MIN_LOG_LEVEL="0")
+    assert "Constant folding" in loud[1]
 
 
-_SAYS_WHERE = "; ".join(
-    (
-        "import sys",
-        "sys.argv = ['discover', '--version']",
-        "from discover.cli import main",
-        "import atexit",
-        "atexit.register(lambda: print(__import__('os').environ['JAX_PLATFORMS']))",
-        "main()",
-    )
-)
+COMMAND = """
+import atexit, os, runpy, sys
+sys.argv = ["discover", "--help"]
+atexit.register(lambda: print(os.environ["JAX_PLATFORMS"]))
+runpy.run_module("discover", run_name="__main__", alter_sys=True)
+"""
 
 
-def test_a_command_computes_on_the_processor():
-    plain = {k: v for k, v in os.environ.items() if not k.startswith("JAX_PLATFORM")}
-    ran = subprocess.run(
-        [sys.executable, "-c", _SAYS_WHERE], env=plain, capture_output=True, text=True, check=True
-    )
-    assert ran.stdout.split()[-1] == "cpu"
+def test_python_m_discover_is_the_command_and_computes_on_the_processor():
+    said, _ = python(COMMAND)
+    assert "discover [OPTIONS] COMMAND" in said
+    assert "__main__" not in said
+    assert said.split()[-1] == "cpu"
 
 
 @pytest.mark.parametrize("name", ["JAX_PLATFORMS", "JAX_PLATFORM_NAME"])

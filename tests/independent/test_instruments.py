@@ -2,14 +2,7 @@
 
 import numpy as np
 import pytest
-from independent import (
-    KBKZ,
-    Giesekus,
-    UpperConvectedMaxwell,
-    oscillation,
-    start_up,
-    steps,
-)
+from independent import KBKZ, Giesekus, UpperConvectedMaxwell, oscillation, start_up, steps
 from independent.folders import maxwell_sweep, write_folder, write_study, write_table
 from independent.instruments import (
     Instrument,
@@ -17,7 +10,7 @@ from independent.instruments import (
     nothing,
     relaxation_as_run,
     scaled,
-)
+)  # fmt: skip
 from independent.noise import correlated, outliers, proportional, rms, white
 
 from discover.dataset import load_dataset
@@ -25,29 +18,48 @@ from discover.study import read_study
 from discover.study.data import load_study_data
 
 TIMES = np.linspace(0.0, 6.0, 121)
-MAXWELL = UpperConvectedMaxwell(50.0, 1.0)
+MAXWELL, UP = UpperConvectedMaxwell(50.0, 1.0), start_up(2.0)
+TRUE = MAXWELL.respond(UP, TIMES).sigma12
 
 
-def test_a_perfect_instrument_records_the_stress():
-    run = Instrument().record(MAXWELL, start_up(2.0), TIMES)
-    np.testing.assert_array_equal(run.stress, run.true.sigma12)
-    np.testing.assert_array_equal(run.felt_rate, run.rate)
+def decay(time):
+    return np.exp(-TIMES / time)
 
 
-def test_slip_makes_maxwell_relax_faster():
-    # σ' = G(γ̇ − sσ) − σ/λ
-    slip, rate = 0.01, 2.0
-    run = Instrument(slip=slip).record(MAXWELL, start_up(rate), TIMES)
-    relaxing = 1.0 + 50.0 * slip
-    np.testing.assert_allclose(
-        run.stress, 50.0 * rate / relaxing * -np.expm1(-relaxing * TIMES), atol=1e-5
-    )
+@pytest.mark.parametrize(
+    ("faults", "known", "tolerance"),
+    [
+        ({}, TRUE, 0.0),
+        # σ' = G(γ̇ − sσ) − σ/λ
+        ({"slip": 0.01}, 100.0 / 1.5 * (1 - decay(1 / 1.5)), 1e-5),
+        # σ' (1 + G C) = Gγ̇ − σ/λ
+        ({"compliance": 0.004}, 100.0 * (1 - decay(1.2)), 1e-5),
+        ({"lag": 0.3}, 100.0 * (1 - (decay(1.0) - 0.3 * decay(0.3)) / 0.7), 0.01),
+        ({"delay": 0.21}, 100.0 * -np.expm1(-np.maximum(TIMES - 0.21, 0.0)), 0.01),
+        ({"offset": 7.0}, TRUE + 7.0, 1e-9),
+        ({"drift": 0.5}, TRUE + 0.5 * TIMES, 1e-9),
+        ({"drift": 3.0, "settling_time": 2.0}, TRUE + 6.0 * (1 - decay(2.0)), 1e-9),
+        ({"gain": 0.1}, 1.1 * TRUE, 1e-9),
+        ({"limit": 60.0}, np.minimum(TRUE, 60.0), 1e-9),
+        ({"rate_gain": 0.1}, 1.1 * TRUE, 1e-6),
+        ({"fastest": 1.0}, 0.5 * TRUE, 1e-6),
+        ({"dead": True, "offset": 42.0}, np.full(121, 42.0), 0.0),
+    ],
+    ids=lambda value: ", ".join(value) if isinstance(value, dict) else None,
+)
+def test_a_fault_is_in_the_stress_as_it_is_written(faults, known, tolerance):
+    run = Instrument(**faults).record(MAXWELL, UP, TIMES)
+    np.testing.assert_allclose(run.stress, known, rtol=0.0, atol=tolerance)
+    np.testing.assert_array_equal(run.rate, 2.0)  # what was commanded
+    np.testing.assert_array_equal(nothing(run, 0.0).stress, 0.0)
 
 
-def test_compliance_softens_maxwell():
-    # σ' (1 + G C) = Gγ̇ − σ/λ
-    run = Instrument(compliance=0.004).record(MAXWELL, start_up(2.0), TIMES)
-    np.testing.assert_allclose(run.stress, 100.0 * -np.expm1(-TIMES / 1.2), atol=1e-5)
+def test_steps_of_a_reading_and_a_slow_clock_are_as_written():
+    stepped = Instrument(adc_step=3.0).record(MAXWELL, UP, TIMES).stress
+    np.testing.assert_allclose(stepped % 3.0, 0.0, atol=1e-12)
+    assert np.max(np.abs(stepped - TRUE)) <= 1.5
+    slow = Instrument(clock_slip=0.02).record(MAXWELL, UP, TIMES)
+    np.testing.assert_allclose(slow.time, 1.02 * TIMES)
 
 
 def test_inertia_and_friction_follow_the_tool_and_not_the_fluid():
@@ -61,48 +73,27 @@ def test_inertia_and_friction_follow_the_tool_and_not_the_fluid():
 
 
 def test_rise_time_is_the_tools_own_and_inertia_feels_it():
-    run = Instrument(rise_time=0.5, inertia=2.0).record(MAXWELL, start_up(2.0), TIMES)
-    np.testing.assert_allclose(run.tool_rate, 2.0 * -np.expm1(-TIMES / 0.5), atol=1e-7)
-    np.testing.assert_allclose(
-        run.stress - run.true.sigma12, 2.0 * 4.0 * np.exp(-TIMES / 0.5), atol=1e-6
-    )
+    run = Instrument(rise_time=0.5, inertia=2.0).record(MAXWELL, UP, TIMES)
+    np.testing.assert_allclose(run.tool_rate, 2.0 * (1 - decay(0.5)), atol=1e-7)
+    np.testing.assert_allclose(run.stress - run.true.sigma12, 8.0 * decay(0.5), atol=1e-6)
 
 
-def test_lag_and_delay_of_the_transducer_are_exact():
-    run = Instrument(lag=0.3).record(MAXWELL, start_up(2.0), TIMES)
-    known = 100.0 * (1 - (np.exp(-TIMES) - 0.3 * np.exp(-TIMES / 0.3)) / 0.7)
-    np.testing.assert_allclose(run.stress, known, atol=0.01)
-    late = Instrument(delay=0.21).record(MAXWELL, start_up(2.0), TIMES)
-    known = 100.0 * -np.expm1(-np.maximum(TIMES - 0.21, 0.0))
-    np.testing.assert_allclose(late.stress, known, atol=0.01)
+def test_a_ringing_transducer_overshoots_as_a_damped_oscillator():
+    # a Maxwell fluid of very short memory has the stress G λ γ̇ at once: a step of 1 Pa
+    fluid, times = UpperConvectedMaxwell(1e4, 1e-4), np.linspace(0.01, 2.0, 60)
+    ringing = Instrument(resonance=8.0, damping=0.2).record(fluid, start_up(1.0), times)
+    own, fading = 8.0 * np.sqrt(1.0 - 0.2**2), np.exp(-0.2 * 8.0 * times)
+    step = 1.0 - fading * (np.cos(own * times) + 0.2 * 8.0 / own * np.sin(own * times))
+    # the stress takes some 1e-3 s to rise, of a period of 0.8 s
+    np.testing.assert_allclose(ringing.stress, step, atol=1e-2)
+    assert np.max(ringing.stress) > 1.4
 
 
-def test_offset_drift_gain_steps_limits_and_clock_are_as_written():
-    flow = start_up(2.0)
-    true = MAXWELL.respond(flow, TIMES).sigma12
-    record = {
-        name: Instrument(**{name: value}).record(MAXWELL, flow, TIMES)
-        for name, value in {
-            "offset": 7.0, "drift": 0.5, "gain": 0.1, "adc_step": 3.0, "limit": 60.0,
-            "clock_slip": 0.02, "rate_gain": 0.1, "fastest": 1.0,
-        }.items()
-    }  # fmt: skip
-    np.testing.assert_allclose(record["offset"].stress, true + 7.0)
-    np.testing.assert_allclose(record["drift"].stress, true + 0.5 * TIMES)
-    np.testing.assert_allclose(record["gain"].stress, 1.1 * true)
-    np.testing.assert_allclose(record["adc_step"].stress % 3.0, 0.0, atol=1e-12)
-    assert np.max(np.abs(record["adc_step"].stress - true)) <= 1.5
-    np.testing.assert_allclose(record["limit"].stress, np.minimum(true, 60.0))
-    np.testing.assert_allclose(record["clock_slip"].time, 1.02 * TIMES)
-    np.testing.assert_allclose(record["rate_gain"].stress, 1.1 * true, atol=1e-6)
-    np.testing.assert_allclose(record["fastest"].stress, 0.5 * true, atol=1e-6)
-    np.testing.assert_allclose(record["fastest"].rate, 2.0)
-
-
-def test_a_dead_sensor_and_an_absent_fluid_have_nothing_of_the_flow():
-    run = Instrument(dead=True, offset=42.0).record(MAXWELL, start_up(2.0), TIMES)
-    np.testing.assert_array_equal(run.stress, 42.0)
-    np.testing.assert_array_equal(nothing(run, 0.0).stress, 0.0)
+def test_slip_of_a_power_of_the_stress_balances_the_rate_of_the_tool():
+    fluid = UpperConvectedMaxwell(100.0, 0.01)
+    record = Instrument(slip=0.3, slip_power=3.0).record(fluid, start_up(1.3), np.array([0.0, 2.0]))
+    stress = record.stress[-1]  # η = 1 Pa s, so that γ̇_felt = σ
+    assert stress + 0.3 * stress**3 == pytest.approx(1.3, rel=1e-6)
 
 
 def test_slip_of_an_integral_law_is_refused():
@@ -114,10 +105,9 @@ def test_slip_of_an_integral_law_is_refused():
 
 def test_relaxation_and_alternation_are_what_they_are_taken_for_not():
     relaxing = relaxation_as_run(MAXWELL, 0.03, 0.01, TIMES)
-    np.testing.assert_allclose(relaxing.stress, 1.5 * np.exp(-TIMES), rtol=0.01)
+    np.testing.assert_allclose(relaxing.stress, 1.5 * decay(1.0), rtol=0.01)
     np.testing.assert_array_equal(relaxing.strain, 0.03)
-    late = alternation_as_from_rest(MAXWELL, 2.0, 1.5, TIMES)
-    wt = 1.5
+    late, wt = alternation_as_from_rest(MAXWELL, 2.0, 1.5, TIMES), 1.5
     known = 100.0 * (np.cos(wt * TIMES) + wt * np.sin(wt * TIMES)) / (1 + wt**2)
     np.testing.assert_allclose(late.stress, known, atol=1e-4)
     np.testing.assert_allclose(scaled(late, 10.0, 1e3).stress, 10.0 * late.stress)
@@ -141,33 +131,22 @@ def test_noise_has_the_size_and_the_kind_asked_for():
 
 def test_a_folder_and_a_study_written_by_hand_are_read(tmp_path):
     fluid = Giesekus(0.2, 50.0, 1.0)
-    runs = {
-        "a.csv": Instrument().record(fluid, start_up(2.0), TIMES),
-        "b.csv": Instrument().record(fluid, oscillation(2.0, 1.0), TIMES),
-    }
-    folder = write_folder(
-        tmp_path / "data", runs, {"a.csv": {"temperature_C": 20}}, normal_stresses=True
-    )
+    flows = {"a.csv": UP, "b.csv": oscillation(2.0, 1.0)}
+    runs = {name: Instrument().record(fluid, flow, TIMES) for name, flow in flows.items()}
+    cells = {"a.csv": {"temperature_C": 20}}
+    folder = write_folder(tmp_path / "data", runs, cells, normal_stresses=True)
     write_table(folder / "lve.csv", maxwell_sweep([50.0], [1.0], np.geomspace(0.01, 100, 20)))
     dataset = load_dataset(folder)
-    np.testing.assert_allclose(dataset["b.csv"].stress, runs["b.csv"].stress, rtol=1e-8)
-    np.testing.assert_allclose(
-        dataset["b.csv"].second_normal_stress_difference, runs["b.csv"].N2, rtol=1e-8
-    )
+    read, written = dataset["b.csv"], runs["b.csv"]
+    np.testing.assert_allclose(read.stress, written.stress, rtol=1e-8)
+    np.testing.assert_allclose(read.second_normal_stress_difference, written.N2, rtol=1e-8)
     assert dataset.linear_sweep is not None
-    study = read_study(
-        write_study(
-            tmp_path / "study.toml",
-            {
-                "data": {"folder": "data", "held_out": ["b.csv"]},
-                "model": {
-                    "law": "giesekus",
-                    "parameters": {"alpha": 0.2},
-                    "modulus_Pa": 50.0,
-                    "known_relaxation": True,
-                },
-                "loop": {"max_effects": 2, "effects": "named"},
-            },
-        )
-    )
+    model = {"law": "giesekus", "parameters": {"alpha": 0.2}, "modulus_Pa": 50.0,
+             "known_relaxation": True}  # fmt: skip
+    sections = {
+        "data": {"folder": "data", "held_out": ["b.csv"]},
+        "model": model,
+        "loop": {"max_effects": 2, "effects": "named"},
+    }
+    study = read_study(write_study(tmp_path / "study.toml", sections))
     assert load_study_data(study).held_out.names == ("b.csv",)

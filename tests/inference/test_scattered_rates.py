@@ -48,8 +48,7 @@ FEW = ("gammadot", "sigma.sigma", "tr(sigma)*sigma", "sigma.gammadot+gammadot.si
 
 
 @pytest.mark.parametrize(
-    ("seed", "some"),
-    [(0, True), *(pytest.param(n, False, marks=pytest.mark.slow) for n in (0, 1))],
+    ("seed", "some"), [(0, True), *(pytest.param(n, False, marks=pytest.mark.slow) for n in (0, 1))]
 )
 def test_noise_of_the_reading_is_told_from_that_of_the_motor(seed, some, monkeypatch):
     if some:

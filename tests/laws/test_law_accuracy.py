@@ -29,7 +29,7 @@ def test_every_named_law_has_an_independent_material():
 
 @pytest.mark.parametrize("law", OF_STRESS)
 def test_every_law_changes_as_its_independent_material_in_any_flow(law):
-    """That programs follow it in time: below, and `test_against_simulate.py`."""
+    """That programs follow it in time: below, and `tests/simulate/test_solvers.py`."""
     made, its, step = make_law(law, CONSTANTS[law]), material(law, CONSTANTS[law]), 1e-5
     for gradient in (ANY, OF_FOUR):
         along = solve_ivp(

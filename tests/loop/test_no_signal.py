@@ -14,11 +14,7 @@ from discover.report.loop.tables import loop_verdict
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
 TIMES = np.linspace(0.1, 10.0, 100)
 FLOWS = {"slow": start_up(0.4), "fast": start_up(1.5), "wave": oscillatory_shear(1.5, 0.8)}
-RATES = {
-    "slow": np.full(100, 0.4),
-    "fast": np.full(100, 1.5),
-    "wave": 1.5 * np.cos(0.8 * TIMES),
-}
+RATES = {"slow": np.full(100, 0.4), "fast": np.full(100, 1.5), "wave": 1.5 * np.cos(0.8 * TIMES)}
 DECLARED = DeclaredModel.maxwell(100.0, 1.0)
 TO_FIT = replace(DECLARED, fit_modulus=True, fit_relaxation_time=True)
 

@@ -8,6 +8,7 @@ from discover.answer.simple_material import recognise
 from discover.dataset import Dataset, LinearSweep, Run
 from discover.forward import DeclaredModel
 from discover.loop import run_loop
+from discover.protocols import oscillations as oscillations_of
 from discover.protocols import oscillatory_shear, start_up, steady_rates
 
 pytestmark = pytest.mark.usefixtures("without_curves", "verdict_alone")
@@ -73,6 +74,17 @@ def test_a_giesekus_flow_curve_is_no_yield_stress(alpha):
     assert recognise([flow_curve(lambda r: giesekus(r, alpha))]) is None
     fast = np.geomspace(1.0, 1000.0, 25)
     assert recognise([flow_curve(lambda r: giesekus(r, alpha), fast)]) is None
+
+
+def test_moduli_at_one_frequency_are_no_solid():
+    strain, level = np.geomspace(1e-3, 1e-2, 12), np.ones(12)
+    moduli = 30.0 * level, 60.0 * level
+    whole = Run(
+        "amplitudes", np.arange(1.0, 13.0), oscillations_of(strain, 2.0 * level), 2.0 * strain,
+        np.hypot(*moduli) * strain, strain=strain, storage_modulus=moduli[0],
+        loss_modulus=moduli[1],
+    )  # fmt: skip
+    assert recognise(whole.records) is None
 
 
 def test_a_maxwell_fluid_and_a_power_law_are_none_of_them():

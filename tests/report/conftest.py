@@ -1,10 +1,10 @@
 """What the tests of reports share."""
 
 import pytest
+from fewer_hypotheses import without_pictures
 
 
 @pytest.fixture
 def no_pictures(monkeypatch):
-    """Leave pictures of comparisons out where only words are asked for."""
-    module = "discover.report.comparison.report.comparison_pictures"
-    monkeypatch.setattr(module, lambda *_: ([], []))
+    """Leave pictures out where only words are asked for."""
+    without_pictures(monkeypatch)

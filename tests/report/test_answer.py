@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from test_loop_report import few_pictures, loop_result  # noqa: F401
+from test_loop_report import loop_result
 
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.answer.naming import named_law
@@ -89,7 +89,7 @@ def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
     assert render("answer.html").strip() == ""  # a page without an answer
 
 
-def test_a_loop_page_begins_with_its_answer(tmp_path, few_pictures):  # noqa: F811
+def test_a_loop_page_begins_with_its_answer(tmp_path, no_pictures):
     page = write_loop(loop_result(), RunFolder(tmp_path, "x"), "n", "d").read_text("utf-8")
     assert page.index('id="answer"') < page.index('id="verdict"')
 
@@ -172,8 +172,7 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
 
 def test_a_tolerance_names_the_worst_run_and_quantities_besides_stress():
     several = replace(
-        MELT,
-        discrepancy=replace(MELT.discrepancy, by_run={"a": 0.06, "b": 0.09, "c": 0.01}),
+        MELT, discrepancy=replace(MELT.discrepancy, by_run={"a": 0.06, "b": 0.09, "c": 0.01})
     )
     said = tolerance(several)
     assert said == "Tolerance 5 %: not met: 2 runs exceed it (worst: b, 9 %)."

@@ -12,7 +12,6 @@ from discover.effects import make_effect
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stage
 from discover.loop.parts import Explanation, Explanations, Fold
-from discover.report.loop import report
 from discover.report.loop.report import write_loop
 from discover.report.loop.tables import loop_verdict, noise_range
 from discover.report.page import render
@@ -50,14 +49,6 @@ def loop_result(held_out=0.2):
     )  # fmt: skip
 
 
-@pytest.fixture
-def few_pictures(monkeypatch):
-    """Leave pictures out where words are asked for, but that of constants by mode."""
-    for name in vars(report):
-        if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
-            monkeypatch.setattr(report, name, lambda *_: None)
-
-
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     """The folder of a report with all its pictures."""
@@ -87,7 +78,7 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(written):
     assert r"\begin{equation}" in (written / "equations.tex").read_text()
 
 
-def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, few_pictures):
+def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, no_pictures):
     result = replace(
         loop_result(), stages=(), error_before=ErrorPair(0.01, None),
         error_after=ErrorPair(0.01, None), verdict="no_effect_needed", rankings=(),
@@ -98,7 +89,7 @@ def test_a_loop_without_held_out_runs_or_effects_still_reports(tmp_path, few_pic
 
 
 def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(
-    tmp_path, few_pictures
+    tmp_path, no_pictures
 ):
     result = replace(
         loop_result(),
@@ -116,7 +107,7 @@ def test_the_loop_report_shows_runs_held_out_in_turn_and_constants_with_units(
     assert contents["declared_parameters"]["modulus_Pa"]["unit"] == "Pa"
 
 
-def test_the_page_says_which_modes_the_data_leave_open(tmp_path, few_pictures):
+def test_the_page_says_which_modes_the_data_leave_open(tmp_path, no_pictures):
     modes = (ModeConstant(5.0, 0.1, (0.08, 0.12), False), ModeConstant(0.05, 0.6, None, True))
     found = ConstantByMode(0.15, (0.14, 0.16), "", 2.0, 1, (0.0, 12.3), modes)
     stage = Stage(
@@ -230,9 +221,7 @@ def test_many_aliases_are_counted_and_not_recited():
     assert "edge fracture" not in following
 
 
-def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(
-    tmp_path, few_pictures
-):
+def test_errors_stand_with_their_range_over_the_runs_and_every_run_is_listed(tmp_path, no_pictures):
     result = loop_result()
     fitted = result.records[0]
     worse = replace(fitted, name="worse.csv", errors=np.array([0.6, 0.03]))
@@ -318,7 +307,7 @@ def test_noise_has_a_range_over_the_runs_only_where_it_comes_from_these_residual
     assert noise_range(estimated) == pytest.approx([noise, noise])
 
 
-def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path, few_pictures):
+def test_parameters_stand_with_the_symbol_that_the_equation_has(tmp_path, no_pictures):
     result = loop_result()
     (stage,) = result.stages
     known = {"gain_error": StageParameter(0.7, (0.69, 0.71), "")}

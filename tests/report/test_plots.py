@@ -10,7 +10,6 @@ import pytest
 from independent import authors
 from independent.homogeneous import UNIT
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from test_loop_report import few_pictures, loop_result  # noqa: F401
 
 from discover.comparison.flows import Flow
 from discover.dataset import Dataset, Run

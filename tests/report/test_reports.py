@@ -30,10 +30,7 @@ from discover.report.plots.comparison.selection import (
 )
 from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.style import SPARSE, style_sheet
-from discover.report.wording import (
-    percent,
-    selection_sentence,
-)
+from discover.report.wording import percent, selection_sentence
 from discover.study import RunFolder, parse_study
 
 

@@ -25,7 +25,8 @@ def test_numbers_keep_what_tells_them_apart():
     assert significant(-0.5) == "−0.5"
     assert significant(1411.0, 3) == "1410"
     assert significant(1.606e-5) == "1.606 × 10⁻⁵"
-    assert percent_range([0.01, 0.03]) == " (1 to 3 %)"
+    assert percent_range([0.01, 0.05]) == " (1 to 5 %)"
+    assert interval((0.19, 0.21)) == "0.19 to 0.21"
     assert percent_range([0.01]) == percent_range(None) == ""
 
 
