@@ -1,9 +1,7 @@
 """What effects add to the law of every mode, of which only what is in use is computed.
 
-All candidates stand in one program, and most are at zero in any one trial: a fit has a few
-effects, and the terms of the library are tried one at a time. The program therefore branches. What
-decides is a few integers that no run and no mode changes, so that a branch not taken costs nothing;
-an effect at zero amplitude adds nothing, so that leaving it out changes nothing.
+All candidates stand in one program, most at zero amplitude, where they add nothing; it branches by
+a few integers that no run and no mode changes, so that what is not taken costs nothing.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +20,7 @@ from tensor_library.kinematics import rate_of_deformation
 
 
 class LibraryMatrix:
-    """Coefficients of library terms, basis tensors × monomials of the invariants.
-
-    `terms`: terms without a closed form. `positions`: of their coefficients in the parameter
-    vector.
-    """
+    """Coefficients of library terms, basis tensors × monomials of the invariants."""
 
     def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
         self.positions = np.asarray(positions, dtype=int)
@@ -71,10 +65,8 @@ ModesRate = Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "
 class InUse(NamedTuple):
     """Which branches a parameter vector takes.
 
-    `library`: 0 without library terms, 1 with terms of one basis tensor, 2 with terms of several.
-    `others`: 0 without other terms, i + 1 with the i-th alone, one past the last with several.
-    `states`: 0 without states of the fluid, i + 1 with the i-th alone, one past the last with
-        several.
+    `library`: 0 without library terms, 1 with one basis tensor, 2 with several. `others`, `states`:
+    0 without, i + 1 with the i-th alone, one past the last with several.
     """
 
     library: np.int32
@@ -87,9 +79,8 @@ class InUse(NamedTuple):
 class AddedTerms:
     """Terms of the law of each mode that effects add.
 
-    `effects`: effects of the fluid; those that add no term are passed over. `slices`: where the
-    parameters of each effect stand in the vector. `varying`: where, of effects whose amplitude may
-    differ from mode to mode, what varies it stands.
+    `slices`: where the parameters of each effect stand in the vector. `varying`: where what varies
+    an amplitude from mode to mode stands.
     """
 
     def __init__(

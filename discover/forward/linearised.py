@@ -16,11 +16,10 @@ _BEYOND = 1e-3
 
 
 class Linearised(NamedTuple):
-    """Residuals of runs at one vector of parameters, and their derivatives.
+    """Weighted residuals at one vector, not finite where it diverges, and derivatives.
 
-    `residual`: weighted residuals; not finite where the vector runs away.
-    `jacobian`: their derivatives by the parameters at `positions`, in the units of these, and
-        behind them their change with each move of the moduli.
+    The derivatives are by the parameters at `positions`, in their units; behind them stand the
+    changes with each move of the moduli.
     """
 
     residual: Float[np.ndarray, "runs n"]
@@ -29,11 +28,9 @@ class Linearised(NamedTuple):
 
 
 class Point(NamedTuple):
-    """A vector of parameters, and what is asked about it.
+    """A vector, the parameters to differentiate by, and its residuals where they are known.
 
-    `theta`, `positions`: the vector, and by which of its parameters to differentiate.
-    `residual`: its weighted residuals, where they are known.
-    `limit`: their sum of squares from which on it is of no use; see `AugmentedModel.residuals`.
+    `limit`: sum of squares beyond which the vector is of no use; see `AugmentedModel.residuals`.
     """
 
     theta: Float[np.ndarray, " p"]
@@ -57,11 +54,7 @@ def widths_of(
 
 
 def linearised(model: Any, points: Sequence[Point], batch: Batch) -> list[Linearised]:
-    """Return what is asked about several vectors, from one call for all of them.
-
-    `model`, `batch`: an `AugmentedModel` whose residuals are asked for, and of which runs.
-    `points`: the vectors.
-    """
+    """Return residuals and derivatives at several vectors, from one call of an `AugmentedModel`."""
     vectors, limits, widths = [], [], []
     for point in points:
         widths.append(widths_of(model, point.theta, point.positions))

@@ -72,10 +72,7 @@ class Program:
         """Shapes of runs for which it is compiled."""
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
-        """Return what predicts many vectors at once; None where that is left to `predict`.
-
-        To it is left what laws or effects of a user's own do that is not known in lanes.
-        """
+        """Return what predicts many vectors at once; None where lanes do not know some code."""
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
@@ -160,10 +157,7 @@ class Program:
         return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
     def _rates(self, theta, present, run: TransientFlows):
-        """Return the rate that the fluid feels, at half steps, and that of the tool at steps.
-
-        What effects do is computed where they are present, in one of the vectors at least.
-        """
+        """Return the felt rate at half steps and the tool's at steps, by the effects present."""
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -189,11 +183,7 @@ class Program:
         return shaped(upstream, self._downstream), upstream[::2]
 
     def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
-        """Return what an effect makes of a value.
-
-        It is computed where one of the vectors has the effect; to those that have it not the value
-        stays what it is, to the last digit.
-        """
+        """Return what an effect makes of a value, which stays as it is without the effect."""
         amplitude = theta[self.fluid.slices[effect.name].start]
         return jax.lax.cond(
             present[self._number[effect.name]],
@@ -312,8 +302,7 @@ class Program:
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.
 
-        What acts sample by sample acts on the wave of the first harmonic. An oscillation takes the
-        inertia of the tool, and what answers late, each frequency by itself.
+        What acts sample by sample acts on the wave of the first harmonic.
         """
         values = self.fluid.values(theta, effect)
         found = found * effect.response(values, frequency) - effect.inertia(values) * frequency**2

@@ -28,8 +28,7 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 class Batch(eqx.Module):
     """Runs of one control or several, in parts of which each has a program of its own.
 
-    `parts`, `rows`: the flows of each control, those in simple shear apart, and which runs they
-        are.
+    `parts`, `rows`: the flows of each control, simple shear apart, and which runs they are.
     `moduli`: of each run that is a modulus, which one, and where its states stand in their part.
     """
 

@@ -23,9 +23,9 @@ _NEVER = -1.0
 class RateSteps(eqx.Module):
     """Steps of the rate between two samples, with a leading axis of runs.
 
-    `start`, `end`: times of the samples in s; padding lies before any record.
-    `share`: of the interval at whose end the rate steps, where that is not fitted.
-    `place`: which of the fitted shares is its own; −1 where it is not fitted.
+    `start`, `end`: times of the samples in s; padding lies before any record. `share`: of the
+    interval at whose end the rate steps, where not fitted. `place`: of its fitted share; −1 where
+    not fitted.
     """
 
     start: Float[Array, "*runs steps"]
@@ -39,11 +39,10 @@ class RateSteps(eqx.Module):
     ) -> Float[Array, " m"]:
         """Return the rate of one run with its steps where they happen.
 
-        Between the two samples Simpson's rule gives the strain of each step of the integration, and
-        rates change smoothly with the instant on a grid that stays as it is.
-
-        `rate`, `times`: rate in 1/s at ends and middles of steps in turn, with a straight line
-        where it steps; and times in s. `fitted`: the fitted shares.
+        Between the two samples Simpson's rule gives the strain of each step of the integration, so
+        that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
+        in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
+        shares.
         """
         share = self.share
         if fitted.shape[0]:
@@ -108,13 +107,12 @@ _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 class TransientFlows(eqx.Module):
     """Flows at a given rate in time on padded grids, with a leading axis of runs.
 
-    `times`: half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
-        what came before the record.
-    `strain_before`: total strain of the sample before each run, shape (runs,).
-    `last_step`: position of the last sample of each run among step ends; what follows is padding.
+    `times`: step ends and middles in turn, in s; negative in what came before the record.
+    `strain_before`: total strain of the sample before each run.
+    `last_step`: position of the last sample of each run among step ends; padding follows.
     `steps`: steps of the rate whose instants are fitted, or were; None where there is none.
-    `cycle`: positions among step ends of the last cycle before the first sample, shape (runs, 2);
-        −1 where the run has no periodic start.
+    `cycle`: positions among step ends of the last cycle before the first sample; −1 where the run
+        has no periodic start.
     """
 
     times: Float[Array, "runs m"]
@@ -137,10 +135,7 @@ class TransientFlows(eqx.Module):
         return float(np.max(ends))
 
     def in_shared_shape(self) -> "TransientFlows":
-        """Return these runs padded to one of few shapes, so that data sets share programs.
-
-        A run more is the last once more, and what is beyond a run's end is at rest.
-        """
+        """Return these runs padded to one of few shapes, so that data sets share programs."""
         times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
         samples = _rounded(self.sample_index.shape[1], _SAMPLES)
         step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)

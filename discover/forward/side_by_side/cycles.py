@@ -1,9 +1,8 @@
 """The state in which a run begins whose oscillation had gone on for ever, for lanes.
 
-It is solved for as in `starts.periodic_start`, with derivatives that are differences: a cycle is
-followed once from the approximation, and once more from each component of all modes and each state
-of the fluid moved a little. All these passes through a cycle, and the run itself, share the code of
-one step.
+Solved for as in `starts.periodic_start`, with derivatives by differences: a cycle is followed from
+the approximation, and from each component of all modes and each state moved a little. All passes,
+and the run itself, share the code of one step.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -41,10 +40,9 @@ _ALIVE, _CHANGE, _SHIFT, _LARGEST, _PERIOD = range(5)
 def improved(relaxation_time, period, alive, moved, way, end, tangents):
     """Return the next approximation of a mode, by how much it moved, and whether there is hope.
 
-    `relaxation_time`, `period`: of the mode and of a cycle, in s. `alive`, `moved`: whether the
-    approximation is looked for, and by how much states have moved since the last. `way`, `end`,
-    `tangents`: the approximation in one row, where a cycle from it ends, and that by direction and
-    component.
+    `alive`, `moved`: whether it is looked for, and by how much states have moved since the last.
+    `way`, `end`, `tangents`: the approximation in one row, where a cycle ends, and that by
+    direction and component.
     """
     size = len(end)
     now = approximation(way, size)
@@ -77,10 +75,8 @@ def approximation(way, size: int) -> Approximation:
 class Cycles:
     """Writes passes through a run: of one that begins with a periodic state first its cycle's.
 
-    `code`: what is written. `levels`: numbers of each state of the fluid, and what it is at rest.
-    `levels_at`, `modes_at`: where in the scratch array these stand, and the modes. `size`: numbers
-    of a mode. `first`: where there is room in the scratch array. `has_states`: whether any vector
-    has states of the fluid.
+    `levels`: numbers of each state of the fluid, and its rest. `levels_at`, `modes_at`, `first`:
+    where in the scratch array these, the modes and free room stand. `size`: numbers of a mode.
     """
 
     def __init__(
@@ -119,11 +115,9 @@ class Cycles:
     ) -> Iterator[tuple[Any, Any, Any]]:
         """Write what follows some steps again and again, up to a run's end.
 
-        Yields the number of the first step and behind the last, and whether they are the run's.
-
-        `start`, `end`: of the cycle; the first is negative where there is none. `last`: behind the
-        last step of the run. `period`: of the cycle in s. `settle`: writes what follows from the
-        modes and states with which a cycle begins.
+        Yields the first step, the one behind the last, and whether they are the run's. `start` is
+        negative where there is no cycle. `settle`: writes what follows from the modes and states at
+        its start.
         """
         w, b = self._w, self._w.builder
         has_cycle = b.icmp_signed(">=", start, INTEGER(0))

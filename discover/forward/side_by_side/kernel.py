@@ -1,7 +1,7 @@
 """The loops over runs, steps and modes, in machine code for eight vectors of parameters at once.
 
-What is done in them is told by `step`; here stands where numbers lie. Arrays have the lanes last,
-each run is followed to its own end, and states of the fluid stay in a scratch array.
+`step` says what is done in them. Arrays have the lanes last, and each run is followed to its own
+end.
 """
 
 from typing import Any
@@ -37,17 +37,11 @@ _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
 
 class Kernel(Code):
-    """Machine code for the effects of a fluid and a law, with all constants and runs as data.
+    """Machine code for flows at a given rate in time.
 
-    `flags`: which parts of it a vector needs.
-    `steps_taken`: by eight vectors at once, in all calls so far.
-
-    `fluid`: the effects, of a structure without constants of the law. `found`: shapes of what is
-    data to it; see `laid_out`. `flow`: kinematics of one run; None where all are simple shear.
-    `chooses`: whether vectors choose widths of steps; if not, all take those of the grid, in less
-    code. `cycles`: whether some runs begin with a periodic state.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
+    `steps_taken`: by eight vectors at once, in all calls so far. `chooses`: whether vectors choose
+    widths of steps; if not, all take those of the grid, in less code. `cycles`: whether some runs
+    begin with a periodic state.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -80,13 +74,9 @@ class Kernel(Code):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """Return stress and felt rate at step ends, the modes', and whether any vector is of use.
 
-        The first two have the shape (runs, ends, lanes); the stress is not a number where none was
-        computed. That of the modes is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where
-        normal stresses are asked for, and empty if not.
-
-        `runs`: how many runs are followed. `tabled`: modes whose weights stand in the table.
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
-        beside these, by name. `normal`: whether normal stresses are asked for.
+        Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12,
+        (runs, ends, 4, lanes), empty unless `normal`. `tabled`: modes whose weights stand in the
+        table. `used`: parts that a vector needs; see `Flags`.
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)

@@ -2,8 +2,7 @@
 
 A step is taken whole and in two halves. Where these agree the vector goes on from the halves,
 extrapolated, and else takes a shorter step   [step doubling with local extrapolation: Hairer,
-Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, section II.4]. What a vector
-chooses depends on no other beside it.
+Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, section II.4].
 """
 
 from collections.abc import Iterator, Sequence
@@ -48,10 +47,9 @@ _ENOUGH = 10**9
 class OwnWidths:
     """Writes what stands around a step, which is written once.
 
-    `w`, `arithmetic`: where it is written. `at`: places in the scratch array of what is `OWN`.
-    `state`: where the state begins that a step changes. `levels`, `modes`: where in it states of
-    the fluid stand, and the modes. `variables`: structure variables of each mode. `has_states`:
-    whether any of the vectors has states of the fluid.
+    `at`: places in the scratch array of what is `OWN`. `state`, `levels`, `modes`: where what a
+    step changes begins, and in it states of the fluid and modes. `variables`: structure variables
+    of a mode.
     """
 
     def __init__(
@@ -84,8 +82,8 @@ class OwnWidths:
     def steps(self, run: Any, number: Any, half: Any) -> tuple[Any, Any]:
         """Return how many steps of the grid are one interval, and whether widths in it are chosen.
 
-        They are where the rate of every vector is a straight line over all of them: an instrument
-        may shape what was commanded.
+        They are where every vector's rate is a straight line: an instrument may shape what was
+        commanded.
         """
         w, b, a = self._w, self._w.builder, self._arithmetic
         place = w.at((run, w.counts["steps"]), (number, 1))
@@ -118,11 +116,7 @@ class OwnWidths:
     def parts(
         self, run: Any, number: Any, is_own: Any, rates: Sequence[Any]
     ) -> Iterator[tuple[Any, Any, tuple[Any, ...]]]:
-        """Write a step again and again until each vector has come to the end of an interval.
-
-        Yields the time in it, the width, and the rates at its beginning, in its middle and at its
-        end.
-        """
+        """Write a step until each vector has come to the end; yields time, width and rates."""
         w, b, a = self._w, self._w.builder, self._arithmetic
         place, at = w.at((run, w.counts["steps"]), (number, 1)), self._at
         width, whole, least = (a.splat(w.load(n, place)) for n in ("width", "whole", "least"))

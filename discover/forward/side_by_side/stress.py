@@ -106,10 +106,7 @@ class StressStep(Step):
 
 
 class StressCode(Code):
-    """Machine code for runs at a given stress.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
-    """
+    """Machine code for runs at a given stress."""
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
@@ -128,13 +125,9 @@ class StressCode(Code):
     def __call__(
         self, used: np.ndarray, given: dict[str, np.ndarray], normal: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the strain of the fluid, shape (runs, ends, lanes), and the stress of the modes.
+        """Return the strain of the fluid, and the stress of the modes if `normal`.
 
-        That is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where normal stresses are asked
-        for, and empty if not.
-
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
-        beside these, by name. `normal`: whether normal stresses are asked for.
+        Shapes (runs, ends, lanes), and (runs, ends, 4, lanes) of σ11, σ22, σ33, σ12.
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         strain = np.full((runs, steps + 1, LANES), np.nan)
@@ -249,9 +242,8 @@ class StressCode(Code):
 class StressSideBySide(LanePredictor):
     """Predictions of strains for one structure of law and effects.
 
-    `fluid`, `code`, `made_from`: as `LanePredictor` takes them. `driven`: of a vector and a run:
-    the true stress at step ends in Pa, the inertia of the tool in Pa s², and the strain of what
-    gives way in series.
+    `driven`: of a vector and a run: the true stress at step ends in Pa, the inertia of the tool in
+    Pa s², and the strain of what gives way in series.
     """
 
     def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):
@@ -261,10 +253,7 @@ class StressSideBySide(LanePredictor):
         self._driven = self._program("driven", driven, (None, 0), (0, None))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return strains, and N1 and N2 behind them if asked for.
-
-        Limits, what judges and how many runs are no padding say nothing here.
-        """
+        """Return strains, and N1 and N2 behind them if asked for; limits say nothing here."""
         return self._by_eights(
             asked.thetas, (), lambda lanes, _, used: self._eight(asked, lanes, used)
         )
