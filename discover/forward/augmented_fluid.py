@@ -163,17 +163,14 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def dynamics(
-        self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
-    ) -> Dynamics:
+    def dynamics(self, numbers, used, theta, flow: Kinematics | None) -> Dynamics:
         """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
 
-        `used`: the branches that the vector takes. `in_one_piece`: whether steps are one piece of
-        code.
+        `used`: the branches that the vector takes.
         """
         law, declared, extra, amplitudes = self.of_modes(numbers, theta)
         of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
-        added = self.added.rate(theta, used, amplitudes, in_one_piece)
+        added = self.added.rate(theta, used, amplitudes)
 
         def modes_rate(stress, gradient):
             return of_law(stress, gradient) - added(stress, gradient)
@@ -193,7 +190,6 @@ class AugmentedFluid:
             used.states,
             law.variables,
             self._of_modes_at_rest("shares", law, declared.modulus, extra) if law.tensors else None,
-            in_one_piece,
         )
 
     def in_series(self, theta, flow: Kinematics | None) -> Series | None:

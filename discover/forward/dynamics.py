@@ -9,7 +9,6 @@ from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
 from discover.forward.integrators.exponential_weights import (
-    KrogstadWeights,
     StressWeights,
     krogstad_weights,
     relax,
@@ -71,7 +70,6 @@ class Dynamics(NamedTuple):
     states_in_use: Int[Array, ""] | None = None
     variables: int = 0  # structure variables of each mode that the law has
     shares: Float[Array, "tensors k"] | None = None
-    in_one_piece: bool = True  # whether no matrix product stands in the steps; see `contracted`
     columns: int = 0
 
     @property
@@ -134,15 +132,7 @@ class Dynamics(NamedTuple):
                 self.times_change, lambda: self.weights_alone(width / slow), lambda: pieces
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
-        whole = KrogstadWeights(*joined[0])
-        if self.relaxations is None:
-            return StressWeights(whole)
-        trace, *others = [KrogstadWeights(*one) for one in joined[1:]]
-        beside = tuple(
-            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
-            for i, one in enumerate(self.relaxations[1:])
-        )
-        return StressWeights(whole, trace, self.relaxations[0, 1], beside, self.shares)
+        return StressWeights.of_kinds(joined, self.relaxations, self.shares)
 
     def rest(self) -> tuple[Float[Array, "s *c k"], Levels]:
         """Return modes and states at rest."""
@@ -229,7 +219,7 @@ class Dynamics(NamedTuple):
 
     def summed(self, of_modes: Float[Array, "*c k"]) -> Float[Array, " *c"]:
         """Return a stress in Pa of that of each mode over its modulus."""
-        return contracted(of_modes, self.modes.modulus, self.in_one_piece)
+        return contracted(of_modes, self.modes.modulus)
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""

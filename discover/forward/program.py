@@ -38,11 +38,6 @@ from discover.protocols.kinematics import Kinematics
 
 _LOGGER = logging.getLogger(__name__)
 
-# Modes up to which the steps at a given rate are one piece of machine code; see `contracted`. With
-# eight runs and all candidates a prediction takes 2.0 ms so and 6.3 otherwise for 3 modes, 4.8 and
-# 7.5 for 6, 10 and 7.8 for 9: arithmetic on many numbers is faster in pieces of its own
-_FEW_MODES = 6
-
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
 
@@ -146,9 +141,7 @@ class Program:
         flow = run.kinematics
         present = self.fluid.present(theta)
         rate, tool_rate = self._rates(theta, present, run)
-        dynamics = self.fluid.dynamics(
-            numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
-        )
+        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
         cycle = None
         if run.cycle_steps:
             cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)

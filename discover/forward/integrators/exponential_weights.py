@@ -1,6 +1,6 @@
 """Weights of a step that treats linear relaxation exactly."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -124,6 +124,21 @@ class StressWeights(NamedTuple):
     faster: Float[Array, " k"] | float = 0.0
     beside: tuple[tuple["StressWeights", Float[Array, " k"]], ...] = ()
     shares: Float[Array, "tensors k"] | None = None
+
+    @classmethod
+    def of_kinds(cls, kinds: Sequence[Any], relaxations: Any, shares: Any) -> "StressWeights":
+        """Return weights told as `Dynamics.weights` does: of the whole, its trace, and so on.
+
+        `relaxations`, `shares`: of each tensor, as `Dynamics` has them.
+        """
+        if relaxations is None:
+            return cls(KrogstadWeights(*kinds[0]))
+        whole, trace, *others = (KrogstadWeights(*one) for one in kinds)
+        beside = tuple(
+            (cls(others[2 * i], others[2 * i + 1], one[1]), one[0])
+            for i, one in enumerate(relaxations[1:])
+        )
+        return cls(whole, trace, relaxations[0, 1], beside, shares)
 
     def remainder(self, stress, change, decay: float):
         """Return what of a change is not relaxation at the rates of these weights."""

@@ -84,6 +84,10 @@ class Code:
         self._flow = Layout(flow, 0)
         self._law = eqx.combine(found[0].law, found[1].law)
         self._plain_law = eqx.filter(self._law, _is_shape, inverse=True)
+        # of a mode, and kinds of weights that its step has
+        self._size = 4 + self._law.variables
+        relaxations = found[0].relaxations
+        self._kinds = 1 if relaxations is None else 2 * relaxations.shape[1]
 
     def packing(self, fluid: AugmentedFluid, made_from: tuple, axis: int) -> Callable:
         """Return a program from numbers, vectors and their moduli to modes and what these share.

@@ -76,7 +76,7 @@ class Cycles:
     """Writes passes through a run: of one that begins with a periodic state first its cycle's.
 
     `levels`: numbers of each state of the fluid, and its rest. `levels_at`, `modes_at`, `first`:
-    where in the scratch array these, the modes and free room stand. `size`: numbers of a mode.
+    where in the scratch array these, the modes and free room stand.
     """
 
     def __init__(
@@ -85,11 +85,10 @@ class Cycles:
         levels: Sequence[tuple[int, float]],
         levels_at: int,
         modes_at: int,
-        size: int,
         first: Any,
         has_states: Any,
     ):
-        self._code, self._levels, self._size = code, levels, size
+        self._code, self._levels, self._size = code, levels, (size := code._size)
         self._levels_at, self._modes_at = levels_at, modes_at
         self._count = sum(count for count, _ in levels)
         w = code._w
@@ -144,9 +143,14 @@ class Cycles:
             yield first, behind, b.or_(is_before, is_run)
             # a stage that ends sets the next one, which is told from it once
             stage = b.load(self._stage)
-            for number, finish in enumerate(
-                (self._end_before, self._end_rest, self._end_newton, self._end_closing, self._end)
-            ):
+            ends = (
+                lambda: self._go_on(_REST),
+                self._end_rest,
+                self._end_newton,
+                lambda: self._go_on(_RUN),
+                lambda: b.store(INTEGER(0), self._left),
+            )
+            for number, finish in enumerate(ends):
                 with b.if_then(b.icmp_signed("==", stage, INTEGER(number))), self._a.apart():
                     finish()
 
@@ -225,9 +229,6 @@ class Cycles:
             for i, value in enumerate(code._kept(way, self._size)):
                 at = self._w.at((state, 1), (i, 1))
                 code._keep(a.chosen(found, value, float("nan")), at)
-
-    def _end_before(self) -> None:
-        self._go_on(_REST)
 
     def _end_rest(self) -> None:
         w, b, code, size = self._w, self._w.builder, self._code, self._size
@@ -319,9 +320,3 @@ class Cycles:
         some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
         b.store(b.select(some, INTEGER(_NEWTON), INTEGER(_CLOSING)), self._stage)
         b.store(INTEGER(0), self._index)
-
-    def _end_closing(self) -> None:
-        self._go_on(_RUN)
-
-    def _end(self) -> None:
-        self._w.builder.store(INTEGER(0), self._left)

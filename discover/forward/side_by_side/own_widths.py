@@ -7,10 +7,12 @@ Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, section II.4]
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from discover.programs.lanes import Arithmetic, Writing
 from discover.programs.lanes.arithmetic import INTEGER
+
+if TYPE_CHECKING:
+    from discover.forward.side_by_side.code import Code
 
 # By how much halves and whole may differ, of the stress of a mode. States of the fluid are of
 # second order where the modes are of fourth, and may differ by more
@@ -48,36 +50,28 @@ class OwnWidths:
     """Writes what stands around a step, which is written once.
 
     `at`: places in the scratch array of what is `OWN`. `state`, `levels`, `modes`: where what a
-    step changes begins, and in it states of the fluid and modes. `variables`: structure variables
-    of a mode.
+    step changes begins, and in it states of the fluid and modes.
     """
 
     def __init__(
         self,
-        w: Writing,
-        arithmetic: Arithmetic,
+        code: "Code",
         at: Sequence[int],
         state: int,
         levels: range,
         modes: int,
-        variables: int,
         has_states: Any,
     ):
-        self._w, self._arithmetic = w, arithmetic
+        self._w, self._arithmetic = w, arithmetic = code._w, code._arithmetic
+        self._keep, self._kept = code._keep, code._kept
         self._straight, self._left = (w.builder.alloca(INTEGER) for _ in range(2))
         self._at = dict(zip(OWN, at, strict=True))
         self._state, self._levels, self._modes = state, levels, modes
-        self._numbers = 4 + variables
+        self._numbers = code._size
         self._size = w.at((w.counts["modes"], self._numbers), (modes - state, 1))
         # of an error of fifth order the halves have a fifteenth of what they differ by, of one of
         # third order a third
         self._further = arithmetic.chosen(has_states, 1.0 / 3.0, 1.0 / 15.0)
-
-    def _kept(self, place: Any) -> Any:
-        return self._w.load("scratch", place)
-
-    def _keep(self, value: Any, place: Any) -> None:
-        self._w.store(self._arithmetic.lanes(value), "scratch", place)
 
     def steps(self, run: Any, number: Any, half: Any) -> tuple[Any, Any]:
         """Return how many steps of the grid are one interval, and whether widths in it are chosen.

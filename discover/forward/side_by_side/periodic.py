@@ -84,10 +84,8 @@ class PeriodicCode(Code):
         self._step = PeriodicStep(fluid, self._plain_law, ())
         variables, tensors = self._law.variables, self._law.tensors
         self._back = mirror(variables - 4 * tensors, tensors)
-        self._size = 4 + variables
-        kinds = 1 if found[0].relaxations is None else 2 * found[0].relaxations.shape[1]
-        self._weights = (kinds, WEIGHTS) if kinds > 1 else (WEIGHTS,)
-        self._way_at = _WEIGHTS + kinds * WEIGHTS
+        self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
+        self._way_at = _WEIGHTS + self._kinds * WEIGHTS
         self._way_size = 3 * self._size + 3
         self._now_at = self._way_at + self._way_size
         self._make(fluid, found)

@@ -205,15 +205,8 @@ class Step:
         """Return weights as the integrators take them; see `Dynamics.weights_of_step`."""
         rows = weights.reshape(-1, self.kept)
         more = jnp.zeros((len(rows), len(KrogstadWeights._fields) - self.kept))
-        kinds = [KrogstadWeights(*row) for row in jnp.concatenate([rows, more], axis=1)]
-        if mode.relaxations is None:
-            return StressWeights(kinds[0])
-        whole, trace, *others = kinds
-        beside = tuple(
-            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
-            for i, one in enumerate(mode.relaxations[1:])
-        )
-        return StressWeights(whole, trace, mode.relaxations[0, 1], beside, mode.shares)
+        rows = jnp.concatenate([rows, more], axis=1)
+        return StressWeights.of_kinds(rows, mode.relaxations, mode.shares)
 
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.

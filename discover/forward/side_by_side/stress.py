@@ -114,11 +114,10 @@ class StressCode(Code):
         super().__init__(fluid, found, flow)
         self._step = StressStep(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
-        self._size = 4 + self._law.variables
-        kinds = 1 if found[0].relaxations is None else 2 * found[0].relaxations.shape[1]
-        self._weights = (kinds, StressStep.kept) if kinds > 1 else (StressStep.kept,)
+        kinds, kept = self._kinds, StressStep.kept
+        self._weights = (kinds, kept) if kinds > 1 else (kept,)
         # of a mode: before and after the step, and its weights
-        self._numbers = 2 * self._size + kinds * StressStep.kept
+        self._numbers = 2 * self._size + kinds * kept
         self._modes_at = _LEVELS + sum(levels for levels, _ in self._levels)
         self._make(fluid, found, flow)
 
