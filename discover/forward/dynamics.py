@@ -8,11 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
-from discover.forward.integrators.exponential_weights import (
-    StressWeights,
-    krogstad_weights,
-    relax,
-)
+from discover.forward.integrators.exponential_weights import StressWeights, krogstad_weights, relax
 from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 

@@ -17,11 +17,7 @@ from discover.forward.side_by_side.predictors import Asked, Eights, StatePredict
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.starts.half_cycles import mirror
 from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
-from discover.forward.starts.steady_states import (
-    goes_on,
-    next_approximation,
-    relative_change,
-)
+from discover.forward.starts.steady_states import goes_on, next_approximation, relative_change
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics

@@ -129,10 +129,7 @@ class Eights(NamedTuple):
         """Return what the code takes of vectors, one a lane, in whole eights."""
         of_mode = self.modes[trial]
         present = modes_in_use(of_mode[:, :, 0], declared)
-        return {
-            "shared": lanes_last(self.shared[trial]),
-            "mode": lanes_last(of_mode[:, present]),
-        }
+        return {"shared": lanes_last(self.shared[trial]), "mode": lanes_last(of_mode[:, present])}
 
 
 class StatePredictor(LanePredictor):

@@ -13,12 +13,7 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.integrators.exponential_weights import KrogstadWeights
 from discover.forward.integrators.stepping import RATE_OF_RATE
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.predictors import (
-    Asked,
-    LanePredictor,
-    flows_of,
-    modes_in_use,
-)
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER

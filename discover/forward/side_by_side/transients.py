@@ -18,12 +18,7 @@ from discover.forward.declared import Numbers
 from discover.forward.integrators.exponential_weights import krogstad_weights
 from discover.forward.integrators.stepping import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.predictors import (
-    Asked,
-    LanePredictor,
-    flows_of,
-    modes_in_use,
-)
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import WEIGHTS
 from discover.programs.lanes import LANES
 from discover.protocols.kinematics import normal_stress_differences
