@@ -18,7 +18,6 @@ from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFl
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -303,15 +302,6 @@ class AugmentedModel:
             by_parameters = (moved - base) / widths[:, None, None]
             jacobian = np.concatenate([by_parameters, 0.5 * (up - down)])
         return Linearised(base[0], jacobian, tuple(positions))
-
-    def vectors_at_once(self, batch: Batch) -> int:
-        """Return how many vectors cost what one does: as many as stand side by side."""
-        kernels = (
-            isinstance(part, TransientFlows | StressFlows)
-            and self._predictor.side_by_side(part) is not None
-            for part in batch.parts
-        )
-        return LANES if all(kernels) else 1
 
 
 def widths_of(
