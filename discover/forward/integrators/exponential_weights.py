@@ -1,6 +1,6 @@
 """Weights of a step that treats linear relaxation exactly."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -126,7 +126,7 @@ class StressWeights(NamedTuple):
     shares: Float[Array, "tensors k"] | None = None
 
     @classmethod
-    def of_kinds(cls, kinds: Sequence[Any], relaxations: Any, shares: Any) -> "StressWeights":
+    def of_kinds(cls, kinds: Any, relaxations: Any, shares: Any) -> "StressWeights":
         """Return weights told as `Dynamics.weights` does: of the whole, its trace, and so on.
 
         `relaxations`, `shares`: of each tensor, as `Dynamics` has them.
