@@ -147,16 +147,11 @@ def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
     )
 
 
-def contracted(
-    first: Float[Array, "..."], second: Float[Array, "..."], in_one_piece: bool = True
-) -> Float[Array, "..."]:
+def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
     """Return Σᵢ first[…, i] second[i, …], as `jnp.tensordot` with `axes=1` does.
 
-    `first`, `second`: the last axis of the one and the first of the other are as long.
-    `in_one_piece`: whether no product of matrices is to stand in the loop.
+    No product of matrices stands in it, which XLA would start by itself at every step of a loop.
     """
-    if not in_one_piece:
-        return jnp.tensordot(first, second, axes=1)
     columns = (1,) * (second.ndim - 1)
     return jnp.sum(first.reshape(first.shape + columns) * second, axis=first.ndim - 1)
 

@@ -10,8 +10,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
-import sympy
-
 T = TypeVar("T")
 
 
@@ -101,76 +99,6 @@ def greek_letter(name: str) -> str | None:
         return unicodedata.lookup(f"GREEK {size} LETTER {name.lower().replace('lambda', 'lamda')}")
     except KeyError:
         return None
-
-
-STRESS = sympy.Symbol("sigma", commutative=False)
-RATE = sympy.Symbol("gammadot", commutative=False)
-UNIT = sympy.Symbol("I", commutative=False)
-
-
-class Trace(sympy.Function):
-    """Trace of a product of tensors: a scalar, so it commutes."""
-
-    is_commutative = True
-    nargs = 1
-
-    # SymPy has a Trace of its own, of matrices, and prints any class of that name as if it were it
-    def _latex(self, printer, exp=None):
-        text = rf"\operatorname{{tr}}\left({printer._print(self.args[0])}\right)"
-        return text if exp is None else rf"{text}^{{{exp}}}"
-
-    def _pretty(self, printer):
-        return printer._print_Function(self, func_name="tr")
-
-
-class SympyNotation(Notation[sympy.Expr]):
-    """Expressions; brackets are the expression tree's own."""
-
-    def tensor(self, name: str) -> sympy.Expr:
-        """Return a non-commuting symbol."""
-        return {"I": UNIT, "sigma": STRESS, "gammadot": RATE}[name]
-
-    def contraction(self, tensors: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the product in this order."""
-        return sympy.Mul(*tensors)
-
-    def sum(self, summands: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the sum."""
-        return sympy.Add(*summands)
-
-    def trace(self, tensor: sympy.Expr) -> sympy.Expr:
-        """Return the trace, which commutes."""
-        return Trace(tensor)  # pyright: ignore[reportReturnType]
-
-    def power(self, scalar: sympy.Expr, exponent: int) -> sympy.Expr:
-        """Return the power."""
-        return sympy.Pow(scalar, exponent)
-
-    def number(self, value: float) -> sympy.Expr:
-        """Return a float."""
-        return sympy.Float(value)
-
-    def letter(self, name: str) -> sympy.Expr:
-        """Return a symbol."""
-        return sympy.Symbol(name)
-
-    def exponential(self, rate: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
-        """Return exp(rate · trace) − 1."""
-        return sympy.exp(rate * trace) - 1  # pyright: ignore[reportReturnType]
-
-    def saturating(self, level: sympy.Expr, trace: sympy.Expr) -> sympy.Expr:
-        """Return trace/(1 + level |trace|)."""
-        return trace / (1 + level * sympy.Abs(trace))
-
-    def scalar(
-        self, expression: Any, letters: Mapping[str, sympy.Expr], factor: bool = False
-    ) -> sympy.Expr:
-        """Return the expression."""
-        return expression.xreplace({one: letters[one.name] for one in expression.free_symbols})
-
-    def product(self, factors: Sequence[sympy.Expr]) -> sympy.Expr:
-        """Return the product."""
-        return sympy.Mul(*factors)
 
 
 _TENSORS = {

@@ -167,7 +167,7 @@ class CandidateTerm:
 
     def sympy(self) -> "sympy.Expr":
         """Return the term as a SymPy expression with non-commuting tensors."""
-        from tensor_library.notation import SympyNotation
+        from tensor_library.sympy_notation import SympyNotation
 
         return self.spell(SympyNotation())
 

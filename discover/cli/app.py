@@ -1,5 +1,6 @@
 """All commands in one place; nothing heavy is imported before a command runs."""
 
+import gc
 import sys
 import warnings
 from typing import Annotated
@@ -68,5 +69,7 @@ def main() -> None:
     warnings.simplefilter("ignore", RuntimeWarning)
     use_one_thread_from_the_start()
     use_the_processor_from_the_start()
+    # tracing makes millions of small objects that stay, and each full collection walks all of them
+    gc.set_threshold(100_000, 50, 100)
     with obeying_interrupts():
         app(prog_name="discover")

@@ -4,7 +4,13 @@
 declared law, then those of every candidate effect. At zero amplitude an effect changes nothing.
 """
 
-from discover.forward.augmented_model import AugmentedModel
+from discover.forward.augmented_model import (
+    AugmentedModel,
+    Linearised,
+    Point,
+    linearised,
+    widths_of,
+)
 from discover.forward.batches import (
     OBSERVED,
     Batch,
@@ -17,7 +23,6 @@ from discover.forward.batches import (
     names_of_loadings,
 )
 from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
-from discover.forward.linearised import Linearised, Point, linearised, widths_of
 
 __all__ = [
     "MODULUS",

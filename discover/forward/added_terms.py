@@ -1,9 +1,7 @@
 """What effects add to the law of every mode, of which only what is in use is computed.
 
-All candidates stand in one program, and most are at zero in any one trial: a fit has a few
-effects, and the terms of the library are tried one at a time. The program therefore branches. What
-decides is a few integers that no run and no mode changes, so that a branch not taken costs nothing;
-an effect at zero amplitude adds nothing, so that leaving it out changes nothing.
+All candidates stand in one program, most at zero amplitude, where they add nothing; it branches by
+a few integers that no run and no mode changes, so that what is not taken costs nothing.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,16 +15,12 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, LibraryTerm
-from tensor_library.algebra import contracted, integrity_basis, scalar_invariants
+from tensor_library.algebra import integrity_basis, scalar_invariants
 from tensor_library.kinematics import rate_of_deformation
 
 
 class LibraryMatrix:
-    """Coefficients of library terms, basis tensors × monomials of the invariants.
-
-    `terms`: terms without a closed form. `positions`: of their coefficients in the parameter
-    vector.
-    """
+    """Coefficients of library terms, basis tensors × monomials of the invariants."""
 
     def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
         self.positions = np.asarray(positions, dtype=int)
@@ -35,11 +29,6 @@ class LibraryMatrix:
         self.columns = np.array([self.powers.index(t.term.powers) for t in terms], dtype=int)
         self.tensors = tuple(sorted(set(self.rows.tolist())))
         """Basis tensors that occur."""
-
-    def tensors_in_use(self, theta: Float[np.ndarray, " p"]) -> list[int]:
-        """Return which of `tensors` have a coefficient that is not zero, by position."""
-        used = set(self.rows[theta[self.positions] != 0.0].tolist())
-        return [i for i, tensor in enumerate(self.tensors) if tensor in used]
 
     def matrix(self, theta: Float[Array, " p"]) -> Float[Array, "8 m"]:
         """Return the coefficients as a matrix."""
@@ -58,10 +47,14 @@ class LibraryMatrix:
             values.append(value)
         return jnp.stack(values)
 
-    def sum(self, matrix: Float[Array, "8 m"], stress, rate, in_one_piece: bool = True):
-        """Return the sum of all terms, without a product of matrices or with."""
-        coefficients = contracted(matrix, self.monomials(stress, rate), in_one_piece)
-        return contracted(coefficients, integrity_basis(stress, rate), in_one_piece)
+    def sum(self, matrix: Float[Array, "8 m"], stress, rate):
+        """Return the sum of all terms; one at zero adds nothing, however large the stress."""
+
+        def times(coefficients, values):
+            return jnp.where(coefficients != 0.0, coefficients * values, 0.0)
+
+        coefficients = times(matrix, self.monomials(stress, rate)).sum(axis=1)
+        return times(coefficients[:, None], integrity_basis(stress, rate)).sum(axis=0)
 
 
 ModesRate = Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "s k"]]
@@ -71,25 +64,21 @@ ModesRate = Callable[[Float[Array, "s k"], Float[Array, "*c k"]], Float[Array, "
 class InUse(NamedTuple):
     """Which branches a parameter vector takes.
 
-    `library`: 0 without library terms, 1 with terms of one basis tensor, 2 with terms of several.
-    `others`: 0 without other terms, i + 1 with the i-th alone, one past the last with several.
-    `states`: 0 without states of the fluid, i + 1 with the i-th alone, one past the last with
-        several.
+    `library`: 1 with terms of it. `others`, `states`: 0 without, i + 1 with the i-th alone,
+    one past the last with several. `times`: 1 where a state changes the relaxation times.
     """
 
     library: np.int32
-    tensor: np.int32  # that one tensor, by its position among those that occur in the library
     others: np.int32
     states: np.int32 = np.int32(0)
-    times: np.int32 = np.int32(0)  # 1 where a state changes the relaxation times
+    times: np.int32 = np.int32(0)
 
 
 class AddedTerms:
     """Terms of the law of each mode that effects add.
 
-    `effects`: effects of the fluid; those that add no term are passed over. `slices`: where the
-    parameters of each effect stand in the vector. `varying`: where, of effects whose amplitude may
-    differ from mode to mode, what varies it stands.
+    `slices`: where the parameters of each effect stand in the vector. `varying`: where what varies
+    an amplitude from mode to mode stands.
     """
 
     def __init__(
@@ -112,12 +101,11 @@ class AddedTerms:
 
     def in_use(self, theta: Float[np.ndarray, " p"]) -> InUse:
         """Return the branches that a parameter vector takes."""
-        tensors = self.library.tensors_in_use(theta)
+        library = np.any(theta[self.library.positions] != 0.0)
         others = [i for i, e in enumerate(self.others) if self._is_used(theta, e)]
         several = len(self.others) + 1
         return InUse(
-            np.int32(min(len(tensors), 2)),
-            np.int32(tensors[0] if tensors else 0),
+            np.int32(library),
             np.int32(0 if not others else others[0] + 1 if len(others) == 1 else several),
         )
 
@@ -130,12 +118,9 @@ class AddedTerms:
         theta: Float[Array, " p"],
         used: InUse,
         amplitudes: Mapping[str, Float[Array, " k"]] | None = None,
-        in_one_piece: bool = True,
     ) -> ModesRate:
         """Return the function that sums what is in use, dimensionless."""
-        library = (
-            self._library_rate(theta, used, in_one_piece) if self.library.tensors else _nothing
-        )
+        library = self._library_rate(theta, used) if self.library.tensors else _nothing
         others = self._others_rate(theta, used, amplitudes or {}) if self.others else _nothing
 
         def total(state, gradient):
@@ -146,24 +131,14 @@ class AddedTerms:
 
         return total
 
-    def _library_rate(self, theta, used: InUse, in_one_piece: bool) -> ModesRate:
-        library, matrix = self.library, self.library.matrix(theta)
-        # with one tensor in use all other rows are zero
-        row = matrix.sum(axis=0)
-        tensors = [
-            _over_modes(lambda stress, rate, i=i: integrity_basis(stress, rate)[i])
-            for i in library.tensors
-        ]
-        coefficient = _over_modes(
-            lambda stress, rate: jnp.sum(row * library.monomials(stress, rate))
-        )
-        every = _over_modes(lambda stress, rate: library.sum(matrix, stress, rate, in_one_piece))
+    def _library_rate(self, theta, used: InUse) -> ModesRate:
+        matrix = self.library.matrix(theta)
 
-        def one(stress, gradient):
-            tensor = jax.lax.switch(used.tensor, tensors, stress, gradient)
-            return coefficient(stress, gradient) * tensor
+        def of_mode(stress, gradient):
+            return self.library.sum(matrix, stress, rate_of_deformation(gradient))
 
-        return lambda *flow: jax.lax.switch(used.library, [_nothing, one, every], *flow)
+        every = jax.vmap(of_mode, in_axes=-1, out_axes=-1)
+        return lambda *flow: jax.lax.switch(used.library, [_nothing, every], *flow)
 
     def _others_rate(self, theta, used: InUse, amplitudes) -> ModesRate:
         def values_of(effect: ConstitutiveEffect):
@@ -192,12 +167,3 @@ class AddedTerms:
 def _nothing(stress, gradient):
     del gradient
     return jnp.zeros_like(stress)
-
-
-def _over_modes(term: Callable) -> ModesRate:
-    """Return a function of one mode's σ and γ̇, both shape (4,), as one of all modes."""
-
-    def of_mode(stress, gradient):
-        return term(stress, rate_of_deformation(gradient))
-
-    return jax.vmap(of_mode, in_axes=-1, out_axes=-1)

@@ -23,12 +23,10 @@ from discover.protocols.kinematics import Kinematics
 
 
 class OfModes(NamedTuple):
-    """What a vector of parameters says of each mode.
+    """What a vector says of each mode.
 
-    `law`: with the values of its free parameters, and constants of its own for each mode where
-        these differ.
-    `declared`, `extra`: the declared modes, and those of effects.
-    `amplitudes`: of effects whose amplitude differs from mode to mode, by name.
+    `declared`, `extra`: the declared modes, and those of effects. `amplitudes`: of effects whose
+    amplitude differs from mode to mode, by name.
     """
 
     law: AbstractConstitutiveLaw
@@ -38,13 +36,10 @@ class OfModes(NamedTuple):
 
 
 class AugmentedFluid:
-    """What a structure makes of a vector of parameters: the fluid, and what gives way beside it.
+    """What a structure makes of a vector: the fluid, and what gives way in series with it.
 
-    `slices`: where the parameters of each effect stand in the vector, by name.
-    `of_effects`, `instants`: where the parameters of all effects stand, and the instants of steps
-        of the rate.
-    `size`: length of the vector.
-    `series`: effects that give way in series with the fluid.
+    `slices`, `of_effects`, `instants`: where in the vector the parameters of each effect, of all of
+    them, and the instants of steps of the rate stand. `size`: its length.
     """
 
     def __init__(self, structure: Structure):
@@ -97,8 +92,8 @@ class AugmentedFluid:
     def beside(self, numbers, theta, rate, flow: Kinematics | None):
         """Return the recorded stress of the solvent and of what effects add beside the modes.
 
-        What an effect says of shear holds for any flow of the same intensity: the stress is that of
-        a generalised Newtonian fluid   [Bird, Armstrong & Hassager 1987, vol. 1, chapter 4].
+        Any flow of the same intensity has the stress of a generalised Newtonian fluid   [Bird,
+        Armstrong & Hassager 1987, vol. 1, chapter 4].
         """
         intensity, viscous = (1.0, 1.0) if flow is None else (flow.intensity, flow.viscous)
         total = numbers.solvent_viscosity * viscous * rate
@@ -116,10 +111,7 @@ class AugmentedFluid:
         return constants_of_modes(mean, low, high, coefficients, deviations, places)
 
     def _law(self, theta, numbers, places):
-        """Return the law with the values of its free parameters, which may differ by mode.
-
-        Of constants by mode, a mode that an effect adds has the one of its own time.
-        """
+        """Return the law with its free parameters, by mode where these differ."""
         free = self.structure.free_parameters
         if not free:
             return numbers.law
@@ -171,18 +163,14 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def dynamics(
-        self, numbers, used, theta, flow: Kinematics | None, in_one_piece: bool = True
-    ) -> Dynamics:
+    def dynamics(self, numbers, used, theta, flow: Kinematics | None) -> Dynamics:
         """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
 
-        `numbers`, `used`, `theta`: what is data to the program, the branches that the vector takes,
-        and the vector. `flow`, `in_one_piece`: the flow, and whether steps are one piece of machine
-        code.
+        `used`: the branches that the vector takes.
         """
         law, declared, extra, amplitudes = self.of_modes(numbers, theta)
         of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
-        added = self.added.rate(theta, used, amplitudes, in_one_piece)
+        added = self.added.rate(theta, used, amplitudes)
 
         def modes_rate(stress, gradient):
             return of_law(stress, gradient) - added(stress, gradient)
@@ -202,7 +190,6 @@ class AugmentedFluid:
             used.states,
             law.variables,
             self._of_modes_at_rest("shares", law, declared.modulus, extra) if law.tensors else None,
-            in_one_piece,
         )
 
     def in_series(self, theta, flow: Kinematics | None) -> Series | None:
@@ -238,9 +225,5 @@ class AugmentedFluid:
 
 
 def where_in_shear(flow: Kinematics | None, changed, unchanged):
-    """Return what a rotational rheometer's drive changes: runs in shear alone.
-
-    An extension is made on another instrument, with flaws of its own. What distorts the signal of
-    the torque changes neither that nor the normal force.
-    """
+    """Return what a rotational rheometer's drive changes: runs in shear alone."""
     return changed if flow is None else jnp.where(flow.is_shear, changed, unchanged)

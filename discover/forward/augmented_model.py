@@ -1,14 +1,13 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
-An effect at zero amplitude changes nothing, so a subset of effects is a vector of parameters with
-zeros, never another program. Runs are padded to one grid. All trial vectors go through one kernel,
-see `discover.forward.side_by_side`; where there is none each vector is a call of its own, which
-leaves out the terms that it has at zero.
+An effect at zero amplitude changes nothing, so a subset of effects is a vector with zeros, never
+another program. All trial vectors go through one kernel (`discover.forward.side_by_side`); where
+there is none each vector is a call of its own, which leaves out the terms it has at zero.
 """
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
@@ -17,10 +16,8 @@ from jaxtyping import Float
 from discover.effects import AbstractEffect, ModeEffect
 from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
-from discover.forward.linearised import Linearised, Point, linearised, widths_of
 from discover.forward.predictor import Predictor, Trials
 from discover.forward.program import program_of
-from discover.programs.lanes import LANES
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -29,16 +26,48 @@ _TRIAL_SHARE = 0.5
 _BY_SPEED = (SteadyFlows, TransientFlows, StressFlows, PeriodicFlows)
 
 
+_WIDTH = 1e-5
+"""Of a parameter, or of its first trial, by which it is moved."""
+
+_BEYOND = 1e-3
+"""By how much a move may lengthen the residuals, whose length is an error over the record."""
+
+
+class Linearised(NamedTuple):
+    """Weighted residuals at one vector, not finite where it diverges, and derivatives.
+
+    The derivatives are by the parameters at `positions`, in their units; behind them stand the
+    changes with each move of the moduli.
+    """
+
+    residual: Float[np.ndarray, "runs n"]
+    jacobian: Float[np.ndarray, "columns runs n"]
+    positions: tuple[int, ...]  # in the vector
+
+
+class Point(NamedTuple):
+    """A vector, the parameters to differentiate by, and its residuals where they are known.
+
+    `limit`: sum of squares beyond which the vector is of no use; see `AugmentedModel.residuals`.
+    """
+
+    theta: Float[np.ndarray, " p"]
+    positions: Sequence[int] = ()
+    residual: Float[np.ndarray, "runs n"] | None = None
+    limit: float = np.inf
+
+    @property
+    def size(self) -> int:
+        """How many vectors are predicted for it."""
+        return len(self.positions) + (self.residual is None)
+
+
 class AugmentedModel:
     """The declared model with a list of effects, as functions of one parameter vector.
 
-    Models that differ in numbers only (moduli, times, scales of the data) share one compiled
-    program for each shape of the runs.
-
-    `effects`: candidates; their parameters follow one another in the vector, after the declared
-    ones. Those that the declared model knows follow, if they are not among them, and last the
-    instants at which rates step. `scales`: size of each property of the data in which parameters
-    are scaled; see `data_scales`.
+    Models that differ in numbers alone share one program for each shape of the runs. The vector
+    holds the declared parameters, those of `effects`, of known effects not among these, and last
+    the instants at which rates step. `scales`: sizes that scale parameters; see `data_scales`.
     """
 
     def __init__(
@@ -90,10 +119,9 @@ class AugmentedModel:
         self.first_trial = np.array([*first, *trials, *[0.5] * steps])
 
     def zero(self) -> Float[np.ndarray, " p"]:
-        """Return the vector of the declared model: amplitudes zero, inner parameters at start.
+        """Return the vector with amplitudes zero and inner parameters at start; rates step halfway.
 
-        Known effects have their values, and where these are to be fitted, a first trial. A rate
-        steps halfway between its samples.
+        Known effects have their values, and where these are fitted, a first trial.
         """
         theta = np.zeros(self.size)
         theta[self.instants] = self.first_trial[self.instants]
@@ -173,11 +201,10 @@ class AugmentedModel:
         batch: Batch,
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n"]:
-        """Return the predicted records of any number of parameter vectors.
+        """Return the predicted records of parameter vectors.
 
-        `thetas`, `batch`: parameter vectors, and the runs that each predicts. `moduli`: of the
-        declared modes in Pa for each vector, and behind them the viscosity of the solvent in Pa s.
-        By default as declared. One that an error of a sweep moves may be negative.
+        `moduli`: of the declared modes in Pa for each vector, and behind them the viscosity of the
+        solvent in Pa s; as declared by default. One that an error of a sweep moves may be negative.
         """
         return self._predicted(thetas, batch, moduli, normal=False)[..., 0]
 
@@ -187,12 +214,10 @@ class AugmentedModel:
         batch: Batch,
         moduli: Float[np.ndarray, "trials c"] | None = None,
     ) -> Float[np.ndarray, "trials runs n 3"]:
-        """Return the predicted records, N1 and N2 in Pa of any number of parameter vectors.
+        """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa, as in `OBSERVED`.
 
-        All three come from one integration, in the order of `OBSERVED`: what is recorded is σ12 in
-        shear, the tensile stress in extension, and a strain at a given stress. N1 is σ11 − σ22 and
-        N2 is σ22 − σ33 in any flow. They are not numbers where a test has none, as a sweep, and at
-        a given stress with a user's own effect that lanes do not know.
+        All come from one integration. N1 and N2 are NaN where a test has none, as a sweep, and at a
+        given stress with a user's own effect that lanes do not know.
         """
         return self._predicted(thetas, batch, moduli, normal=True)
 
@@ -226,10 +251,8 @@ class AugmentedModel:
 
         Those of runs that are loadings of their own are what the factors of these leave.
 
-        `limits`: sums of squares from which on a vector is of no use: its residuals are infinite.
-        What has reached its limit is not followed to the end of its runs, nor, in tests that are
-        quickly predicted, asked about the others, of which a periodic state takes a hundred times
-        as long as a steady one.
+        `limits`: sums of squares from which on a vector is of no use: its residuals are infinite,
+        its runs not followed to the end, and slower tests not asked for.
         """
         if limits is None:
             return batch.records.residual(self.predictions(thetas, batch, moduli))
@@ -260,13 +283,11 @@ class AugmentedModel:
         positions: Sequence[int] = (),
         moves: Float[np.ndarray, "m c"] | None = None,
     ) -> Linearised:
-        """Return the weighted residuals of a vector and their derivatives, from one call.
+        """Return the weighted residuals of a vector and their one-sided differences, from one call.
 
-        `theta`, `batch`: the vector, and the runs. `positions`: parameters by which to
-        differentiate, by differences of one side, away from an end of their range. `moves`: of the
-        moduli in Pa and of the solvent in Pa s: half the difference between what is left after each
-        move and after its opposite follows the derivatives. It is the change by the move where
-        records are linear in the moduli.
+        `positions`: parameters to differentiate by. `moves`: of the moduli in Pa and of the solvent
+        in Pa s; half the difference between each move and its opposite stands behind the
+        derivatives.
         """
         if moves is None or not len(moves):
             return linearised(self, [Point(theta, positions)], batch)[0]
@@ -282,11 +303,43 @@ class AugmentedModel:
             jacobian = np.concatenate([by_parameters, 0.5 * (up - down)])
         return Linearised(base[0], jacobian, tuple(positions))
 
-    def vectors_at_once(self, batch: Batch) -> int:
-        """Return how many vectors cost what one does: as many as stand side by side."""
-        kernels = (
-            isinstance(part, TransientFlows | StressFlows)
-            and self._predictor.side_by_side(part) is not None
-            for part in batch.parts
-        )
-        return LANES if all(kernels) else 1
+
+def widths_of(
+    model: Any, theta: Float[np.ndarray, " p"], positions: Sequence[int]
+) -> Float[np.ndarray, " positions"]:
+    """Return by how much parameters are moved for a derivative, away from an upper bound."""
+    at = list(positions)
+    width = _WIDTH * np.maximum(np.abs(theta[at]), model.first_trial[at])
+    return np.where(theta[at] + width > model.high[at], -width, width)
+
+
+def linearised(model: Any, points: Sequence[Point], batch: Batch) -> list[Linearised]:
+    """Return residuals and derivatives at several vectors, from one call of an `AugmentedModel`."""
+    vectors, limits, widths = [], [], []
+    for point in points:
+        widths.append(widths_of(model, point.theta, point.positions))
+        if point.residual is None:
+            vectors.append(point.theta)
+        for position, width in zip(point.positions, widths[-1], strict=True):
+            moved = point.theta.copy()
+            moved[position] += width
+            vectors.append(moved)
+        limits += [(np.sqrt(point.limit) + _BEYOND) ** 2] * point.size
+        if point.residual is None:
+            limits[-point.size] = point.limit
+    if not vectors:
+        none = (np.zeros((0, *np.asarray(point.residual).shape)) for point in points)
+        return [_of(*one) for one in zip(points, none, widths, strict=True)]
+    known = np.array(limits)
+    ended = () if np.all(np.isinf(known)) else (known,)
+    found = model.residuals(np.array(vectors), batch, *ended)
+    ends = np.cumsum([point.size for point in points])[:-1]
+    each = zip(points, np.split(found, ends), widths, strict=True)
+    return [_of(point, rows, width) for point, rows, width in each]
+
+
+def _of(point: Point, rows: np.ndarray, widths: np.ndarray) -> Linearised:
+    base, moved = (rows[0], rows[1:]) if point.residual is None else (point.residual, rows)
+    with np.errstate(invalid="ignore", over="ignore"):  # what ran away
+        jacobian = (moved - base) / widths[:, None, None]
+    return Linearised(base, jacobian, tuple(point.positions))

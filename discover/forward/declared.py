@@ -35,10 +35,8 @@ def decades(
 ) -> Float[Array, " m"]:
     """Return log10(λ/λ̄), with λ̄ the geometric mean of the times by viscosity.
 
-    `modulus`, `relaxation_time`: of the declared modes, in Pa and s. `of`: times in s; by default
-    the declared ones. Beyond these the end counts, for a polynomial says nothing there. `beyond`:
-    whether times beyond the declared ones count as they are: of modes by which a polynomial is
-    told, too.
+    `of`: times in s, by default the declared ones. Beyond these the end counts, for a polynomial
+    says nothing there, unless `beyond`.
     """
     own = jnp.log10(relaxation_time)
     viscosity = modulus * relaxation_time
@@ -56,15 +54,11 @@ def constants_of_modes(
     deviations: Float[Array, " k"],
     places: Float[Array, " k"],
 ) -> Float[Array, " k"]:
-    """Return the constant of each mode: that at λ̄, with its link moved by a polynomial.
+    """Return the constant of each mode: that at λ̄, its link moved by a polynomial.
 
-    The link is the logarithm of (c − low)/(high − c), or of c − low where there is no upper bound:
-    so every mode keeps the range in which the law is one, whatever the coefficients. With all of
-    them zero each mode has the very constant of the mean.
-
-    `mean`: the constant at λ̄, dimensionless. `low`, `high`: its range. `coefficients`: of the
-    first and the second power of `places`. `deviations`: of each mode from the polynomial.
-    `places`: of the modes, from `decades`.
+    The link is the logarithm of (c − low)/(high − c), or of c − low without an upper bound, so
+    every mode stays in its range, and has the very constant of the mean where all coefficients are
+    zero.
     """
     powers = jnp.stack([places ** (i + 1) for i in range(DEGREE)])
     change = coefficients @ powers + deviations
@@ -95,26 +89,14 @@ class FreeParameter:
 class DeclaredModel:
     """A law, its modes, and which of them are still to be fitted.
 
-    `law`: the law of every mode, with starting values where parameters are free.
-    `fit_modulus`, `fit_relaxation_time`: whether one common factor on all moduli, or on all times,
-        is fitted.
-    `law_name`, `parameters`: name and parameters of a named law; needed only if some are free.
-    `linear_error`: relative error with which the modes describe the linear data they come from; no
-        prediction can be expected to do better.
-    `linear_pattern`: relative size of what in that error is no noise of the linear data; 0 where
-        all may be, None where no number of modes follows them.
-    `modulus_covariance`: of the moduli in Pa², shape (k, k), as those data leave them, and of the
-        solvent behind them, shape (k + 1, k + 1), where it comes from them; None where they are
-        exact.
-    `effects`: what is known beside the law: effects of fluid and instrument, with values or to be
-        fitted.
-    `step_instants`: how many instants of steps of the rate in the fitted runs are fitted;
-        `Run.rate_steps` say which is whose.
-    `by_mode`: free parameters of the law, and effects by the amplitude of their term, that may
-        differ from mode to mode, as a smooth function of the time; see `discover.forward.declared`.
-    `added_modes`: how many modes beside the declared ones, which effects add, have constants by
-        mode of their own; without, these have the constants of the declared spectrum at their
-        times.
+    `fit_modulus`, `fit_relaxation_time`: whether one factor on all moduli, or times, is fitted.
+    `law_name`, `parameters`: of a named law; needed only if some are free.
+    `linear_error`: relative error with which the modes describe the linear data they come from.
+    `linear_pattern`: relative size of what in it is no noise; None where no number of modes fits.
+    `modulus_covariance`: of the moduli in Pa² (the solvent's last), shape (k, k) or (k + 1, k + 1).
+    `step_instants`: how many instants of steps of the rate are fitted; see `Run.rate_steps`.
+    `by_mode`: parameters of the law, and effects by their amplitude, that may differ by mode.
+    `added_modes`: how many modes that effects add have constants by mode of their own.
 
     Raises InputError if modes are none, or a constant by mode cannot be one, or has one mode alone.
     """
@@ -202,10 +184,9 @@ class DeclaredModel:
         free: Sequence[str] = (),
         **options,
     ) -> "DeclaredModel":
-        """Return a named law with these modes.
+        """Return a named law with these modes, in Pa and s.
 
-        `modulus`, `relaxation_time` in Pa and s, one or several. `free`: what to fit: parameters of
-        the law, ``modulus_Pa``, ``relaxation_time_s``. `**options`: other attributes.
+        `free`: what to fit: parameters of the law, ``modulus_Pa``, ``relaxation_time_s``.
         """
         law = make_law(law_name, parameters)
         ranges = LAWS[law_name].parameters
@@ -249,10 +230,7 @@ class DeclaredModel:
 
     @property
     def by_mode_slices(self) -> dict[str, slice]:
-        """Where, after the law's free parameters, each constant by mode has what varies it.
-
-        First the coefficients of a polynomial, then the deviation of each mode from it.
-        """
+        """Where each constant by mode has its polynomial, then the deviations of the modes."""
         start, each = 2 + len(self.free_parameters), DEGREE + self.n_modes
         return {
             name: slice(start + i * each, start + (i + 1) * each)
@@ -304,11 +282,7 @@ class Structure(NamedTuple):
     """How many modes that effects add have constants by mode of their own."""
 
     def with_every_effect(self) -> "Structure":
-        """Return the structure that all sets of effects share: an absent one is at zero.
-
-        It has every effect that is built in, and after them, by name, those of a user's own that
-        are asked for. What a declared model leaves as it is, is not moved.
-        """
+        """Return the structure that all sets share: built-in effects, then a user's, by name."""
         asked = {effect.name: effect for effect in self.effects}
         every = {name: asked.pop(name, effect) for name, effect in built_in_effects().items()}
         every |= {name: asked[name] for name in sorted(asked)}

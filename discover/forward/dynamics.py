@@ -8,12 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from discover.effects import StateEffect
-from discover.forward.integrators.exponential_weights import (
-    KrogstadWeights,
-    StressWeights,
-    krogstad_weights,
-    relax,
-)
+from discover.forward.integrators.exponential_weights import StressWeights, krogstad_weights, relax
 from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 
@@ -31,7 +26,7 @@ class Modes(NamedTuple):
 class Series(NamedTuple):
     """Elements in series with the fluid: slip s in 1/(Pa s) and compliance C in 1/Pa.
 
-    `slip_by_stress`: what slip is beyond that at a stress in Pa; None for nothing.
+    `slip_by_stress`: further slip at a stress in Pa; None for nothing.
     """
 
     slip: Float[Array, ""]
@@ -47,19 +42,16 @@ class Dynamics(NamedTuple):
     """How the modes change, and what changes with them.
 
     `slope`: dimensionless dσ/dt of all modes from their σ, shape (4, k), and their λL: shear rates,
-        shape (k,), in simple shear, else four components, shape (4, k). Where the law has structure
-        variables, σ stands for σ with these behind it, here and below.
-    `declared`, `extra`: the declared modes, and those of effects. Apart, because the weights of the
-        declared ones depend on no trial and are then computed once for all trials.
-    `viscosity`: stress that drives the flow beside that of the modes, at unit rate, in Pa s.
+        shape (k,), in simple shear, else (4, k). Structure variables stand behind σ, here and
+        below.
+    `declared`, `extra`: the declared modes and those of effects, apart because the weights of the
+        former are computed once for all trials.
+    `viscosity`: in Pa s, of the stress that drives the flow beside that of the modes.
     `relaxations`: rates at which each tensor of a mode at rest, and its trace, relax beside −σ,
-        over 1/λ, as the law's, shape (t, 2, k); these too are integrated exactly. None where chains
-        do not retract.
-    `states_in_use`: 0 for none, i + 1 for the i-th alone, one past the last for several; None
-        computes all. One that is not in use stays at rest.
-    `shares`: of each tensor that stands first among them, of each mode, as the law's.
-    `columns`: how many derivatives stand beside each number of the modes: σ then has shape (s, 1 +
-        columns, k), and `slope` is of all of it. 0 leaves σ as it is.
+        over 1/λ, shape (t, 2, k), integrated exactly; None where chains do not retract.
+    `states_in_use`: 0 for none, i + 1 for the i-th alone, one past the last for several; None for
+        all.
+    `columns`: derivatives beside each number of the modes: σ then has shape (s, 1 + columns, k).
     """
 
     slope: Callable
@@ -74,7 +66,6 @@ class Dynamics(NamedTuple):
     states_in_use: Int[Array, ""] | None = None
     variables: int = 0  # structure variables of each mode that the law has
     shares: Float[Array, "tensors k"] | None = None
-    in_one_piece: bool = True  # whether no matrix product stands in the steps; see `contracted`
     columns: int = 0
 
     @property
@@ -97,10 +88,10 @@ class Dynamics(NamedTuple):
         return 1.0 if self.linear_relaxation else 0.0
 
     def weights(self, width: Float[Array, " s"]) -> tuple[Float[Array, "s kinds 11 _"], ...]:
-        """Return what `weights_of_step` wants of steps of these widths in s.
+        """Return the weights of steps in s, apart for declared modes and those of effects.
 
-        Apart for the declared modes and those of effects; of each the weights of its stress and,
-        where that relaxes faster, of its trace, and so on of each further tensor.
+        Of each the weights of its stress and, where that relaxes faster, of its trace, then of each
+        further tensor.
         """
         pieces, first = [], 0
         for modes in [self.declared] if self.extra is None else [self.declared, self.extra]:
@@ -126,27 +117,18 @@ class Dynamics(NamedTuple):
         width: Float[Array, ""],
         slow: Float[Array, ""] | float,
     ) -> StressWeights:
-        """Return the weights of one step.
+        """Return the weights of one step, of those of `weights`, its width and a factor on times.
 
-        `pieces`: those of `weights`. `width`: of the step in s. `slow`: the factor on all times in
-        its middle. A step in time over it is exact for the relaxation as it is there: a structure
-        may shorten times a hundredfold, which explicit steps of the length that the flow asks for
-        cannot follow.
+        A step in time over that factor is exact for the relaxation as it is there: a structure may
+        shorten times a hundredfold, which explicit steps as long as the flow asks for cannot
+        follow.
         """
         if any(effect.changes_times for effect in self.states):
             pieces = jax.lax.cond(
                 self.times_change, lambda: self.weights_alone(width / slow), lambda: pieces
             )
         joined = pieces[0] if len(pieces) == 1 else jnp.concatenate(pieces, axis=-1)
-        whole = KrogstadWeights(*joined[0])
-        if self.relaxations is None:
-            return StressWeights(whole)
-        trace, *others = [KrogstadWeights(*one) for one in joined[1:]]
-        beside = tuple(
-            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
-            for i, one in enumerate(self.relaxations[1:])
-        )
-        return StressWeights(whole, trace, self.relaxations[0, 1], beside, self.shares)
+        return StressWeights.of_kinds(joined, self.relaxations, self.shares)
 
     def rest(self) -> tuple[Float[Array, "s *c k"], Levels]:
         """Return modes and states at rest."""
@@ -196,10 +178,7 @@ class Dynamics(NamedTuple):
         return total
 
     def change(self, stress, rate, slow, flow: Kinematics | None):
-        """Return dσ/dt of each mode in its own time, with all times longer by a factor.
-
-        With all times longer the law holds in its own time, which runs slower.
-        """
+        """Return dσ/dt of each mode in its own time; longer times are a law in a slower time."""
         gradient = rate if flow is None else flow.gradient[:, None] * rate
         if not self.states:
             return self.slope(stress, self.modes.relaxation_time * gradient)
@@ -208,11 +187,9 @@ class Dynamics(NamedTuple):
     def stage(
         self, w: StressWeights, slow: Float[Array, ""] | float, flow: Kinematics | None
     ) -> Callable[[Float[Array, "s *c k"], tuple], Float[Array, "s *c k"]]:
-        """Return what is evaluated in each stage of a step.
+        """Return the function from stress, rate and factor to the change that is no relaxation.
 
-        `w`: weights of the step. `slow`: the factor on all times in its middle. `flow`: which flow
-        it is; None is simple shear. What is returned takes the stress in a stage, and the rate and
-        the factor there, to what of the change is not relaxation at the rates of the weights.
+        `slow`: the factor on all times in the middle of the step.
         """
 
         def remainder(stress, given):
@@ -229,10 +206,7 @@ class Dynamics(NamedTuple):
         width: Float[Array, ""],
         flow: Kinematics | None,
     ) -> Float[Array, "s *c k"]:
-        """Return the modes after a step at a given rate, where no state changes with them.
-
-        `rates`: at its beginning, in its middle and at its end, in 1/s. `width`: of the step in s.
-        """
+        """Return the modes after a step without states: three rates in 1/s, a width in s."""
         w = self.weights_of_step(self.weights_alone(width), width, 1.0)
         stage = self.stage(w, 1.0, flow)
         first, middle, last = rates
@@ -241,7 +215,7 @@ class Dynamics(NamedTuple):
 
     def summed(self, of_modes: Float[Array, "*c k"]) -> Float[Array, " *c"]:
         """Return a stress in Pa of that of each mode over its modulus."""
-        return contracted(of_modes, self.modes.modulus, self.in_one_piece)
+        return contracted(of_modes, self.modes.modulus)
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa, without the factor of the states."""
@@ -249,10 +223,7 @@ class Dynamics(NamedTuple):
         return self.summed(of_modes)
 
     def sheared(self, stress, rate, flow: Kinematics | None):
-        """Return the stress and the rate that a state feels.
-
-        Those of a shear of the same intensity that does the same work.
-        """
+        """Return stress and rate of a shear of the same intensity that does the same work."""
         if flow is None:
             return self.summed(stress[3]), rate
         of_modes = flow.equivalent_shear_stress(stress[:4])

@@ -1,9 +1,7 @@
 """Fluids without instrument in flows of any control: what is recorded at the samples.
 
-A law is followed in time at a given rate, at a given stress the rate is solved for, and steady and
-periodic states are solved for as such. Every function here is made to be transformed: `jax.vmap`
-over runs or laws, `jax.jvp`, and reverse mode; a state that is solved for has the derivative of the
-implicit function.
+Every function here is made to be transformed: `jax.vmap`, `jax.jvp`, and reverse mode; a state that
+is solved for has the derivative of the implicit function.
 """
 
 from collections.abc import Callable
@@ -43,10 +41,8 @@ _GROUP = 8
 class AtSamples(NamedTuple):
     """What is seen of a fluid at the samples.
 
-    `observed`: what is recorded, and N1 and N2 in Pa, shape (n, 3). Of an oscillation G′ + iG″, of
-        which a run shows one, see `FlowBatch.over`; N1 and N2, for it belongs to no moment, are
-        zero.
-    `states`: dimensionless, of each mode, shape (n, k, s); of an oscillation at zero strain.
+    `observed`: what is recorded, N1 and N2 in Pa; of an oscillation G′ + iG″, and zeros. `states`:
+    dimensionless, of each mode; of an oscillation at zero strain.
     """
 
     observed: Inexact[Array, "n 3"]
@@ -83,12 +79,10 @@ def solve_on_grid(
     grid: IntegrationGrid,
     adjoint: diffrax.AbstractAdjoint | None = None,
 ) -> Float[Array, "n 4"]:
-    """Return the stresses at a given rate at the samples of one grid.
+    """Return σ11, σ22, σ33, σ12 in Pa at the samples of one grid, at a given rate.
 
-    `adjoint`: how diffrax differentiates in reverse mode, such as ``RecursiveCheckpointAdjoint()``.
-    None is for values and forward mode: the same steps, traced and compiled in a third of the time.
-
-    Returns σ11, σ22, σ33, σ12 in Pa, shape (n, 4).
+    `adjoint`: how diffrax differentiates in reverse mode. None is for values and forward mode: the
+    same steps, traced and compiled in a third of the time.
     """
     if adjoint is None or protocol.control == "steady":
         return _at_given_rate(fluid, protocol, grid, lambda s, rate: fluid.stress(s.T, rate))
@@ -128,8 +122,7 @@ def solved_on_grid(
 ) -> AtSamples:
     """Return what is seen where the rate is solved for: at a given stress, and of oscillations.
 
-    `make`: the fluid of some numbers; derivatives pass through these alone. `numbers`: a tree.
-    `protocol`, `grid`: of one run, from `lay_out`.
+    `make`: the fluid of some numbers, a tree through which alone derivatives pass.
     """
     dynamics, fixed = make(numbers), make(without_derivatives(numbers))
     if protocol.control == "stress":
@@ -200,12 +193,9 @@ _MOST_PIECES = 8
 
 
 def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
-    """Return flows in steps that follow a fluid's chains as they retract.
+    """Return flows in steps short enough for a fluid's chains as they retract.
 
-    The length of steps is chosen by the flow, which is what all else in a law follows. Of a law
-    that does not retract they are returned as they are.
-
-    `fluid`: the fluid; where it runs away steps stay as they are. `flows`: from `lay_out`.
+    Of another law, or one that diverges, they are returned as they are.
     """
     followed = all(protocols.control in FOLLOWED for protocols, _ in flows.parts)
     if not fluid.law.retracts or not followed:

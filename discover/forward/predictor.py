@@ -1,8 +1,4 @@
-"""What vectors of parameters predict of each part of a batch, in one kernel where there is one.
-
-All trial vectors go through the kernel of every effect; see `discover.forward.side_by_side`. Where
-there is none each vector is a call of its own, which leaves out the terms that it has at zero.
-"""
+"""Predictions of parameter vectors for each part of a batch, in one kernel where there is one."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -55,8 +51,7 @@ no padding."""
 class Predictor:
     """Predictions of a declared model with effects, part by part of a batch.
 
-    `declared`: the declared model. `program`, `of_every_effect`: what is compiled of it: of the
-    effects that there are, and of all that there may be.
+    `program`, `of_every_effect`: compiled of the effects that there are, and of all there may be.
     """
 
     def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
@@ -94,11 +89,7 @@ class Predictor:
     def of_part(
         self, trials: Trials, batch: Batch, number: int, normal: bool = False
     ) -> Float[np.ndarray, "trials rows n kinds"]:
-        """Return the records that a part of a batch holds, in the order of its rows.
-
-        `normal`: whether N1 and N2 are to stand behind what is recorded: not a number where a test
-        has none.
-        """
+        """Return the records of a part, and if `normal` N1 and N2: NaN where a test has none."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
             found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)

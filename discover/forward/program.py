@@ -38,11 +38,6 @@ from discover.protocols.kinematics import Kinematics
 
 _LOGGER = logging.getLogger(__name__)
 
-# Modes up to which the steps at a given rate are one piece of machine code; see `contracted`. With
-# eight runs and all candidates a prediction takes 2.0 ms so and 6.3 otherwise for 3 modes, 4.8 and
-# 7.5 for 6, 10 and 7.8 for 9: arithmetic on many numbers is faster in pieces of its own
-_FEW_MODES = 6
-
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
 
@@ -72,10 +67,7 @@ class Program:
         """Shapes of runs for which it is compiled."""
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
-        """Return what predicts many vectors at once; None where that is left to `predict`.
-
-        To it is left what laws or effects of a user's own do that is not known in lanes.
-        """
+        """Return what predicts many vectors at once; None where lanes do not know some code."""
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
@@ -149,9 +141,7 @@ class Program:
         flow = run.kinematics
         present = self.fluid.present(theta)
         rate, tool_rate = self._rates(theta, present, run)
-        dynamics = self.fluid.dynamics(
-            numbers, used, theta, flow, in_one_piece=len(numbers.modulus) <= _FEW_MODES
-        )
+        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
         cycle = None
         if run.cycle_steps:
             cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
@@ -160,10 +150,7 @@ class Program:
         return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
     def _rates(self, theta, present, run: TransientFlows):
-        """Return the rate that the fluid feels, at half steps, and that of the tool at steps.
-
-        What effects do is computed where they are present, in one of the vectors at least.
-        """
+        """Return the felt rate at half steps and the tool's at steps, by the effects present."""
         instrument_times = run.times / run.clock_factor
         # what lies upstream of the tool first. A series element changes no rate here: slip and
         # compliance stand between the driven tool and the fluid, and the tool moves on as
@@ -189,11 +176,7 @@ class Program:
         return shaped(upstream, self._downstream), upstream[::2]
 
     def _if_present(self, theta, present, effect: AbstractEffect, change: Callable, value):
-        """Return what an effect makes of a value.
-
-        It is computed where one of the vectors has the effect; to those that have it not the value
-        stays what it is, to the last digit.
-        """
+        """Return what an effect makes of a value, which stays as it is without the effect."""
         amplitude = theta[self.fluid.slices[effect.name].start]
         return jax.lax.cond(
             present[self._number[effect.name]],
@@ -312,8 +295,7 @@ class Program:
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.
 
-        What acts sample by sample acts on the wave of the first harmonic. An oscillation takes the
-        inertia of the tool, and what answers late, each frequency by itself.
+        What acts sample by sample acts on the wave of the first harmonic.
         """
         values = self.fluid.values(theta, effect)
         found = found * effect.response(values, frequency) - effect.inertia(values) * frequency**2

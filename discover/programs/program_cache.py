@@ -63,8 +63,8 @@ _PLAIN = (type(None), bool, int, float, str)
 def take_apart(value: Any, leaves: list[Any]) -> Any:
     """Return the nesting of a value as JSON-able lists, and append its arrays to `leaves`.
 
-    Raises NotDescribable if it holds something other than arrays, plain values, tuples, lists,
-    dictionaries and the named tuples and modules of this project.
+    Raises NotDescribable unless it is made of arrays, plain values, tuples, lists, dictionaries and
+    the named tuples and modules of this project.
     """
     if eqx.is_array(value):
         leaves.append(value)
@@ -148,14 +148,12 @@ def compiled(
 ) -> "Compiled[P, R]":
     """Compile a function as `equinox.filter_jit` does, and keep its program for the next start.
 
-    Arrays are traced, everything else is part of the program. Inside of a transformation, without a
-    cache folder, or with arguments that cannot be described exactly (a law from a notebook, say),
-    it is `equinox.filter_jit` and no more.
+    Arrays are traced, everything else, what it encloses too, is part of the program. Inside of a
+    transformation, without a cache folder, or with arguments that no digest describes (a law from a
+    notebook, say), it is `equinox.filter_jit` and no more.
 
-    `function`: pure, as any function to be compiled. What it encloses becomes part of the program.
     `made_from`: what tells a function made inside of another from others made there, in place of
-    everything that it encloses. `runs_long`: whether to let the compiler take its time: a program
-    that a fit calls for many seconds on large matrices is worth it.
+    everything that it encloses. `runs_long`: whether to let the compiler take its time.
     """
     return Compiled(function, made_from, runs_long)
 
@@ -295,8 +293,7 @@ class Compiled(Generic[P, R]):
 def _compiled_soon() -> dict[str, Any]:
     """Return options that make XLA compile sooner, none where its version knows none of them.
 
-    Most programs are small and run for a second or less, and XLA's newer emitters take half as
-    long again to compile them as its older ones. What those make is as fast, but for large
+    Its older emitters take two thirds of the time, and what they make is as fast but for large
     matrices.
     """
     return _if_known({"xla_cpu_use_fusion_emitters": False})
@@ -306,10 +303,9 @@ def _compiled_soon() -> dict[str, Any]:
 def _whole_loops() -> dict[str, Any]:
     """Return options that keep sums inside the loop that they stand in.
 
-    Newer versions of XLA hand sums of more than some thousand numbers to a library, and a loop
-    with a call of a library is started piece by piece at every step, where it else is one piece
-    of machine code (`discover.compilation_cache`): four times the work for eight runs of a fluid
-    of fourteen modes.
+    Newer versions of XLA hand sums of more than some thousand numbers to a library, and a loop with
+    such a call is started piece by piece at every step (`discover.compilation_cache`): four times
+    the work for eight runs of fourteen modes.
     """
     return _if_known({"xla_cpu_experimental_ynn_fusion_type": ""})
 

@@ -135,13 +135,11 @@ class NotDescribable(Exception):
 
 
 def fingerprint(value: Any, arrays_by_content: bool) -> bytes:
-    """Return a digest of a value.
+    """Return a digest of a value, such as the arguments of a function, or the function.
 
-    `value`: arguments of a function, or the function. `arrays_by_content`: whether an array counts
-    with its numbers, as it does where they are built into a program, or with its shape and type
-    only, as it does for an argument. Raises NotDescribable if the value holds what cannot be
-    described: code outside the packages known by version, an object that refers to itself, a
-    device's handle.
+    `arrays_by_content`: whether an array counts with its numbers, as where they are built into a
+    program, or with shape and type only, as an argument does. Raises NotDescribable of code outside
+    the packages known by version, an object that refers to itself, a device's handle.
     """
     return _Walk().digest(value, arrays_by_content)
 

@@ -34,9 +34,8 @@ def in_threads(
 ) -> list[Result]:
     """Return what a function makes of each job, in their order.
 
-    `function`: calls a compiled program, which leaves Python to the others, and not this function.
-    `jobs`: what it is called with. `is_compiled`: whether the program has met jobs of this shape.
-    If not, the first runs alone, so that it is compiled once.
+    `function`: calls a compiled program, which leaves Python to the others. `is_compiled`: whether
+    that has met jobs of this shape; if not, the first runs alone, so that it is compiled once.
     """
     waiting = list(jobs)
     done = [] if is_compiled else [function(job) for job in waiting[:1]]

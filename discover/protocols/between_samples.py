@@ -1,9 +1,9 @@
 """A rate that was read in samples, between them: smooth where the samples say so, else straight.
 
-What the samples say is what they say of one another: each is predicted from its neighbours by a
-straight line and by a cubic, and the curve is smooth where the cubic predicts far better [leaving
-out one at a time: Stone 1974, J. R. Stat. Soc. B 36, 111]. Across a jump neither predicts anything,
-so there no spline swings; in noise both predict as badly.
+Each sample is predicted from its neighbours by a straight line and by a cubic, and the curve is
+smooth where the cubic predicts far better   [leaving out one at a time: Stone 1974, J. R. Stat.
+Soc. B 36, 111]. Across a jump neither predicts anything, so there no spline swings; in noise both
+predict as badly.
 """
 
 from collections.abc import Sequence
@@ -80,8 +80,8 @@ def knots_between(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return knots whose straight lines lie on the curve, and have its area in each interval.
 
-    `times`, `rates`: the samples, shape (n,), at increasing times; of a test at a given stress, the
-    stress. `another`: whether to take another curve through them: see `another_between_samples`.
+    `times`, `rates`: of the samples; at a given stress the stress. `another`: whether to take
+    another curve through them, as `another_between_samples`.
     """
     stretches = _smooth_stretches(times, rates)
     knots, values = [times], [rates]
@@ -107,13 +107,11 @@ def knots_between(
 
 
 def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProtocol | None:
-    """Return a protocol whose rate is another curve through the same samples.
+    """Return a protocol whose rate is another curve through the same samples, at `times` in s.
 
-    What that changes is what nobody knows of the rate: of fifth degree where a cubic spline was
-    taken, monotonic where straight lines were   [Fritsch & Carlson 1980, SIAM J. Numer. Anal. 17,
-    238]. None where the rate was commanded: constant, a wave, or steps.
-
-    `times`: of the samples, in s.
+    It is of fifth degree for a cubic spline, monotonic for straight lines   [Fritsch & Carlson
+    1980, SIAM J. Numer. Anal. 17, 238]: the difference is what nobody knows of the rate. None where
+    the rate was commanded: constant, a wave, or steps.
     """
     knots, rates = np.asarray(protocol.table_times), np.asarray(protocol.table_rates)
     # a jump at 0 ends what came before the record, which no sample holds
@@ -133,10 +131,9 @@ def another_between_samples(protocol: FlowProtocol, times: Samples) -> FlowProto
 def samples_of(
     protocol: FlowProtocol, times: Samples
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
-    """Return the samples of a rate that was read in samples: times in s and rates in 1/s.
+    """Return times in s and rates in 1/s of a rate that was read in samples.
 
-    `protocol`: whose table holds nothing from before the record. `times`: of the record; where that
-    was thinned, what its rate was read in before.
+    `times`: of the record; where that was thinned, what its rate was read in before.
     """
     return _samples(np.asarray(protocol.table_times), np.asarray(protocol.table_rates), times)
 
@@ -224,10 +221,7 @@ _SMALLEST = 0.01
 
 @dataclass(frozen=True)
 class RateStep:
-    """A step of the rate between two samples.
-
-    `start`, `end`: times of the two samples in s.
-    """
+    """A step of the rate between two samples, at `start` and `end` in s."""
 
     start: float
     end: float
@@ -243,14 +237,11 @@ class RateStep:
 def steps_between_samples(
     protocol: FlowProtocol, time: Float[np.ndarray, " n"], rate: Float[np.ndarray, " n"]
 ) -> tuple[RateStep, ...]:
-    """Return the steps of a rate whose instants its samples do not tell.
+    """Return the steps of a rate whose instants its samples, in s and 1/s, do not tell.
 
     The rate changes from one sample to the next, and hardly before and after. A straight line
-    between the two samples stands for a step halfway, which errs by up to half the strain of the
-    interval.
-
-    `protocol`: of the record. A rate that was given as a function of time has no such step. `time`,
-    `rate`: of the samples in s and 1/s.
+    between the two stands for a step halfway, which errs by up to half the strain of the interval.
+    A rate that was given as a function of time has no such step.
     """
     if protocol.control != "rate" or np.any(np.asarray(protocol.amplitudes)) or len(time) < 4:
         return ()
@@ -279,9 +270,8 @@ def sampling_interval(
 ) -> float:
     """Return the median time between neighbouring samples of a record, in s.
 
-    Not a number of what other means record than those of a shear stress at a given rate, from rest:
-    a strain, a normal stress, an extension, the points of a table of states, cycles that a
-    rheometer has averaged. Their noise need not be correlated as that of the others.
+    NaN but for a shear stress at a given rate, from rest: the noise of a strain, a normal stress,
+    an extension, a table of states or cycles averaged need not be correlated in the same way.
     """
     plain = protocol.control == "rate" and float(protocol.begins) == 0.0
     if not plain or {quantity, protocol.quantity} != {"sigma12"} or len(time) < 2:

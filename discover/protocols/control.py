@@ -47,13 +47,12 @@ def oscillations(
 def imposed_stress(times: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> FlowProtocol:
     """Return the stress at samples as what is imposed, from rest at t = 0.
 
-    Between samples it is what a rate would be: smooth where the samples are, such as a wave, else
-    straight (`sampled_rate`). It jumps at t = 0 if the first samples hold one level, and between
-    two levels, however small the step between them (creep and recovery, a staircase), right after
-    the last sample of the first. A jump takes a thousandth of the time to the next sample.
+    Between samples it is smooth where they are, else straight (`sampled_rate`). It jumps at t = 0
+    if the first samples hold one level, and between two levels (creep and recovery, a staircase)
+    right after the last sample of the first, in a thousandth of the time to the next sample.
 
-    `times` in s, from 0 on, increasing, shape (n,), two at least. `stress`: the recorded stress in
-    Pa, shape (n,). Raises InputError if there are fewer than two samples, or no stress.
+    `times` in s, increasing from 0 on; `stress` in Pa. Raises InputError if there are fewer than
+    two samples, or no stress.
     """
     times, stress = np.asarray(times, dtype=float), np.asarray(stress, dtype=float)
     size = float(np.max(np.abs(stress), initial=0.0))
@@ -103,10 +102,7 @@ def drawn_against(
 ) -> tuple[str, Float[np.ndarray, " n"]]:
     """Return what a record is drawn against, in words with the unit, and its values.
 
-    Time where it goes on in time, of a flow curve the rate, of oscillations frequency or amplitude,
-    whichever varies.
-
-    `time`, `rate`, `strain`: of the samples, shape (n,).
+    Time; of a flow curve the rate; of oscillations frequency or amplitude, whichever varies.
     """
     if control not in STATES:
         return "time (s)", time

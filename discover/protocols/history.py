@@ -159,9 +159,7 @@ def after_alternation(
 def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
     """Return the protocol with as many cycles before the record as a mode needs to be periodic.
 
-    For integrators that wait; what solves for the periodic state needs no more than it has.
-
-    `protocol`: of any kind; what is no oscillation that had gone on is returned as it is.
+    For integrators that wait. What is no oscillation that had gone on is returned as it is.
     `relaxation_time`: the longest, in s. Raises InputError if more than `MOST_CYCLES` would be
     needed.
     """

@@ -82,12 +82,10 @@ _IN_WORDS = {
 class Kinematics(eqx.Module):
     """A homogeneous flow at unit rate, and the stress that is recorded in it.
 
-    `recorded`: weights of σ11, σ22, σ33, σ12 in the recorded stress: σ12 in shear, or one of its
-        normal stress differences; σ11 − σ22 in extension.
-    `intensity`: √(γ̇:γ̇/2) at unit rate: the shear rate of the same intensity. 1 in shear, √3 in
-        uniaxial extension.
+    `recorded`: weights of σ11, σ22, σ33, σ12 in the recorded stress.
+    `intensity`: √(γ̇:γ̇/2) at unit rate: 1 in shear, √3 in uniaxial extension.
     `viscous`: recorded stress of a Newtonian fluid of unit viscosity at unit rate: 1 in shear, 3, 4
-        and 6 in uniaxial, planar and biaxial extension [Trouton 1906, Proc. R. Soc. A 77, 426].
+        and 6 in uniaxial, planar and biaxial extension   [Trouton 1906, Proc. R. Soc. A 77, 426].
     """
 
     gradient: Float[Array, "*batch 4"]  # L11, L22, L33, L12 at unit rate
@@ -162,10 +160,9 @@ def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:
 def kinematics_recording(
     kinematics: Kinematics | None, quantity: RecordedQuantity, count: int
 ) -> Kinematics:
-    """Return the kinematics of so many runs as if another stress of theirs were recorded.
+    """Return the kinematics of so many runs as if N1 or N2 of theirs were recorded.
 
-    `kinematics`: those of the runs; None where all are simple shear. `quantity`: ``"N1"`` or
-    ``"N2"``, of any flow.
+    None stands for runs in simple shear.
     """
     every = kinematics or stack_kinematics([kinematics_of("shear")] * count)
     assert every is not None
@@ -179,11 +176,10 @@ def normal_stress_differences(
     recorded: Float[np.ndarray, "trials runs n"],
     of_modes: Float[np.ndarray, "trials runs n 4"],
 ) -> Float[np.ndarray, "trials runs n 2"]:
-    """Return N1 and N2 of runs.
+    """Return N1 and N2 of runs, of the recorded stress and σ11, σ22, σ33, σ12 of the modes.
 
-    `kinematics`: those of the runs; None where all are simple shear. `recorded`, `of_modes`: the
-    recorded stress, and σ11, σ22, σ33, σ12 of the modes alone: what else stands in the recorded one
-    is that of a generalised Newtonian fluid, which in shear has neither.
+    What else stands in the recorded stress is that of a generalised Newtonian fluid, which in shear
+    has neither.
     """
     weights = np.array([_RECORDED["N1"], _RECORDED["N2"]])
     found = of_modes @ weights.T

@@ -225,10 +225,9 @@ def simulate_homogeneous_flow(
 ) -> Float[np.ndarray, "n 3 3"]:
     """Return the full dimensionless stress of a law in any homogeneous flow from rest.
 
-    `velocity_gradient`: function of time that returns L, shape (3, 3). Flows that differ in the
-    arrays of a `jax.tree_util.Partial` alone share a program. `times`: dimensionless sampling
-    times, shape (n,), increasing, from 0 on. Raises SimulationError if the stress diverges, as it
-    does in UCM beyond a critical extension rate.
+    `velocity_gradient`: function of time that returns L, shape (3, 3); `jax.tree_util.Partial` of
+    other arrays share a program. `times`: dimensionless, increasing, from 0 on. Raises
+    SimulationError if the stress diverges, as in UCM beyond a critical extension rate.
     """
     found, successful = _solve_in_any_flow(
         law, velocity_gradient, jnp.asarray(times, dtype=float), rtol, atol

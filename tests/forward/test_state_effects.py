@@ -160,10 +160,7 @@ def test_heat_and_work_shorten_the_relaxation_times(name):
     start, oscillation = predict(**{name: (heating, loss)})
 
     def slope(y, rate):
-        return [
-            MODULUS * rate - y[0] * np.exp(y[1]) / TIME,
-            heating * y[0] * rate - y[1] / loss,
-        ]
+        return [MODULUS * rate - y[0] * np.exp(y[1]) / TIME, heating * y[0] * rate - y[1] / loss]
 
     # second order in steps of 0.1 strain
     for record, rate in ((start, lambda t: STEADY), (oscillation, oscillating_rate)):

@@ -8,7 +8,7 @@ from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import Giesekus
 from discover.learners import LearnerResult, RecoveredTerm
 from tensor_library.law_terms import LawTerms
-from tensor_library.notation import STRESS, Trace
+from tensor_library.sympy_notation import STRESS, Trace
 
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
 

@@ -5,7 +5,7 @@ import pytest
 import sympy
 
 import tensor_library as tl
-from tensor_library.notation import RATE, STRESS, UNIT, Trace
+from tensor_library.sympy_notation import RATE, STRESS, UNIT, Trace
 
 LIBRARY = tl.build_library(degree=2, closed_forms=("exp", "saturating"))
 

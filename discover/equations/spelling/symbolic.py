@@ -6,7 +6,7 @@ import sympy
 
 from discover.equations.parts import NamedPart
 from tensor_library.law_terms import LawTerm
-from tensor_library.notation import SympyNotation
+from tensor_library.sympy_notation import SympyNotation
 from tensor_library.terms import parse_term
 
 

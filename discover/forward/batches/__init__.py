@@ -1,12 +1,14 @@
 """Runs laid out once on the host: padded, and of each control all in one program."""
 
-from discover.forward.batches.batch import Batch, Flows, make_batch
 from discover.forward.batches.flows import (
+    Batch,
+    Flows,
     PeriodicFlows,
     Places,
     SteadyFlows,
     StressFlows,
     TransientFlows,
+    make_batch,
 )
 from discover.forward.batches.records import (
     OBSERVED,

@@ -1,4 +1,4 @@
-"""What is needed to follow runs of each control, padded, side by side."""
+"""Runs laid out for prediction: what is needed to follow those of each control, side by side."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,6 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
+from discover.forward.batches.records import Records, make_records
 from discover.forward.grids.grid import make_grid, steps_of_half_cycle, stress_grid
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
@@ -23,9 +24,9 @@ _NEVER = -1.0
 class RateSteps(eqx.Module):
     """Steps of the rate between two samples, with a leading axis of runs.
 
-    `start`, `end`: times of the samples in s; padding lies before any record.
-    `share`: of the interval at whose end the rate steps, where that is not fitted.
-    `place`: which of the fitted shares is its own; −1 where it is not fitted.
+    `start`, `end`: times of the samples in s; padding lies before any record. `share`: of the
+    interval at whose end the rate steps, where not fitted. `place`: of its fitted share; −1 where
+    not fitted.
     """
 
     start: Float[Array, "*runs steps"]
@@ -39,11 +40,10 @@ class RateSteps(eqx.Module):
     ) -> Float[Array, " m"]:
         """Return the rate of one run with its steps where they happen.
 
-        Between the two samples Simpson's rule gives the strain of each step of the integration, and
-        rates change smoothly with the instant on a grid that stays as it is.
-
-        `rate`, `times`: rate in 1/s at ends and middles of steps in turn, with a straight line
-        where it steps; and times in s. `fitted`: the fitted shares.
+        Between the two samples Simpson's rule gives the strain of each step of the integration, so
+        that rates change smoothly with the instant. `rate`, `times`: at ends and middles of steps
+        in turn, in 1/s and s, with a straight line where the rate steps. `fitted`: the fitted
+        shares.
         """
         share = self.share
         if fitted.shape[0]:
@@ -108,13 +108,12 @@ _MANY_RUNS, _SAMPLES, _STEPS = 8, 128, 256
 class TransientFlows(eqx.Module):
     """Flows at a given rate in time on padded grids, with a leading axis of runs.
 
-    `times`: half-step grid: step ends and middles in turn, shape (runs, 2 s − 1), in s. Negative in
-        what came before the record.
-    `strain_before`: total strain of the sample before each run, shape (runs,).
-    `last_step`: position of the last sample of each run among step ends; what follows is padding.
+    `times`: step ends and middles in turn, in s; negative in what came before the record.
+    `strain_before`: total strain of the sample before each run.
+    `last_step`: position of the last sample of each run among step ends; padding follows.
     `steps`: steps of the rate whose instants are fitted, or were; None where there is none.
-    `cycle`: positions among step ends of the last cycle before the first sample, shape (runs, 2);
-        −1 where the run has no periodic start.
+    `cycle`: positions among step ends of the last cycle before the first sample; −1 where the run
+        has no periodic start.
     """
 
     times: Float[Array, "runs m"]
@@ -137,10 +136,7 @@ class TransientFlows(eqx.Module):
         return float(np.max(ends))
 
     def in_shared_shape(self) -> "TransientFlows":
-        """Return these runs padded to one of few shapes, so that data sets share programs.
-
-        A run more is the last once more, and what is beyond a run's end is at rest.
-        """
+        """Return these runs padded to one of few shapes, so that data sets share programs."""
         times, rate = np.asarray(self.times), np.asarray(self.commanded_rate)
         samples = _rounded(self.sample_index.shape[1], _SAMPLES)
         step_ends = _rounded((times.shape[1] + 1) // 2, _STEPS)
@@ -332,3 +328,70 @@ def oscillations(
     strain, frequency = states.T
     steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), strain_step) for one in strain]
     return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places
+
+
+Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
+"""Flows of one control, which share one program; of all but oscillations one row for each run."""
+
+
+class Batch(eqx.Module):
+    """Runs of one control or several, in parts of which each has a program of its own.
+
+    `parts`, `rows`: the flows of each control, simple shear apart, and which runs they are.
+    `moduli`: of each run that is a modulus, which one, and where its states stand in their part.
+    """
+
+    parts: tuple[Flows, ...]
+    rows: tuple[tuple[int, ...], ...] = eqx.field(static=True)
+    moduli: tuple[Places, ...] = eqx.field(static=True)
+    records: Records  # of all runs in their order, of one kind, in arrays of NumPy
+
+    @property
+    def weight(self) -> Float[np.ndarray, "runs n"]:
+        """Weights of what was recorded, zero at padding."""
+        return np.asarray(self.records.weight)
+
+    @property
+    def recorded(self) -> Float[np.ndarray, "runs n"]:
+        """What was recorded, in Pa or as a strain."""
+        return np.asarray(self.records.recorded)
+
+    @property
+    def longest(self) -> float:
+        """Time of the last sample of all, in s."""
+        return max(part.longest for part in self.parts)
+
+    def without_factors(self) -> "Batch":
+        """Return a batch whose residuals are those of predictions, without factors of loadings."""
+        return replace(self, records=self.records.without_factors())
+
+
+def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
+    """Return runs as a batch.
+
+    `runs`: of each record one. `strain_step`: largest strain of a step.
+    """
+    # simple shear apart from other flows, for it costs less
+    kinds = [
+        (flow.control, flow.control == "rate" and flow.kinematics is not None)
+        for flow in (run.protocol for run in runs)
+    ]
+    rows = tuple(
+        tuple(i for i, own in enumerate(kinds) if own == kind) for kind in dict.fromkeys(kinds)
+    )
+    moduli: tuple[Places, ...] = ()
+    parts: list[Flows] = []
+    for at in rows:
+        own = [runs[i] for i in at]
+        control = own[0].protocol.control
+        if control == "oscillation":
+            part, moduli = oscillations(own, strain_step)
+        elif control == "steady":
+            part = steady_states(own)
+        elif control == "stress":
+            part = at_given_stress(own, strain_step)
+        else:
+            part = transients(own, strain_step)
+        parts.append(part)
+    records = make_records(runs, max(map(len, runs)), "run").of_one_kind()
+    return Batch(tuple(parts), rows, moduli, records)

@@ -1,10 +1,8 @@
 """What was recorded in runs and what every value weighs: the misfit that all fits minimise.
 
-A residual is what is predicted minus what was recorded, times its weight. A weight is the run's own
-(`Run.weight`, or one of `Run.normal_weights`), over the size of the value (`Run.sizes`: the
-root-mean-square of a transient, in a flow curve or a sweep each value itself), over the root of the
-number of values that the mean is over. So where runs weigh alike the squares of the residuals add
-up to the mean squared relative misfit of each run, of all runs, or of all values; see `Mean`.
+A residual is prediction minus record, times its weight: the run's own (`Run.weight`, or one of
+`Run.normal_weights`) over the size of the value (`Run.sizes`) and over the root of the number of
+values that the mean is over, so that squares add up to a mean squared relative misfit; see `Mean`.
 """
 
 from collections.abc import Sequence
@@ -38,8 +36,8 @@ Values = TypeVar("Values", Array, np.ndarray)
 class Loadings(eqx.Module):
     """Which rows of records share a loading, and how much their factors may differ.
 
-    `members`: whether a row is a record of a loading, shape (loadings, rows).
-    `noise`: standard deviation of the weighted residuals of each row that is noise, shape (rows,).
+    `members`: whether a row is a record of a loading. `noise`: standard deviation of the weighted
+    residuals of each row that is noise.
     """
 
     members: Bool[Array | np.ndarray, "loadings rows"]
@@ -61,8 +59,7 @@ class Loadings(eqx.Module):
     ) -> Float[Values, "*trials rows n"]:
         """Return weighted residuals with factors of their own, which the prior holds back.
 
-        `residual`, `predicted`: predictions minus records, and predictions, both weighted; arrays
-        of NumPy or JAX.
+        `residual`, `predicted`: predictions minus records, and predictions, both weighted.
         """
         along, size = self._along(residual, predicted)
         with np.errstate(all="ignore"):  # a trial that ran away
@@ -81,10 +78,7 @@ class Loadings(eqx.Module):
         residual: Float[np.ndarray, "trials rows n"],
         predicted: Float[np.ndarray, "trials rows n"],
     ) -> tuple[Float[np.ndarray, "trials loadings"], Float[np.ndarray, "trials loadings"]]:
-        """Return the factors less one that fit best without the prior, and their precisions.
-
-        The precision is one over the variance by noise. Parameters as in `whitened`.
-        """
+        """Return the factors less one that fit best without the prior, and their precisions."""
         along, size = self._along(residual, predicted)
         return -along / np.where(size > 0.0, size, 1.0), size
 
@@ -106,10 +100,8 @@ def _where(chosen, values):
 def loadings(runs: Sequence[Run], unit: Float[np.ndarray, " runs"]) -> Loadings | None:
     """Return the loadings of runs; None where they are none of their own.
 
-    What else was recorded of a run, and both moduli of a sweep, share its loading.
-
-    `runs`: of each record one. `unit`: the norm of the weighted residuals of one that misses by all
-    of its size, over the root of the number of its samples, shape (runs,).
+    What else was recorded of a run, and both moduli of a sweep, share its loading. `unit`: the norm
+    of the weighted residuals of a run that misses by all of its size, over the root of its samples.
     """
     deviations = {run.loading.deviation for run in runs if run.loading is not None}
     if not deviations:
@@ -193,9 +185,8 @@ of that over the runs, or the mean over all values."""
 class Records(eqx.Module):
     """What was recorded in runs, and what every value weighs; arrays of NumPy or JAX.
 
-    `recorded` in Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is
-        recorded, N1 and N2, or (runs, n) of the first alone.
-    `weight`: of each value, as above; zero where nothing was recorded or it is not looked at.
+    `recorded`: in Pa, of creep the strain; zero where nothing was. Shape (runs, n, 3) of what is
+    recorded, N1 and N2, or (runs, n). `weight`: zero where nothing was recorded or is looked at.
     """
 
     recorded: Float[Array | np.ndarray, "runs n *kinds"]
@@ -286,9 +277,9 @@ class Records(eqx.Module):
 def make_records(runs: Sequence[Run], n: int, mean: Mean, kinds: int = 1) -> Records:
     """Return what was recorded in runs, of three kinds, in arrays of NumPy.
 
-    `runs`: any runs. What is zero throughout sets no scale, and is not looked at if it is a normal
-    stress difference. `n`: samples of each, with padding. `mean`: what the squares of the residuals
-    add up to. `kinds`: how many of `OBSERVED`, where measured, are looked at.
+    `n`: samples of each, with padding. `mean`: what the squares of residuals add up to. `kinds`:
+    how many of `OBSERVED` are looked at, where measured; a normal stress difference that is zero is
+    not.
     """
     recorded = np.zeros((len(runs), n, len(OBSERVED)))
     weight, size = np.zeros_like(recorded), np.ones_like(recorded)

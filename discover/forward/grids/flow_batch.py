@@ -37,10 +37,8 @@ class Shown(NamedTuple):
 class FlowBatch(eqx.Module):
     """Flows and their grids, those of one control together, for each has a program of its own.
 
-    G′ and G″ of one sweep are two runs of one flow: its periodic states are solved for once.
-
-    `parts`: protocols and grids of each control, both with a leading axis of flows.
-    `shown`: what each run of a part shows of them.
+    G′ and G″ of one sweep are two runs of one flow. `parts`: protocols and grids of each control,
+    with a leading axis of flows. `shown`: what each run of a part shows of them.
     """
 
     parts: tuple[tuple[FlowProtocol, IntegrationGrid], ...]
@@ -73,9 +71,7 @@ class FlowBatch(eqx.Module):
     def over(self, function: Callable[..., Any]) -> Any:
         """Return what a function makes of each flow and its grid, runs in their order.
 
-        `function`: of one protocol and its grid; it may return a tree of arrays, whose shapes do
-        not depend on the control. Where an array is complex, a run has the part that is its
-        modulus.
+        It may return a tree of arrays; of a complex one a run has the part that is its modulus.
         """
         found, told = [], None
         for part, shown in zip(self.parts, self.shown, strict=True):
@@ -200,11 +196,9 @@ def lay_out(
     """Return flows with their grids, as many padded samples in each.
 
     Of an oscillation that had gone on for ever the periodic state is solved for if the fluid
-    relaxes; if not, the cycles with which its protocol begins are waited for.
-
-    `protocols`, `times`: one flow and its sampling times for each run. `n_samples`: pad to so many
-    samples, or to those of the longest run. `relaxation_time`: longest of the fluid, in s; None
-    where only what is learned relaxes. `**limits`: as `make_grids` takes them.
+    relaxes; else the cycles with which its protocol begins are waited for. `n_samples`: least of
+    each. `relaxation_time`: longest of the fluid, in s; None where only what is learned relaxes.
+    `**limits`: of `make_grids`.
     """
     n = max(n_samples, *(len(sampled) for sampled in times))
     parts, shown = [], []

@@ -34,14 +34,9 @@ def stress_grid(
 ) -> Float[np.ndarray, " s"]:
     """Return step times for a run at a given stress.
 
-    Every sample and every kink of the imposed stress is a step, and there is one between any two
-    samples. A jump, which takes a short time, is gone through in even steps, and what follows it
-    in steps that grow with the time since. No step takes more than twice `strain_step` of the
-    strain recorded.
-
-    `protocol`: with the imposed stress as its table, and the strain recorded where there is a
-    record. `times`: of the samples, shape (n,). `strain_step`: half of the largest strain of one
-    step: the rate is solved for in its middle too.
+    Every sample and kink of the stress is a step, and there is one between any two samples. A jump
+    is gone through in even steps, and what follows in steps that grow with the time since. No step
+    takes more than twice `strain_step` of the strain that the protocol holds as recorded.
     """
     begins, end = float(protocol.begins), float(times[-1])
     knots = np.asarray(protocol.table_times)
@@ -132,13 +127,12 @@ _DISTURBANCE, _GROWTH_AS_IT_SETTLES, _SURE, _ORDER = 0.01, 0.05, 0.5, 4
 class IntegrationGrid(eqx.Module):
     """Where to step and where to sample, for one run or, with a leading axis, a batch of runs.
 
-    `times`: step times in s, shape (s,), strictly increasing from where the protocol begins; padded
-        past the last sample.
-    `sample_index`: position in `times` of every sample, shape (n,); padded with the last one.
-    `phase`: of oscillations that have gone on until they are periodic: ωt at step ends and middles
-        in turn over half a cycle, shape (m,). None elsewhere.
-    `cycle`: steps of the cycle with which the grid of a run begins that had gone on for ever; 0 of
-        a run that had not, None where no run had.
+    `times`: of steps in s, increasing from where the protocol begins, padded past the last sample.
+    `sample_index`: position in `times` of every sample; padded with the last one.
+    `phase`: of periodic oscillations ωt at step ends and middles in turn over half a cycle; else
+        None.
+    `cycle`: steps of the cycle with which a grid begins that had gone on for ever; 0 of a run that
+        had not, None where no run had.
     """
 
     times: Float[Array, "*batch s"]
@@ -154,13 +148,7 @@ class IntegrationGrid(eqx.Module):
         return self.times[self.sample_index]
 
     def of_states(self, solve: Callable[[Float[Array, ""]], Any]) -> Any:
-        """Return what is found of each steady state, at the samples of one grid.
-
-        States are few where samples are padded to those of a long record beside them: each is
-        solved for once, and none for padding.
-
-        `solve`: from the number of a state to a tree of arrays.
-        """
+        """Return what is found of each steady state, once each, at the samples of one grid."""
         found = jax.vmap(solve)(self.times)
         return jax.tree.map(lambda leaf: leaf[self.sample_index], found)
 
@@ -177,26 +165,23 @@ def make_grid(
 ) -> tuple[Float[np.ndarray, " s"], Int[np.ndarray, " n"]]:
     """Return step times and the position of each sample among them.
 
-    Every sample and every kink of the protocol is a step; between them no step turns the fluid
-    through more than `strain_step` of strain or `phase_step` radians of an oscillation. With the
-    defaults the fourth-order method is accurate to about 1e-6 of the stress (tested). A constant
-    rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or a quarter where the
-    relaxation time is not known, that shrink towards its end: a steady state is a fixed point of
-    the method whatever its step, but stable in short ones only.
+    Every sample and kink of the protocol is a step; between them none takes more than `strain_step`
+    of strain or `phase_step` radians: with the defaults the fourth-order method errs by about 1e-6
+    of the stress. A constant rate before t = 0 is gone through in steps of `COARSEST_STRAIN`, or a
+    quarter where the relaxation time is not known, that shrink towards its end: a steady state is a
+    fixed point of the method whatever its step, but stable in short ones only.
 
-    `times`: sampling times in s, increasing, from 0 on. `strain_step`, `phase_step`: largest strain
-    and phase per step. `max_step`: largest step in s. `growth`: while the rate of a table does not
-    change, steps may grow to this fraction of the time since it last did, up to `COARSEST_STRAIN`
-    where `max_step` limits them too, else half of it: what follows a change happens ever more
-    slowly. An oscillation of the fluid's own is not resolved in the steps that grow.
-    `relaxation_time`: longest of the fluid, in s. Steps then grow while the rate of a table is
-    constant, up to `COARSEST_STRAIN` and this time, without adding to the largest error: what a
-    change of the rate set off, an oscillation or a decay, dies out as exp(−t/λ), so steps that grow
-    as exp(t/4λ) from t = λ on add as much to the error of a fourth-order method as has died out of
-    it. Half of this relaxation is counted on. None leaves steps as they are. `from_cycle`: whether
-    what had gone on for ever begins with its last cycle before the record, whose state is solved
-    for, and not with all that are waited for. Raises InputError if the run would need an absurd
-    number of steps.
+    `times`: of samples in s, increasing, from 0 on.
+    `max_step`: largest step in s.
+    `growth`: while the rate of a table is constant, steps may grow to this fraction of the time
+        since it changed, up to `COARSEST_STRAIN` where `max_step` limits them too, else half of it.
+    `relaxation_time`: longest of the fluid, in s. Steps then grow while the rate is constant, up to
+        `COARSEST_STRAIN` and this time: what a change set off dies out as exp(−t/λ), so steps that
+        grow as exp(t/4λ) from t = λ on add no more to the error of a fourth-order method. Half of
+        this relaxation is counted on. None leaves steps as they are.
+    `from_cycle`: whether what had gone on for ever begins with its last cycle, which is solved for.
+
+    Raises InputError if the run would need an absurd number of steps.
     """
     times = np.asarray(times, dtype=float)
     if protocol.control in STATES:
@@ -357,12 +342,7 @@ def make_grids(
     from_cycle: bool = False,
     **limits: float,
 ) -> IntegrationGrid:
-    """Return the grids of several runs, padded to one shape with a leading batch axis.
-
-    `protocols`, `times`: one flow of one control and its sampling times for each run; see
-    `make_grid`. `relaxation_time`, `from_cycle`, `**limits`: step limits of `make_grid`, and where
-    it begins.
-    """
+    """Return the grids of several runs of one control, padded to one shape; see `make_grid`."""
     grids = [
         make_grid(p, t, relaxation_time=relaxation_time, from_cycle=from_cycle, **limits)
         for p, t in zip(protocols, times, strict=True)

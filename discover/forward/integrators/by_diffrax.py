@@ -22,11 +22,7 @@ def solve_in_reverse(
     start: Float[Array, "k s"],
     adjoint: diffrax.AbstractAdjoint,
 ) -> Float[Array, "n 4"]:
-    """Return the stresses in Pa at the samples of one grid, from where the modes begin.
-
-    `fluid`, `protocol`, `grid`: of one run at a given rate in time. `start`: dimensionless modes at
-    the first time. `adjoint`: how diffrax differentiates.
-    """
+    """Return the stresses in Pa at the samples of one grid, from dimensionless modes on."""
     solution = diffrax.diffeqsolve(
         diffrax.ODETerm(vector_field),
         exponential_steps(fluid),
@@ -59,18 +55,15 @@ def stress_of(t, state, args):
 class ExponentialRungeKutta4(diffrax.AbstractAdaptiveSolver):
     """Fourth-order exponential Runge–Kutta method   [Krogstad 2005, JCP 203, 72].
 
-    The vector field is split as f = −decay ∘ y + N(t, y). The decay is integrated exactly, so a
-    spectrum of relaxation times over seven decades costs no more steps than its slowest mode. With
-    zero decay the method is a classical four-stage Runge–Kutta method. The error estimate is the
-    difference to the third-order solution that takes the last stage from the new point; where no
-    error is asked for (fixed steps), that evaluation is compiled away and a step costs four.
+    The vector field is split as f = −decay ∘ y + N(t, y), and the decay integrated exactly, so a
+    spectrum over seven decades costs no more steps than its slowest mode. With zero decay it is
+    classical Runge–Kutta. The error estimate is the difference to the third-order solution that
+    takes the last stage from the new point; in fixed steps it is compiled away.
 
-    `decay`: rates of linear relaxation in 1/s, broadcastable against the state. Any value is
-        consistent: it decides accuracy, not the limit. No gradient flows through it.
-    `tensors`: of how many tensors the rates are those of a state as `turned` gives it, each with
-        its trace first: chains that retract relax that faster than the rest, and both have to be
-        exact where steps are long beside a mode's time.
-    `shares`: what the first tensor has of the others, of which only the rest is followed; or None.
+    `decay`: rates of linear relaxation in 1/s, broadcastable against the state; any value is
+    consistent, and no gradient flows through it. `tensors`: how many tensors the rates are of, each
+    with its trace first (`turned`): chains that retract relax that faster than the rest. `shares`:
+    what the first tensor has of the others; or None.
     """
 
     decay: Float[Array, " ..."]

@@ -16,9 +16,8 @@ Numbers = Float[Array | np.ndarray, " ..."]
 def phi_functions(z: Numbers) -> tuple[Numbers, Numbers, Numbers]:
     """Return φ₁, φ₂, φ₃ with φ₁(z) = (eᶻ − 1)/z and φₖ₊₁(z) = (φₖ(z) − 1/k!)/z.
 
-    The recurrence loses digits near zero, so a Taylor series serves there: with 14 terms its
-    remainder at |z| = 1 is below 1e-15, and the recurrence loses less than three digits beyond.
-    Of an array of NumPy's they are computed by NumPy.
+    The recurrence loses digits near zero, so a Taylor series serves there: its remainder at |z| = 1
+    is below 1e-15, and the recurrence loses less than three digits beyond.
     """
     of: Any = np if isinstance(z, np.ndarray) else jnp
     small = of.abs(z) < 1.0
@@ -45,9 +44,8 @@ def phi_functions(z: Numbers) -> tuple[Numbers, Numbers, Numbers]:
 def with_shares(state, shares, factor: float, axis: int):
     """Return states whose first tensor has shares of the further ones more, times a factor.
 
-    `state`: components along an axis: four of each tensor, and what stands behind. `shares`: of
-    each further tensor, or of each and of each mode along the last axis of `state`; None or none
-    leaves states as they are. `factor`: 1, or −1 to undo it. `axis`: of the components.
+    `state`: components along `axis`: four of each tensor, and what stands behind. `shares`: of each
+    further tensor, or of each and each mode; None for none. `factor`: 1, or −1 to undo it.
     """
     if shares is None or not len(shares):
         return state
@@ -61,9 +59,9 @@ class KrogstadWeights(NamedTuple):
     """What one step of Krogstad's method multiplies state and remainders with.
 
     The stages are Y2 = half y + a21 N1, Y3 = half y + a31 N1 + a32 N2 and Y4 = full y + a41 N1 +
-    a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y.
-    A parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle, in which m4
-    is the weight of N4; those of the others follow from it and from the stages.
+    a43 N3, the new state is full y + b1 N1 + b23 (N2 + N3) + b4 N4, and N is f + decay · Y. A
+    parabola through N1, the mean of N2 and N3, and N4 gives the state in the middle, with m4 the
+    weight of N4.
     """
 
     half: Numbers
@@ -116,11 +114,9 @@ class KrogstadWeights(NamedTuple):
 class StressWeights(NamedTuple):
     """The same for stresses of modes, (4, k), whose trace may relax faster than the rest.
 
-    `trace`: those of its trace; None where it relaxes as the rest does.
-    `faster`: by how much the trace relaxes faster, over 1/λ, shape (k,).
-    `beside`: the same of each further tensor of the law, each with by how much it relaxes as a
-        whole faster than −1; for a law with one tensor none.
-    `shares`: what σ has of each of these, of which only the rest is followed; None for none.
+    `trace`, `faster`: weights of the trace and by how much it relaxes faster, over 1/λ; None where
+    it does not. `beside`: the same of each further tensor, with by how much it relaxes faster than
+    −1. `shares`: what σ has of each of these.
     """
 
     whole: KrogstadWeights  # weights of each mode
@@ -128,6 +124,21 @@ class StressWeights(NamedTuple):
     faster: Float[Array, " k"] | float = 0.0
     beside: tuple[tuple["StressWeights", Float[Array, " k"]], ...] = ()
     shares: Float[Array, "tensors k"] | None = None
+
+    @classmethod
+    def of_kinds(cls, kinds: Any, relaxations: Any, shares: Any) -> "StressWeights":
+        """Return weights told as `Dynamics.weights` does: of the whole, its trace, and so on.
+
+        `relaxations`, `shares`: of each tensor, as `Dynamics` has them.
+        """
+        if relaxations is None:
+            return cls(KrogstadWeights(*kinds[0]))
+        whole, trace, *others = (KrogstadWeights(*one) for one in kinds)
+        beside = tuple(
+            (cls(others[2 * i], others[2 * i + 1], one[1]), one[0])
+            for i, one in enumerate(relaxations[1:])
+        )
+        return cls(whole, trace, relaxations[0, 1], beside, shares)
 
     def remainder(self, stress, change, decay: float):
         """Return what of a change is not relaxation at the rates of these weights."""
@@ -151,12 +162,9 @@ class StressWeights(NamedTuple):
     ) -> tuple[Float[Array, "s *c k"], Any]:
         """Return the stress after a step, and what else each stage says.
 
-        A scan and not four lines: what a stage does is then compiled once and not four times.
-
-        `stress`: before the step. `stage`: of the stress in a stage and of its share of `inputs`;
-        returns `remainder` and more. `inputs`: a tree with a leading axis of four stages.
-        `at_once`: stages that are compiled one after another: with 4 a small one takes a quarter
-        less.
+        A scan, so that what a stage does is compiled once and not four times. `stage`: from stress
+        and its share of `inputs` to `remainder` and more. `at_once`: stages compiled one after
+        another.
         """
         if self.beside:
             return self._step_by_step(stress, stage, inputs)

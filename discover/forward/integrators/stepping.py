@@ -34,14 +34,11 @@ def follow(
 ) -> PyTree:
     """Return what is observed at the samples of one grid, stacked along a new first axis.
 
-    Made to be transformed: `jax.vmap`, `jax.jvp`; reverse mode keeps every step in memory. A law
-    that runs away gives infinite or nan values, never an error, so that a fit can reject the trial.
+    Made to be transformed. A law that diverges gives infinite or nan values, never an error.
 
-    `dynamics`: the modes, with derivatives beside them where it has columns. No state changes with
-    them, and nothing gives way in series. `fixed`: the modes alone, through which no derivative
-    passes. `protocol`, `grid`: of one run at a given rate, in time or steady. `observe`: what is
-    seen at each step end, or of each steady state. `start`: the modes at the first time; by default
-    as `begun` says.
+    `dynamics`: the modes, with derivatives beside them where it has columns; without states or
+    series. `fixed`: the same, through which no derivative passes. `start`: the modes at the first
+    time; by default as `begun` says.
     """
     flow = protocol.kinematics
     if protocol.control == "steady":
@@ -74,9 +71,8 @@ def begun(
 ) -> Float[Array, "s *c k"]:
     """Return the modes at the start of a grid: at rest, or periodic where it begins with a cycle.
 
-    A periodic state is solved for, without derivatives. One step of Newton's method from there
-    moves it by nothing, and its derivatives, also those that stand beside it in columns, to those
-    of the implicit function.
+    A periodic state is solved for without derivatives; one step of Newton's method from there moves
+    it by nothing, and its derivatives to those of the implicit function.
     """
     rest, _ = dynamics.rest()
     if grid.cycle is None:
@@ -147,11 +143,9 @@ def integrate(
 ) -> tuple[Float[Array, " s"], Float[Array, " s"]]:
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s at step ends.
 
-    `dynamics`: the fluid, with what gives way in series with it. `times`, `rate`: step ends, shape
-    (s,), and the rate at ends and middles in turn, shape (2 s − 1,). `steps`: how many steps are
-    taken; those beyond are padding, and nothing is computed of them. `flow`: which flow has this
-    rate; None is simple shear. `cycle`: the last cycle before the record, of a batch that holds
-    runs with a periodic start.
+    `times`, `rate`: step ends, and the rate at ends and middles in turn. `steps`: how many are
+    taken; padding follows. `flow`: None is simple shear. `cycle`: the last one before the record,
+    in a batch of runs with a periodic start.
     """
     width = jnp.diff(times)
     if cycle is not None:
@@ -276,9 +270,9 @@ def _compliance_rate(
 ):
     """Return the slope with it, and the rate that the series elements take in this step.
 
-    The strain that they have taken at the end of the step must be −C σ − ∫ s σ dt there. The
-    stress at the end is predicted by one exponential Euler step, linear in the rate; what the
-    prediction misses is carried in `missing` to the next step.
+    Their strain at the end must be −C σ − ∫ s σ dt. The stress there is predicted by one
+    exponential Euler step, linear in the rate; what this misses is taken to the next step in
+    `missing`.
     """
     series, modes, viscous = dynamics.series, dynamics.modes, dynamics.viscosity
     assert series is not None
@@ -328,18 +322,15 @@ def answer_to_stress(
 ) -> Answer:
     """Return the strain at step ends, and the modes and the rate there.
 
-    In each step the rate is a straight line, and such that the balance σ + η γ̇ + I dγ̇/dt =
-    σ_imposed holds in the middle and at the end: collocation of a Volterra equation of the first
-    kind, of order two and stable whatever the modes' times, since one of the points is the end
-    [Brunner 2004, Collocation Methods for Volterra Integral and Related Functional Differential
-    Equations, chapter 2.4]. No differentiation of a measured strain comes in. The modes follow that
-    rate by Krogstad's method, and what a step misses of the stress the next one makes good.
+    In each step the rate is a straight line such that σ + η γ̇ + I dγ̇/dt = σ_imposed holds in the
+    middle and at the end: collocation of a Volterra equation of the first kind, of order two and
+    stable whatever the modes' times   [Brunner 2004, Collocation Methods for Volterra Integral and
+    Related Functional Differential Equations, chapter 2.4]. The modes follow that rate by
+    Krogstad's method.
 
-    `dynamics`: the fluid, with what gives way in series with it. `times`: step ends in s, shape
-    (s,), increasing; at rest at the first. `imposed`: recorded stress there in Pa, shape (s,).
-    `inertia`: I of the tool in Pa s². `flow`: which flow it is; None is simple shear. `fixed`: the
-    fluid once more, through which no derivative passes: where the rate is looked for, those of its
-    law would cost much and say nothing.
+    `times`: step ends in s, at rest at the first. `imposed`: recorded stress there in Pa.
+    `inertia`: I of the tool in Pa s². `fixed`: the fluid once more, through which no derivative
+    passes.
     """
     fixed = dynamics if fixed is None else fixed
     width = jnp.diff(times)

@@ -25,12 +25,9 @@ def as_array(values: Sequence[Any]) -> np.ndarray:
 
 
 class Layout:
-    """Trees of arrays as one axis of numbers, and back.
+    """Trees of arrays as one axis of `size` numbers, and back.
 
-    `tree`: one of them; what of it is no array is left out. `axes`: how many leading axes each leaf
-    has that stay apart.
-
-    `size`: how many numbers there are.
+    `axes`: how many leading axes of each leaf stay apart.
     """
 
     def __init__(self, tree: Any, axes: int):
@@ -67,12 +64,9 @@ _KEPT = 16
 class Code:
     """Machine code for the effects of a fluid and a law, with all constants and flows as data.
 
-    `flags`: which parts of it a vector needs.
-    `counts`, `arrays`: what it takes: whole numbers, and arrays.
-    `wide`, `whole`: arrays of all lanes, and those of whole numbers.
-
-    `fluid`: the effects, of a structure without constants of the law. `found`: shapes of what is
-    data to it; see `laid_out`. `flow`: kinematics of one run; None where all are simple shear.
+    `counts`, `arrays`: the whole numbers and arrays it takes; `wide`: arrays of all lanes; `whole`:
+    of whole numbers. `found`: shapes of its data, from `laid_out`. `flow`: kinematics of one run;
+    None where all are simple shear.
     """
 
     counts: ClassVar[tuple[str, ...]]
@@ -90,14 +84,16 @@ class Code:
         self._flow = Layout(flow, 0)
         self._law = eqx.combine(found[0].law, found[1].law)
         self._plain_law = eqx.filter(self._law, _is_shape, inverse=True)
+        # of a mode, and kinds of weights that its step has
+        self._size = 4 + self._law.variables
+        relaxations = found[0].relaxations
+        self._kinds = 1 if relaxations is None else 2 * relaxations.shape[1]
 
     def packing(self, fluid: AugmentedFluid, made_from: tuple, axis: int) -> Callable:
-        """Return a program from numbers, vectors and their moduli to modes, and what these share.
+        """Return a program from numbers, vectors and their moduli to modes and what these share.
 
-        The moduli are those of the declared modes, and behind them the viscosity of the solvent.
-
-        `fluid`: the fluid with its effects, of which the vectors are. `made_from`: what tells it
-        from that of another structure. `axis`: where the vectors stand in what is returned.
+        The solvent's viscosity stands behind the moduli. `made_from`: what tells the fluid from
+        that of another structure. `axis`: of the vectors in what is returned.
         """
 
         def packed(numbers: Numbers, thetas, moduli):
@@ -223,10 +219,7 @@ def code_of(
 ) -> _Kind:
     """Return the machine code of a kind for a fluid, made once for all whose constants differ.
 
-    `kind`, `choices`: which code, and what else it takes. `fluid`: the fluid with its effects.
-    `numbers`: one of those that it is called with; their values are data. `flow`: kinematics of one
-    run; None where all are simple shear. Raises NotTranslatable if a law or an effect does what is
-    not known in lanes.
+    Raises NotTranslatable if a law or an effect does what lanes do not know.
     """
     theta = jax.ShapeDtypeStruct((fluid.size,), float)
     found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)

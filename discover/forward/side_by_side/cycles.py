@@ -1,9 +1,8 @@
 """The state in which a run begins whose oscillation had gone on for ever, for lanes.
 
-It is solved for as in `starts.periodic_start`, with derivatives that are differences: a cycle is
-followed once from the approximation, and once more from each component of all modes and each state
-of the fluid moved a little. All these passes through a cycle, and the run itself, share the code of
-one step.
+Solved for as in `starts.periodic_start`, with derivatives by differences: a cycle is followed from
+the approximation, and from each component of all modes and each state moved a little. All passes,
+and the run itself, share the code of one step.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -41,10 +40,9 @@ _ALIVE, _CHANGE, _SHIFT, _LARGEST, _PERIOD = range(5)
 def improved(relaxation_time, period, alive, moved, way, end, tangents):
     """Return the next approximation of a mode, by how much it moved, and whether there is hope.
 
-    `relaxation_time`, `period`: of the mode and of a cycle, in s. `alive`, `moved`: whether the
-    approximation is looked for, and by how much states have moved since the last. `way`, `end`,
-    `tangents`: the approximation in one row, where a cycle from it ends, and that by direction and
-    component.
+    `alive`, `moved`: whether it is looked for, and by how much states have moved since the last.
+    `way`, `end`, `tangents`: the approximation in one row, where a cycle ends, and that by
+    direction and component.
     """
     size = len(end)
     now = approximation(way, size)
@@ -77,10 +75,8 @@ def approximation(way, size: int) -> Approximation:
 class Cycles:
     """Writes passes through a run: of one that begins with a periodic state first its cycle's.
 
-    `code`: what is written. `levels`: numbers of each state of the fluid, and what it is at rest.
-    `levels_at`, `modes_at`: where in the scratch array these stand, and the modes. `size`: numbers
-    of a mode. `first`: where there is room in the scratch array. `has_states`: whether any vector
-    has states of the fluid.
+    `levels`: numbers of each state of the fluid, and its rest. `levels_at`, `modes_at`, `first`:
+    where in the scratch array these, the modes and free room stand.
     """
 
     def __init__(
@@ -89,11 +85,10 @@ class Cycles:
         levels: Sequence[tuple[int, float]],
         levels_at: int,
         modes_at: int,
-        size: int,
         first: Any,
         has_states: Any,
     ):
-        self._code, self._levels, self._size = code, levels, size
+        self._code, self._levels, self._size = code, levels, (size := code._size)
         self._levels_at, self._modes_at = levels_at, modes_at
         self._count = sum(count for count, _ in levels)
         w = code._w
@@ -119,11 +114,9 @@ class Cycles:
     ) -> Iterator[tuple[Any, Any, Any]]:
         """Write what follows some steps again and again, up to a run's end.
 
-        Yields the number of the first step and behind the last, and whether they are the run's.
-
-        `start`, `end`: of the cycle; the first is negative where there is none. `last`: behind the
-        last step of the run. `period`: of the cycle in s. `settle`: writes what follows from the
-        modes and states with which a cycle begins.
+        Yields the first step, the one behind the last, and whether they are the run's. `start` is
+        negative where there is no cycle. `settle`: writes what follows from the modes and states at
+        its start.
         """
         w, b = self._w, self._w.builder
         has_cycle = b.icmp_signed(">=", start, INTEGER(0))
@@ -150,9 +143,14 @@ class Cycles:
             yield first, behind, b.or_(is_before, is_run)
             # a stage that ends sets the next one, which is told from it once
             stage = b.load(self._stage)
-            for number, finish in enumerate(
-                (self._end_before, self._end_rest, self._end_newton, self._end_closing, self._end)
-            ):
+            ends = (
+                lambda: self._go_on(_REST),
+                self._end_rest,
+                self._end_newton,
+                lambda: self._go_on(_RUN),
+                lambda: b.store(INTEGER(0), self._left),
+            )
+            for number, finish in enumerate(ends):
                 with b.if_then(b.icmp_signed("==", stage, INTEGER(number))), self._a.apart():
                     finish()
 
@@ -231,9 +229,6 @@ class Cycles:
             for i, value in enumerate(code._kept(way, self._size)):
                 at = self._w.at((state, 1), (i, 1))
                 code._keep(a.chosen(found, value, float("nan")), at)
-
-    def _end_before(self) -> None:
-        self._go_on(_REST)
 
     def _end_rest(self) -> None:
         w, b, code, size = self._w, self._w.builder, self._code, self._size
@@ -325,9 +320,3 @@ class Cycles:
         some = a.in_some(a.compare(">", self._kept(_ALIVE), 0.0))
         b.store(b.select(some, INTEGER(_NEWTON), INTEGER(_CLOSING)), self._stage)
         b.store(INTEGER(0), self._index)
-
-    def _end_closing(self) -> None:
-        self._go_on(_RUN)
-
-    def _end(self) -> None:
-        self._w.builder.store(INTEGER(0), self._left)

@@ -1,7 +1,7 @@
 """The loops over runs, steps and modes, in machine code for eight vectors of parameters at once.
 
-What is done in them is told by `step`; here stands where numbers lie. Arrays have the lanes last,
-each run is followed to its own end, and states of the fluid stay in a scratch array.
+`step` says what is done in them. Arrays have the lanes last, and each run is followed to its own
+end.
 """
 
 from typing import Any
@@ -37,17 +37,11 @@ _MISSING, _EARLIER, _SHEARED, _RECORDED, _LEVELS = range(_STATE, _STATE + 5)
 
 
 class Kernel(Code):
-    """Machine code for the effects of a fluid and a law, with all constants and runs as data.
+    """Machine code for flows at a given rate in time.
 
-    `flags`: which parts of it a vector needs.
-    `steps_taken`: by eight vectors at once, in all calls so far.
-
-    `fluid`: the effects, of a structure without constants of the law. `found`: shapes of what is
-    data to it; see `laid_out`. `flow`: kinematics of one run; None where all are simple shear.
-    `chooses`: whether vectors choose widths of steps; if not, all take those of the grid, in less
-    code. `cycles`: whether some runs begin with a periodic state.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
+    `steps_taken`: by eight vectors at once, in all calls so far. `chooses`: whether vectors choose
+    widths of steps; if not, all take those of the grid, in less code. `cycles`: whether some runs
+    begin with a periodic state.
     """
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
@@ -63,7 +57,6 @@ class Kernel(Code):
         super().__init__(fluid, found, flow)
         self._chooses, self._begins, self.steps_taken = chooses, cycles, 0
         self._times_at = self.flags.names.index("times")
-        self._variables = self._law.variables
         self._step = Step(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
         self._series = bool(fluid.series)
@@ -80,13 +73,9 @@ class Kernel(Code):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """Return stress and felt rate at step ends, the modes', and whether any vector is of use.
 
-        The first two have the shape (runs, ends, lanes); the stress is not a number where none was
-        computed. That of the modes is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where
-        normal stresses are asked for, and empty if not.
-
-        `runs`: how many runs are followed. `tabled`: modes whose weights stand in the table.
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
-        beside these, by name. `normal`: whether normal stresses are asked for.
+        Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12,
+        (runs, ends, 4, lanes), empty unless `normal`. `tabled`: modes whose weights stand in the
+        table. `used`: parts that a vector needs; see `Flags`.
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
@@ -95,10 +84,10 @@ class Kernel(Code):
         of_modes[:, 0] = 0.0
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]
-        size = self._state_at + modes * (4 + self._variables)
+        size = self._state_at + modes * self._size
         # a step whose width is chosen holds the state three times
         room = _STATE + 3 * (size - _STATE)
-        room += Cycles.room(self._state_at - _LEVELS, modes, 4 + self._variables) * self._begins
+        room += Cycles.room(self._state_at - _LEVELS, modes, self._size) * self._begins
         scratch = np.empty((room, LANES))
         arrays = given | {
             "flags": flags, "stress": stress, "felt": felt, "scratch": scratch, "goes_on": goes_on,
@@ -115,16 +104,12 @@ class Kernel(Code):
         self._on = self._truths()
         self._keep(0.0, _MISSED)
         self._next = w.builder.alloca(INTEGER)
-        self._held = OwnWidths(
-            w, self._arithmetic, _OWN, _STATE, range(_LEVELS, self._state_at),
-            self._state_at, self._variables, self._on["states"],
-        )  # fmt: skip
+        levels, has_states = range(_LEVELS, self._state_at), self._on["states"]
+        self._held = OwnWidths(self, _OWN, _STATE, levels, self._state_at, has_states)
         if self._begins:
-            size = 4 + self._variables
-            modes = w.at((w.counts["modes"], 3 * size), (3, self._state_at - _STATE), (_STATE, 1))
-            self._cycles = Cycles(
-                self, self._levels, _LEVELS, self._state_at, size, modes, self._on["states"]
-            )
+            of_modes = (w.counts["modes"], 3 * self._size)
+            room = w.at(of_modes, (3, self._state_at - _STATE), (_STATE, 1))
+            self._cycles = Cycles(self, self._levels, _LEVELS, self._state_at, room, has_states)
         w.store(INTEGER(1), "goes_on", 0)
         with w.loop(w.counts["runs"], self._goes_on) as run, self._arithmetic.apart():
             self._of_run(run)
@@ -141,7 +126,7 @@ class Kernel(Code):
             self._keep(0.0, place)
         w.builder.store(INTEGER(0), self._next)
         self._rest(self._levels, _LEVELS)
-        states = w.at((counts["modes"], 4 + self._variables))
+        states = w.at((counts["modes"], self._size))
         with w.loop(states) as number:
             self._keep(0.0, w.at((number, 1), (self._state_at, 1)))
         last = w.load("last", run)
@@ -179,12 +164,12 @@ class Kernel(Code):
             self._keep(0.0, place)
         with w.loop(w.counts["modes"]) as number, self._arithmetic.apart():
             mode, at = self._tree("mode", self._of_mode, number), self._place_of_mode(number)
-            stress = self._kept(at, 4 + self._variables)
+            stress = self._kept(at, self._size)
             sheared, _ = self._write(self._step.felt, mode, flow, stress)
             self._keep(add(self._kept(_SHEARED), sheared[()]), _SHEARED)
 
     def _place_of_mode(self, number) -> Any:
-        return self._w.at((number, 4 + self._variables), (self._state_at, 1))
+        return self._w.at((number, self._size), (self._state_at, 1))
 
     def _of_grid(self, run, number, flow, is_run) -> None:
         """Write a step of the grid."""
@@ -293,34 +278,34 @@ class Kernel(Code):
         on = {"own weights": own}
         weights = self._write(self._step.weights, mode, on, width, _array(table))
         at = self._place_of_mode(mode_number)
-        return mode, weights, self._kept(at, 4 + self._variables), at
+        return mode, weights, self._kept(at, self._size), at
 
     def _record(self, run, number, flow, rate, is_run) -> None:
-        """Write a stress down, and give up where no vector is of use any more."""
-        with self._w.builder.if_then(is_run), self._arithmetic.apart():
-            self._record_run(run, number, flow, rate)
-
-    def _record_run(self, run, number, flow, rate) -> None:
+        """Write the run's stress down, and give up where no vector is of use any more."""
         w, builder, a = self._w, self._w.builder, self._arithmetic
-        steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
-        at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
-        w.store(a.lanes(recorded), "stress", at)
-        w.store(a.lanes(taken), "felt", at)
-        with builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))), a.apart():
-            levels = self._states(self._levels, _LEVELS)
-            factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
-            self._record_modes(at, factor, self._state_at, 4 + self._variables)
-        weight = w.load("weight", at)
-        with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
-            beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
-            off = a.subtract(a.add(recorded, beside), self._splat("recorded", at))
-            off = a.multiply(a.splat(weight), off)
-            missed = a.add(self._kept(_MISSED), a.multiply(off, off))
-            self._keep(missed, _MISSED)
-            limit = w.load("limit", 0)
-            # what is no number is below no limit
-            endless = a.compare("==", limit, float("inf"))
-            self._go_on_if(builder.or_(endless, a.compare("<", missed, limit)))
+        with builder.if_then(is_run), a.apart():
+            steps, recorded, taken = w.counts["steps"], self._kept(_RECORDED), self._kept(_EARLIER)
+            at = w.at((run, w.at((steps, 1), (1, 1))), (number, 1), (1, 1))
+            w.store(a.lanes(recorded), "stress", at)
+            w.store(a.lanes(taken), "felt", at)
+            with (
+                builder.if_then(builder.icmp_signed("!=", w.counts["normal"], INTEGER(0))),
+                a.apart(),
+            ):
+                levels = self._states(self._levels, _LEVELS)
+                factor = self._write(self._step.stiffness, self._parameters, self._on, levels)[()]
+                self._record_modes(at, factor, self._state_at, self._size)
+            weight = w.load("weight", at)
+            with builder.if_then(builder.fcmp_ordered(">", weight, weight.type(0.0))), a.apart():
+                beside = self._write(self._step.beside, self._parameters, self._on, flow, rate)[()]
+                off = a.subtract(a.add(recorded, beside), self._splat("recorded", at))
+                off = a.multiply(a.splat(weight), off)
+                missed = a.add(self._kept(_MISSED), a.multiply(off, off))
+                self._keep(missed, _MISSED)
+                limit = w.load("limit", 0)
+                # what is no number is below no limit
+                endless = a.compare("==", limit, float("inf"))
+                self._go_on_if(builder.or_(endless, a.compare("<", missed, limit)))
 
     def _at_start(self, run, flow) -> None:
         """Write what is felt and recorded at the start of a run, where the modes are at rest."""

@@ -2,16 +2,17 @@
 
 A step is taken whole and in two halves. Where these agree the vector goes on from the halves,
 extrapolated, and else takes a shorter step   [step doubling with local extrapolation: Hairer,
-Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, section II.4]. What a vector
-chooses depends on no other beside it.
+Nørsett & Wanner 1993, Solving Ordinary Differential Equations I, section II.4].
 """
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from discover.programs.lanes import Arithmetic, Writing
 from discover.programs.lanes.arithmetic import INTEGER
+
+if TYPE_CHECKING:
+    from discover.forward.side_by_side.code import Code
 
 # By how much halves and whole may differ, of the stress of a mode. States of the fluid are of
 # second order where the modes are of fourth, and may differ by more
@@ -48,44 +49,35 @@ _ENOUGH = 10**9
 class OwnWidths:
     """Writes what stands around a step, which is written once.
 
-    `w`, `arithmetic`: where it is written. `at`: places in the scratch array of what is `OWN`.
-    `state`: where the state begins that a step changes. `levels`, `modes`: where in it states of
-    the fluid stand, and the modes. `variables`: structure variables of each mode. `has_states`:
-    whether any of the vectors has states of the fluid.
+    `at`: places in the scratch array of what is `OWN`. `state`, `levels`, `modes`: where what a
+    step changes begins, and in it states of the fluid and modes.
     """
 
     def __init__(
         self,
-        w: Writing,
-        arithmetic: Arithmetic,
+        code: "Code",
         at: Sequence[int],
         state: int,
         levels: range,
         modes: int,
-        variables: int,
         has_states: Any,
     ):
-        self._w, self._arithmetic = w, arithmetic
+        self._w, self._arithmetic = w, arithmetic = code._w, code._arithmetic
+        self._keep, self._kept = code._keep, code._kept
         self._straight, self._left = (w.builder.alloca(INTEGER) for _ in range(2))
         self._at = dict(zip(OWN, at, strict=True))
         self._state, self._levels, self._modes = state, levels, modes
-        self._numbers = 4 + variables
+        self._numbers = code._size
         self._size = w.at((w.counts["modes"], self._numbers), (modes - state, 1))
         # of an error of fifth order the halves have a fifteenth of what they differ by, of one of
         # third order a third
         self._further = arithmetic.chosen(has_states, 1.0 / 3.0, 1.0 / 15.0)
 
-    def _kept(self, place: Any) -> Any:
-        return self._w.load("scratch", place)
-
-    def _keep(self, value: Any, place: Any) -> None:
-        self._w.store(self._arithmetic.lanes(value), "scratch", place)
-
     def steps(self, run: Any, number: Any, half: Any) -> tuple[Any, Any]:
         """Return how many steps of the grid are one interval, and whether widths in it are chosen.
 
-        They are where the rate of every vector is a straight line over all of them: an instrument
-        may shape what was commanded.
+        They are where every vector's rate is a straight line: an instrument may shape what was
+        commanded.
         """
         w, b, a = self._w, self._w.builder, self._arithmetic
         place = w.at((run, w.counts["steps"]), (number, 1))
@@ -118,11 +110,7 @@ class OwnWidths:
     def parts(
         self, run: Any, number: Any, is_own: Any, rates: Sequence[Any]
     ) -> Iterator[tuple[Any, Any, tuple[Any, ...]]]:
-        """Write a step again and again until each vector has come to the end of an interval.
-
-        Yields the time in it, the width, and the rates at its beginning, in its middle and at its
-        end.
-        """
+        """Write a step until each vector has come to the end; yields time, width and rates."""
         w, b, a = self._w, self._w.builder, self._arithmetic
         place, at = w.at((run, w.counts["steps"]), (number, 1)), self._at
         width, whole, least = (a.splat(w.load(n, place)) for n in ("width", "whole", "least"))

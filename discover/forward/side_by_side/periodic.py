@@ -17,11 +17,7 @@ from discover.forward.side_by_side.predictors import Asked, Eights, StatePredict
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
 from discover.forward.starts.half_cycles import mirror
 from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
-from discover.forward.starts.steady_states import (
-    goes_on,
-    next_approximation,
-    relative_change,
-)
+from discover.forward.starts.steady_states import goes_on, next_approximation, relative_change
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
@@ -51,7 +47,7 @@ class PeriodicStep(Step):
         return jax.vmap(lambda unit: jax.jvp(of, (stress,), (unit,)), out_axes=(None, 0))(tangents)
 
     def improved(self, mode: Mode, frequency, back, alive, change, way, end, tangents):
-        """Return the next approximation of the start of a cycle, and whether it is gone through.
+        """Return the next start of a cycle, by how much it moved, and whether it goes on.
 
         Half a cycle later the state is mirrored, by the signs in `back`.
         """
@@ -73,14 +69,7 @@ class PeriodicStep(Step):
 
 
 class PeriodicCode(Code):
-    """Machine code for periodic states.
-
-    No state of the fluid changes with the modes in it, and nothing gives way in series.
-
-    `flags`: which parts of it a vector needs.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
-    """
+    """Machine code for periodic states: no state of the fluid changes, nothing gives way."""
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
@@ -91,10 +80,8 @@ class PeriodicCode(Code):
         self._step = PeriodicStep(fluid, self._plain_law, ())
         variables, tensors = self._law.variables, self._law.tensors
         self._back = mirror(variables - 4 * tensors, tensors)
-        self._size = 4 + variables
-        kinds = 1 if found[0].relaxations is None else 2 * found[0].relaxations.shape[1]
-        self._weights = (kinds, WEIGHTS) if kinds > 1 else (WEIGHTS,)
-        self._way_at = _WEIGHTS + kinds * WEIGHTS
+        self._weights = (self._kinds, WEIGHTS) if self._kinds > 1 else (WEIGHTS,)
+        self._way_at = _WEIGHTS + self._kinds * WEIGHTS
         self._way_size = 3 * self._size + 3
         self._now_at = self._way_at + self._way_size
         self._make(fluid, found)
@@ -102,9 +89,8 @@ class PeriodicCode(Code):
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> np.ndarray:
         """Return G′ + iG″ of the modes in Pa, shape (groups, lanes).
 
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`:
-        amplitudes, frequencies, modes and what these share, groups first and lanes last; the steps
-        of half a cycle of each group, and cosine and sine at their ends and middles.
+        `given`: amplitudes, frequencies, modes and what these share, groups first and lanes last;
+        the steps of half a cycle of each group, and cosine and sine at their ends and middles.
         """
         groups, modes = given["mode"].shape[:2]
         storage, loss = np.empty((2, groups, LANES))
@@ -210,9 +196,8 @@ _AT_ONCE = 2
 class PeriodicSideBySide(StatePredictor):
     """Predictions of moduli for one structure of law and effects.
 
-    `fluid`, `code`, `rates`, `made_from`: as `StatePredictor` takes them. `recorded`: of the
-    numbers, a vector, the effects that are present, states and the moduli of the modes in these:
-    the moduli recorded.
+    `recorded`: of numbers, a vector, the effects present, states and moduli of the modes: those
+    recorded.
     """
 
     def __init__(
@@ -235,18 +220,11 @@ class PeriodicSideBySide(StatePredictor):
         self._recorded = self._program("moduli", of_solvent, (None, 0, 0, None, None, 0))
 
     def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program.
-
-        In those a state of the fluid changes with the modes, or something gives way in series.
-        """
+        """Return which vectors are left to the other program: states or series act."""
         return np.any(thetas[:, self._coupling], axis=1)
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
-        """Return both moduli.
-
-        Limits, what judges and how many runs are no padding say nothing here, and a modulus has no
-        normal stresses beside it.
-        """
+        """Return both moduli; limits say nothing here."""
         part, eights = asked.part, self._eights(asked)
         frequency = np.asarray(part.frequency)
         rate = self._felt(asked, eights, frequency * np.asarray(part.strain))

@@ -20,12 +20,10 @@ from discover.programs.lanes import LANES
 class Asked(NamedTuple):
     """What is asked of vectors of parameters.
 
-    `moduli`: of the declared modes in Pa, and behind them the viscosity of the solvent in Pa s.
-    `limits`: sums of squared residuals from which on a vector is of no use; infinite ones follow it
-        to the end.
-    `part`, `judging`: runs of one control, and what was recorded of them.
-    `runs`: how many of these are no padding.
-    `normal`: whether N1 and N2 are to stand behind what is recorded.
+    `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `limits`: sums of
+    squared residuals from which on a vector is of no use. `part`, `judging`: runs of one control,
+    and what was recorded. `runs`: how many are no padding. `normal`: whether N1 and N2 are asked
+    for.
     """
 
     numbers: Numbers
@@ -66,8 +64,7 @@ def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
 class LanePredictor:
     """Predictions of one kind of flows for one structure of law and effects, in lanes.
 
-    `fluid`, `code`: the fluid with its effects, and its machine code. `made_from`: what tells these
-    from those of another structure. `axis`: where vectors stand in what is packed.
+    `made_from`: what tells the structure from another. `axis`: of the vectors in what is packed.
     """
 
     def __init__(self, fluid: AugmentedFluid, code: Any, made_from: tuple, axis: int = -1):
@@ -81,10 +78,7 @@ class LanePredictor:
     def _program(
         self, name: str, function: Callable, *axes: Sequence[int | None], vectors_to: Any = 0
     ) -> Callable:
-        """Return a program of a function that is mapped over axes, the innermost first.
-
-        `vectors_to`: where those of the outermost, the vectors, stand in what is returned.
-        """
+        """Return a program of a function mapped over axes, that of the vectors last."""
         *inner, outermost = axes
         for along in inner:
             function = jax.vmap(function, along)
@@ -99,11 +93,9 @@ class LanePredictor:
     ) -> np.ndarray:
         """Return what is found of vectors, eights of which are computed together.
 
-        Vectors that need the same parts of the code go together, and of these such that agree in
-        `keys`: what one of eight needs is computed for all of them.
-
-        `of_eight`: of eight vectors, the last again until there are eight, which are different, and
-        which parts of the code they need.
+        Those that need the same parts of the code, and agree in `keys`, go together. `of_eight`: of
+        eight vectors, the last again until there are eight, which are different, and the parts they
+        need.
         """
         flags = self._flags.of(thetas)
         order = np.lexsort([*keys, *flags.T])
@@ -124,9 +116,8 @@ class LanePredictor:
 class Eights(NamedTuple):
     """Vectors in whole eights, the last again until they are full.
 
-    `pairs`: of each eight its vectors and their moduli.
-    `places`: where each of them stands among the vectors.
-    `modes`, `shared`: what the vectors say of each mode, and of all of them, lanes first.
+    `pairs`, `places`: of each eight its vectors and moduli, and where these stand among the
+    vectors. `modes`, `shared`: what vectors say of each mode, and of all, lanes first.
     """
 
     pairs: list[tuple[np.ndarray, np.ndarray]]
@@ -138,17 +129,14 @@ class Eights(NamedTuple):
         """Return what the code takes of vectors, one a lane, in whole eights."""
         of_mode = self.modes[trial]
         present = modes_in_use(of_mode[:, :, 0], declared)
-        return {
-            "shared": lanes_last(self.shared[trial]),
-            "mode": lanes_last(of_mode[:, present]),
-        }
+        return {"shared": lanes_last(self.shared[trial]), "mode": lanes_last(of_mode[:, present])}
 
 
 class StatePredictor(LanePredictor):
     """Predictions of states, steady or periodic, each of which is a lane of its own.
 
-    `shaping`: effects that shape the rate. `rates`: of a vector, the effects that are present, and
-    runs: the rate that the fluid feels. `axes`: over which it is mapped.
+    `shaping`: effects that shape the rate. `rates`: the felt rate, of a vector, the effects present
+    and runs, mapped over `axes`.
     """
 
     def __init__(
@@ -191,8 +179,8 @@ class StatePredictor(LanePredictor):
     ) -> None:
         """Solve for states of vectors, those together that need the same parts of the code.
 
-        `alike`: groups of states that may stand side by side. `eights_at_once`: of which a call
-        takes at most so many. `solve`: of the parts needed, and of each lane its vector and state.
+        `alike`: groups of states that may stand side by side. `solve`: of the parts needed, and of
+        each lane its vector and state.
         """
         patterns, which = np.unique(self._flags.of(thetas), axis=0, return_inverse=True)
         size, pieces = eights_at_once * LANES, []

@@ -118,12 +118,7 @@ class SteadyStep(Step):
 
 
 class SteadyCode(Code):
-    """Machine code for steady states.
-
-    `flags`: which parts of it a vector needs.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
-    """
+    """Machine code for steady states."""
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
@@ -138,13 +133,10 @@ class SteadyCode(Code):
         self._make(fluid, found, flow)
 
     def __call__(self, used: np.ndarray, given: dict[str, np.ndarray]) -> tuple[np.ndarray, ...]:
-        """Return the recorded stress before the signal, the felt rate, and the stress of the modes.
+        """Return recorded stress before the signal, felt rate, and the modes' stress.
 
-        The first two have the shape (groups, lanes), that of the modes is σ11, σ22, σ33, σ12, shape
-        (groups, 4, lanes).
-
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: rates,
-        modes, what these share, and flows, by name; groups first and lanes last.
+        The first two have the shape (groups, lanes), the last is σ11, σ22, σ33, σ12, shape (groups,
+        4, lanes). `given`: rates, modes, what these share, and flows, groups first and lanes last.
         """
         groups, modes = given["mode"].shape[:2]
         (stress, felt), of_modes = np.empty((2, groups, LANES)), np.empty((groups, 4, LANES))
@@ -224,8 +216,7 @@ _AT_ONCE = 8
 class SteadySideBySide(StatePredictor):
     """Predictions of flow curves for one structure of law and effects.
 
-    `fluid`, `code`, `rates`, `made_from`: as `StatePredictor` takes them. `recorded`: of a vector,
-    the effects that are present, and a run, its stress and felt rate: what is recorded.
+    `recorded`: of a vector, the effects present, a run, its stress and felt rate: what is recorded.
     """
 
     def __init__(
@@ -245,10 +236,7 @@ class SteadySideBySide(StatePredictor):
         self._recorded = self._program("steady records", recorded, *axes)
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded, and N1 and N2 behind it if asked for.
-
-        Limits, what judges and how many runs are no padding say nothing here.
-        """
+        """Return what is recorded, and N1 and N2 if asked for; limits say nothing here."""
         thetas, part, eights = asked.thetas, asked.part, self._eights(asked)
         rate = self._felt(asked, eights, np.asarray(part.rate))
         found = self._states(thetas, eights, len(asked.numbers.modulus), rate, part)

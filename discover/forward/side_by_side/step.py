@@ -1,8 +1,7 @@
 """A step of one mode of one vector, as functions of numbers from which lanes are written.
 
-The scheme is that of `with_effects.integrate`, taken apart where a loop over the modes stands: what
-precedes it, each mode, and what follows. A branch is taken by a flag that all vectors of a call
-share, and costs nothing where it is not taken.
+The scheme of `stepping.integrate`, taken apart where a loop over the modes stands. A branch by a
+flag that all vectors of a call share costs nothing where it is not taken.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,8 +34,8 @@ WEIGHTS = 10
 class Mode(NamedTuple):
     """What differs from mode to mode: each leaf has a leading axis of modes, or is of one mode.
 
-    `relaxations`, `shares`: what decides how chains that retract are stepped through, as the law's;
-        None for others.
+    `relaxations`, `shares`: how chains that retract are stepped through, as the law's; None for
+    others.
     """
 
     modulus: Any
@@ -48,10 +47,7 @@ class Mode(NamedTuple):
 
 
 class Shared(NamedTuple):
-    """What all modes share: parameters of effects, the law but for what differs, the solvent.
-
-    The former as the vector of a structure without constants of the law.
-    """
+    """What all modes share: parameters of effects, the law but for what differs, the solvent."""
 
     theta: Any
     law: Any
@@ -126,10 +122,8 @@ def beside_modes(fluid: AugmentedFluid) -> list[ConstitutiveEffect]:
 class Step:
     """The functions of which a step consists.
 
-    `fluid`: the fluid with its effects. `law`: what of the law is no array. `states`: those states
-    of the fluid that are followed; by default all.
-
-    `kept`: how many weights of a step are kept of each mode.
+    `law`: what of it is no array. `states`: of the fluid that are followed; by default all. `kept`:
+    how many weights of a step are kept of each mode.
     """
 
     kept = WEIGHTS
@@ -194,8 +188,8 @@ class Step:
     def weights(self, mode: Mode, on, width, table):
         """Return the weights of a step: those of a table, or of a mode's own time.
 
-        Where chains retract they are always a mode's own, of the stress and of its trace, and so on
-        of each further tensor: they depend on the constants of the law.
+        Where chains retract always the latter, of stress and trace of each tensor: they depend on
+        the law.
         """
 
         def own(faster=0.0):
@@ -211,22 +205,15 @@ class Step:
         """Return weights as the integrators take them; see `Dynamics.weights_of_step`."""
         rows = weights.reshape(-1, self.kept)
         more = jnp.zeros((len(rows), len(KrogstadWeights._fields) - self.kept))
-        kinds = [KrogstadWeights(*row) for row in jnp.concatenate([rows, more], axis=1)]
-        if mode.relaxations is None:
-            return StressWeights(kinds[0])
-        whole, trace, *others = kinds
-        beside = tuple(
-            (StressWeights(others[2 * i], others[2 * i + 1], one[1]), one[0])
-            for i, one in enumerate(mode.relaxations[1:])
-        )
-        return StressWeights(whole, trace, mode.relaxations[0, 1], beside, mode.shares)
+        rows = jnp.concatenate([rows, more], axis=1)
+        return StressWeights.of_kinds(rows, mode.relaxations, mode.shares)
 
     def of_mode(self, shared, mode, on, flow, slow, stress, rates, taken, earlier, weights):
         """Return a mode after a step.
 
-        `flow`: which flow it is; None is simple shear. `slow`: the factor on all times at the
-        start, in the middle and at the end. `rates`: there, in 1/s, without what series elements
-        take. `taken`, `earlier`: rate that these take in this step and in the one before.
+        `slow`, `rates`: the factor on all times, and the rate in 1/s without what series elements
+        take, at start, middle and end. `taken`, `earlier`: rate that these take in this step and in
+        the one before.
         """
         w = self._of_step(mode, weights)
         first, middle, last = rates

@@ -13,12 +13,7 @@ from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.integrators.exponential_weights import KrogstadWeights
 from discover.forward.integrators.stepping import RATE_OF_RATE
 from discover.forward.side_by_side.code import Code
-from discover.forward.side_by_side.predictors import (
-    Asked,
-    LanePredictor,
-    flows_of,
-    modes_in_use,
-)
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
@@ -106,10 +101,7 @@ class StressStep(Step):
 
 
 class StressCode(Code):
-    """Machine code for runs at a given stress.
-
-    Raises NotTranslatable if a law or an effect does what is not known in lanes.
-    """
+    """Machine code for runs at a given stress."""
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
@@ -117,24 +109,19 @@ class StressCode(Code):
         super().__init__(fluid, found, flow)
         self._step = StressStep(fluid, self._plain_law)
         self._levels = [(e.levels, e.rest) for e in fluid.states]
-        self._size = 4 + self._law.variables
-        kinds = 1 if found[0].relaxations is None else 2 * found[0].relaxations.shape[1]
-        self._weights = (kinds, StressStep.kept) if kinds > 1 else (StressStep.kept,)
+        kinds, kept = self._kinds, StressStep.kept
+        self._weights = (kinds, kept) if kinds > 1 else (kept,)
         # of a mode: before and after the step, and its weights
-        self._numbers = 2 * self._size + kinds * StressStep.kept
+        self._numbers = 2 * self._size + kinds * kept
         self._modes_at = _LEVELS + sum(levels for levels, _ in self._levels)
         self._make(fluid, found, flow)
 
     def __call__(
         self, used: np.ndarray, given: dict[str, np.ndarray], normal: bool
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the strain of the fluid, shape (runs, ends, lanes), and the stress of the modes.
+        """Return the strain of the fluid, and the stress of the modes if `normal`.
 
-        That is σ11, σ22, σ33, σ12, shape (runs, ends, 4, lanes), where normal stresses are asked
-        for, and empty if not.
-
-        `used`: parts of the program that one of the vectors needs; see `Flags`. `given`: the arrays
-        beside these, by name. `normal`: whether normal stresses are asked for.
+        Shapes (runs, ends, lanes), and (runs, ends, 4, lanes) of σ11, σ22, σ33, σ12.
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         strain = np.full((runs, steps + 1, LANES), np.nan)
@@ -249,9 +236,8 @@ class StressCode(Code):
 class StressSideBySide(LanePredictor):
     """Predictions of strains for one structure of law and effects.
 
-    `fluid`, `code`, `made_from`: as `LanePredictor` takes them. `driven`: of a vector and a run:
-    the true stress at step ends in Pa, the inertia of the tool in Pa s², and the strain of what
-    gives way in series.
+    `driven`: of a vector and a run: the true stress at step ends in Pa, the inertia of the tool in
+    Pa s², and the strain of what gives way in series.
     """
 
     def __init__(self, fluid: AugmentedFluid, code: StressCode, driven: Callable, made_from: tuple):
@@ -261,10 +247,7 @@ class StressSideBySide(LanePredictor):
         self._driven = self._program("driven", driven, (None, 0), (0, None))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return strains, and N1 and N2 behind them if asked for.
-
-        Limits, what judges and how many runs are no padding say nothing here.
-        """
+        """Return strains, and N1 and N2 behind them if asked for; limits say nothing here."""
         return self._by_eights(
             asked.thetas, (), lambda lanes, _, used: self._eight(asked, lanes, used)
         )

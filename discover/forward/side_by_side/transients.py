@@ -1,7 +1,6 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
-The rate that an instrument shapes and the signal that it distorts are left to JAX,
-which is called only where a vector asks for it.
+JAX shapes the rate and distorts the signal, where a vector asks for it.
 """
 
 from collections.abc import Callable
@@ -19,12 +18,7 @@ from discover.forward.declared import Numbers
 from discover.forward.integrators.exponential_weights import krogstad_weights
 from discover.forward.integrators.stepping import JUMP
 from discover.forward.side_by_side.kernel import Kernel
-from discover.forward.side_by_side.predictors import (
-    Asked,
-    LanePredictor,
-    flows_of,
-    modes_in_use,
-)
+from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import WEIGHTS
 from discover.programs.lanes import LANES
 from discover.protocols.kinematics import normal_stress_differences
@@ -48,17 +42,14 @@ _OF_RUNS = (
 class _Runs(NamedTuple):
     """Runs as the kernel takes them, in arrays of NumPy.
 
-    `width`, `jump`: of the steps, and the width up to which one only marks a jump of the rate, in
-        s.
-    `held`, `whole`, `least`: of how many steps that follow the commanded rate may be a straight
-        line, from each on, how long these are together, in s, and how short a vector's own may
-        become; see `OwnWidths`.
+    `width`, `jump`: of steps in s, and the width up to which one only marks a jump of the rate.
+    `held`, `whole`, `least`: over how many steps from each on the commanded rate may be a straight
+        line, how long these are, and how short a vector's own may be, in s; see `OwnWidths`.
     `cycle`, `period`: steps between which the cycle lies that a run's start brings back, the first
-        negative where there is none, and how long it is, in s.
+        negative where there is none, and its length in s.
     `weight`, `recorded`: what was measured, at step ends.
-    `rate`, `tool_rate`: without effects of the instrument, the lanes of the former last and those
-        of the latter first.
-    `in_shear`: whether any of them is simple shear, where alone an instrument shapes and distorts.
+    `rate`, `tool_rate`: without effects of the instrument, lanes of the former last, of the latter
+        first.
     """
 
     last: np.ndarray  # how many steps of each are taken
@@ -81,8 +72,8 @@ class _Runs(NamedTuple):
 def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return of each step how many from it on are one interval, its length, and the least step.
 
-    An interval ends at a sample and where a rate jumps. One of few steps is left as it is, and so
-    is one in which the commanded rate is no straight line.
+    An interval of a straight rate ends at a sample and where a rate jumps; one of few steps is
+    left.
     """
     half, rates = np.asarray(part.times), np.asarray(part.commanded_rate)
     times, sample, last = half[:, ::2], np.asarray(part.sample_index), np.asarray(part.last_step)
@@ -125,10 +116,9 @@ def _between(
 class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
-    `fluid`, `code`, `made_from`: as `LanePredictor` takes them. `rates`: of a vector, the effects
-    that are present, and a run: the felt rate at ends and middles of steps, without what series
-    elements take, and the tool's rate at ends. `recorded`: of these, the stress, the felt rate and
-    the tool's, what is recorded at samples.
+    `rates`: of a vector, the effects present, and a run: the felt rate at ends and middles of
+    steps, and the tool's at ends. `recorded`: of these, the stress and both rates, what samples
+    record.
     """
 
     def __init__(

@@ -26,10 +26,8 @@ _MIRROR = (1.0, 1.0, 1.0, -1.0)
 class HalfCycle(NamedTuple):
     """Half a cycle: where it ends, mirrored; what is left of each level; and σ12 on the way.
 
-    `recorded`: its first harmonic where steps are counted, shape (), else its values at step ends,
-        (s,).
-    `of_modes`: these of each mode, where they are asked for, without the factor of the states,
-        shape (s, k).
+    `recorded`: its first harmonic where steps are counted, else its values at step ends.
+    `of_modes`: these of each mode where asked for, without the factor of the states.
     """
 
     stress: Float[Array, "s k"]
@@ -62,8 +60,7 @@ def first_harmonic(
 def half_cycle(dynamics: Dynamics, wave, width, by_mode: bool = False):
     """Return the function from state and strain amplitude to what half a cycle makes of them.
 
-    `dynamics`: the fluid. `wave`: rate over strain amplitude at step ends and middles in turn.
-    `width`: of a step in s. `by_mode`: whether stresses of each mode are asked for too.
+    `wave`: rate over strain amplitude at step ends and middles in turn. `width`: of a step in s.
     """
     step, begun = _step(dynamics, width, 1 if by_mode else 4)
 
@@ -213,14 +210,12 @@ def periodic_start(
 ) -> tuple[Float[Array, "s k"], Levels]:
     """Return modes and states that a cycle brings back; not a number where none is found.
 
-    It is solved for and not waited for: a mode that relaxes over a thousand cycles takes no more
-    steps than another. Newton's steps take the derivative of the cycle along the components of
-    each mode, and along each state, which change nearly by themselves   [shooting: Stoer & Bulirsch
-    2002, Introduction to Numerical Analysis, section 7.3; `next_approximation`].
+    Solved for and not waited for, by Newton's steps along the components of each mode and along
+    each state, which change nearly by themselves   [shooting: Stoer & Bulirsch 2002, Introduction
+    to Numerical Analysis, section 7.3; `next_approximation`].
 
-    `after_cycle`: from modes, shape (s, k), and states to what they are a cycle later. `rest`:
-    modes and states at rest, from which the iteration begins. `slowness`: relaxation time of each
-    mode, in cycles. `is_periodic`: where not, rest is returned.
+    `after_cycle`: from modes and states to what they are a cycle later. `rest`: these at rest.
+    `slowness`: relaxation times, in cycles. `is_periodic`: where not, rest is returned.
     """
 
     def with_derivative(stress, levels):

@@ -60,20 +60,15 @@ def complex_modulus(
 ) -> Complex[Array, ""]:
     """Return G′ + iG″ in Pa of the first harmonic at a strain γ₀ sin ωt of the tool.
 
-    The periodic state is solved for and not waited for: it is the fixed point of half a cycle
-    followed by the mirror image that half a period is in simple shear. Newton's steps take the
-    derivative of that map along the components of each mode, which change by themselves; a
-    step that leads astray is shortened   [shooting and the modified Newton method: Stoer & Bulirsch
-    2002, Introduction to Numerical Analysis, sections 7.3 and 5.4]. Not finite where this does not
-    converge.
+    The periodic state is solved for: the fixed point of half a cycle and the mirror image that half
+    a period is in simple shear. Newton's steps take the derivative along the components of each
+    mode   [shooting and the modified Newton method: Stoer & Bulirsch 2002, Introduction to
+    Numerical Analysis, sections 7.3 and 5.4]. Not finite where this does not converge.
 
     G′ = (2/Tγ₀) ∫ σ sin ωt dt and G″ = (2/Tγ₀) ∫ σ cos ωt dt   [Hyun et al. 2011, Prog. Polym. Sci.
-    36, 1697]. Slip and compliance in series take their share of the first harmonic; that they also
-    feel the higher ones is neglected.
+    36, 1697]. Slip and compliance in series take their share of the first harmonic alone.
 
-    `dynamics`: the fluid, with what gives way in series with it. `strain`, `frequency`: amplitude
-    γ₀ and ω in rad/s. `steps`: over half a cycle. `beside`: recorded stress beside the modes in Pa,
-    of rates in 1/s.
+    `steps`: over half a cycle. `beside`: recorded stress beside the modes in Pa, of rates in 1/s.
     """
     half = counted_half_cycle(dynamics, frequency, steps)
 
@@ -178,12 +173,9 @@ def periodic_state(
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
 ) -> PeriodicState:
-    """Return what `complex_modulus` solves for, of modes alone, with derivatives in both modes.
+    """Return what `complex_modulus` solves for, of modes alone, with implicit derivatives.
 
-    They are those of the implicit function: none passes through the iteration.
-
-    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
-    same, through which no derivative passes.
+    `fixed`: the fluid once more, through which no derivative passes.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency

@@ -30,9 +30,8 @@ _HOPELESS = 5e-4
 class Approximation(NamedTuple):
     """An approximation to the modes, and the best one of each that was tried.
 
-    `stress`, `best`: dimensionless, shape (s, k): four components of σ, and structure variables.
-    `best_misfit`, `best_step`: what a cycle changes in the best one, relative, and Newton's step
-        from it.
+    `stress`, `best`: dimensionless, σ and structure variables. `best_misfit`, `best_step`: what a
+    cycle changes in the best one, relative, and Newton's step from it.
     """
 
     stress: Float[Array, "s k"]
@@ -67,10 +66,9 @@ def next_approximation(
     A step that leads astray is shortened   [modified Newton method: Stoer & Bulirsch 2002,
     Introduction to Numerical Analysis, section 5.4].
 
-    `now`, `after`: the modes, and what a cycle makes of them. `jacobian`: of that in these, for
-    each mode: direction, component. `moved`: by how much something beside the modes has changed
-    since, a state or what is felt. It puts the modes off, which is no step of theirs that led
-    astray.
+    `after`: what a cycle makes of the modes. `jacobian`: of that, for each mode: direction,
+    component. `moved`: by how much something beside the modes has changed since, which puts them
+    off.
     """
     difference = after - now.stress
     misfit = _size(difference) / (1.0 + _size(now.stress))
@@ -109,8 +107,7 @@ def relative_change(
 ) -> Float[Array, ""]:
     """Return how far the modes moved, relative, but for what rounding moves of slow ones.
 
-    `now`, `following`: approximations one after the other. `slowness`: relaxation time of each mode
-    over that of a cycle. `tolerance`: change below which the iteration ends.
+    `slowness`: relaxation time of each mode over that of a cycle. `tolerance`: ends the iteration.
     """
     told = 1.0 + _STATE_ROUNDING / tolerance * slowness
     moved = _size(following.stress - now.stress) / (1.0 + _size(now.stress))
@@ -170,12 +167,10 @@ def approach_step(
     weissenberg_number: Float[Array, " k"],
     scalars: int,
 ) -> Approach:
-    """Return the way after one step.
+    """Return the way after one step; where chains outgrow it, a linearly implicit one goes astray.
 
-    Where chains grow faster than a step is long, a linearly implicit one goes the wrong way.
-
-    `change`: rate of change of all modes. `index`: of the step. `weissenberg_number`: of each mode.
-    `scalars`: how many structure variables that are no part of a tensor stand last in each mode.
+    `change`: rate of change of all modes. `scalars`: structure variables of no tensor, last in
+    each.
     """
     width = pseudo_time_step(way.number, weissenberg_number)
     moved = linearly_implicit_step(change, way.stress, width)
@@ -201,10 +196,7 @@ def moves(
 ) -> Bool[Array, ""]:
     """Return whether another step may change anything: one of Newton's from here did, or none was.
 
-    A step that is taken again moves nothing either.
-
-    `before`, `after`: the way at the beginning and at the end of a step. `weissenberg_number`: of
-    each mode. `beside`: what else is on the way, before and after the step.
+    `beside`: what else is on the way, before and after the step.
     """
     width = pseudo_time_step(before.number, weissenberg_number)
     newton = jnp.all((after.number >= before.number) & (width > _LONG))
@@ -258,11 +250,7 @@ def linearly_implicit_step(
     stress: Float[Array, "s k"],
     width: Float[Array, " k"],
 ) -> Float[Array, "s k"]:
-    """Return modes after one linearly implicit Euler step; an infinite one is Newton's.
-
-    `change`: rate of change of all modes, each of which changes by itself. `stress`: where the step
-    begins. `width`: of the step, in the unit of time of each mode.
-    """
+    """Return modes after a linearly implicit Euler step; an infinite one is Newton's."""
     now, jacobian = _with_jacobian(change, stress)
     matrix = jnp.eye(len(stress)) / width[:, None, None] - jacobian
     return stress + _solved(matrix, now)
@@ -271,10 +259,7 @@ def linearly_implicit_step(
 def newton_step(
     change: Callable[[Float[Array, "s k"]], Float[Array, "s k"]], stress: Float[Array, "s k"]
 ) -> Float[Array, "s k"]:
-    """Return modes after a step of Newton's method from where they are steady.
-
-    It moves them by nothing, and by what the change depends on as the implicit function does.
-    """
+    """Return modes after Newton's step from where they are steady, as the implicit function."""
     now, jacobian = _with_jacobian(change, stress)
     return stress + _solved(jax.lax.stop_gradient(-jacobian), now)
 
@@ -307,12 +292,11 @@ def steady_states(
     """Return the recorded stress of the modes in Pa and the felt rate in 1/s in steady flow.
 
     Each state is approached from rest by linearly implicit Euler steps in pseudo-time that grow
-    until they are Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]. Where a law has
-    several steady states it is the one that a start-up leads to; where it has none, or the flow
-    runs away, the values are not finite or far off.
+    until they are Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]: of several the
+    one that a start-up leads to. Where there is none, or the flow diverges, values are not finite
+    or far off.
 
-    `dynamics`: the fluid; of elements in series only slip acts. `rates`: of the tool, in 1/s, shape
-    (n,); zero is rest. `flow`: which flow has these rates; None is simple shear.
+    `rates`: of the tool, in 1/s; zero is rest. Of elements in series only slip acts.
     """
 
     def one(rate):
@@ -326,13 +310,10 @@ def steady_states(
 def steady_state(
     dynamics: Dynamics, fixed: Dynamics, rate: Float[Array, ""], flow: Kinematics | None
 ) -> Float[Array, "s k"]:
-    """Return the dimensionless modes in one steady flow, as `steady_states` reaches it.
+    """Return the dimensionless modes in one steady flow, with derivatives of the implicit function.
 
-    Not finite where none is reached. Derivatives are those of the implicit function: none passes
-    through the steps.
-
-    `dynamics`: the fluid; no state changes with it, and nothing gives way in series. `fixed`: the
-    same, through which no derivative passes.
+    Not finite where none is reached. `fixed`: the fluid once more, through which no derivative
+    passes.
     """
     reached, _, _ = jax.lax.stop_gradient(_approach(fixed, rate, flow))
     return newton_step(lambda stress: dynamics.change(stress, rate, 1.0, flow), reached)

@@ -136,10 +136,8 @@ def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
 def kept(made_from: Any, write: Callable[[], bytes]) -> bytes:
     """Return machine code that an earlier start made of the same, or write and keep it.
 
-    It lies beside the programs, where nobody else can write; see `discover.programs.store`.
-
-    `made_from`: what tells it from other code; what cannot be described, a user's own code, is not
-    kept. `write`: makes it.
+    It lies with the programs (`discover.programs.store`). `made_from`: what tells it from other
+    code; what no digest describes, a user's own code, is not kept.
     """
     folder = program_folder()
     if folder is None:
