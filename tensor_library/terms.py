@@ -1,4 +1,4 @@
-"""A candidate term: tensor × invariant multipliers × closed-form scalar."""
+"""Candidate terms: tensor × invariant multipliers × closed-form scalar."""
 
 import re
 from collections.abc import Mapping
@@ -30,18 +30,11 @@ _NO_POWERS = (0,) * len(INVARIANT_NAMES)
 class CandidateTerm:
     """One term that a constitutive law may hold.
 
-    Attributes
-    ----------
-    tensor
-        Index into `TENSOR_NAMES`.
-    powers
-        Exponent of each invariant of `INVARIANT_NAMES`.
-    closed_form
-        Key of `CLOSED_FORMS`, or None.
+    `tensor`: index into `TENSOR_NAMES`. `powers`: exponent of each invariant of `INVARIANT_NAMES`.
+    `closed_form`: key of `CLOSED_FORMS`, or None.
 
     Examples
     --------
-    >>> from tensor_library import CandidateTerm
     >>> CandidateTerm(tensor=1, powers=(1, 0, 0, 0, 0, 0, 0, 0)).name
     'tr(sigma)*sigma'
     """
@@ -107,15 +100,9 @@ class CandidateTerm:
         rate: Symmetric,
         inner: Mapping[str, Float[Array, ""]] | None = None,
     ) -> Symmetric:
-        """Return the value of the term at one state.
+        """Return the value of the term at one dimensionless state, both (3, 3) or both (4,).
 
-        Parameters
-        ----------
-        stress, rate
-            Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
-        inner
-            Inner parameters by name, dimensionless, of shape (); the form's default where one is
-            missing.
+        `inner`: inner parameters by name; the form's default where one is missing.
         """
         invariants = scalar_invariants(stress, rate)
         value = integrity_basis(stress, rate)[self.tensor]
@@ -137,14 +124,8 @@ class CandidateTerm:
     ) -> T:
         """Return the term in a notation, as a factor: a sum of tensors is bracketed.
 
-        Parameters
-        ----------
-        notation
-            How to write it.
-        coefficient
-            Number in front; none if None.
-        inner
-            Inner parameters by name; one that is missing stays a letter.
+        `coefficient`: number in front, if any. `inner`: by name; one that is missing stays a
+        letter.
         """
         factors = [] if coefficient is None else [notation.number(coefficient)]
         if self.form is not None:
@@ -177,17 +158,9 @@ class CandidateTerm:
 
 
 def parse_term(name: str) -> CandidateTerm:
-    """Return the term with this canonical spelling.
+    """Return the term with this canonical spelling, which is matched, never evaluated.
 
-    Parameters
-    ----------
-    name
-        Such as ``sigma``, ``tr(sigma)*sigma`` or ``(exp(epsilon*tr(sigma))-1)*sigma``.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a canonical spelling. The text is matched, never evaluated.
+    Raises ValueError if the text is none.
 
     Examples
     --------

@@ -1,8 +1,4 @@
-"""All effects by name.
-
-An effect that a module of the dictionary holds is built in. Effects of a user's own are registered,
-by a program or by an installed package (see docs/adding-an-effect.md).
-"""
+"""Effects by name: the built-in ones, and a user's own (docs/adding-an-effect.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -51,10 +47,10 @@ def built_in_effects() -> Mapping[str, AbstractEffect]:
 
 
 def effects_table() -> "pd.DataFrame":
-    """Return the effects that are known by name, one line for each parameter, the amplitude first.
+    """Return the effects known by name, one line a parameter, the amplitude first.
 
-    An amplitude of zero is no effect. `low` and `high` are in `unit` where `range_scale` is
-    ``one``, and else multiples of that property of the data.
+    `low` and `high` are in `unit` where `range_scale` is ``one``, else in that property of the
+    data.
 
     Examples
     --------
@@ -75,18 +71,9 @@ def effects_table() -> "pd.DataFrame":
 
 
 def register_effect(effect: AbstractEffect) -> AbstractEffect:
-    """Make an effect of one's own known by name, to studies and loops in this process.
+    """Make an effect of one's own known by name to studies and loops in this process.
 
     An installed package does so in every process: see docs/adding-an-effect.md.
-
-    Parameters
-    ----------
-    effect
-        Made as docs/adding-an-effect.md shows.
-
-    Returns
-    -------
-    The effect.
 
     Raises
     ------
@@ -138,7 +125,7 @@ Written = Any
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """An effect that is part of the declared model.
+    """Effect that is part of the declared model.
 
     `values`: of its parameters, in their units and order; None where one is to be fitted.
     """
@@ -173,9 +160,8 @@ class KnownEffect:
 def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
     """Return the effects that a study or a program names.
 
-    `written`: by name of the effect: values of its parameters, ``"fit"`` for those to be fitted
-    along. `where`: the place, for messages. Raises InputError if an effect or a parameter is
-    unknown, one is missing, or a value is outside its range.
+    `written`: effect → parameter → value or ``"fit"``. `where`: the place, for messages. Raises
+    InputError if a name is unknown, a parameter missing, or a value outside its range.
     """
     if not isinstance(written, Mapping):
         raise InputError(

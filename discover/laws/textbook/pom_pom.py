@@ -1,6 +1,7 @@
 """Pom-pom law of branched melts, differential: a backbone that turns, stretches and ends."""
 
 from functools import partial
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -52,15 +53,8 @@ class PomPom(AbstractConstitutiveLaw):
     drag_strain: bool = eqx.field(static=True, default=False)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def variables(self) -> int:
-        """One, y."""
-        return 1
-
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract."""
-        return True
+    variables: ClassVar[int] = 1
+    retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, y, γ̇) as above, and of y what its change is short of −y."""
