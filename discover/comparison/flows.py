@@ -1,4 +1,4 @@
-"""The flows on which learned laws are looked at, with what is known of the truth in each."""
+"""Flows in which learned laws are compared, with what is known of the truth in each."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -55,15 +55,12 @@ DRAWN: tuple[FlowKind, ...] = ("training", "held_out", "test")
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow, when to look at it, and what is known of the stresses.
+    """Flow, its samples, and what is known of the stresses.
 
-    `times`, `shear_rate`: samples, shape (n,), in s and 1/s.
-    `reference`: the truth where the law is known, the measurement otherwise; not every quantity.
-    `measured`: σ12 that the learners saw, noise included, for training flows.
-    `training_end`: last time of the training series, beyond which a prediction extrapolates in
-        time; or None.
-    `commanded`: the protocol before an instrument that is known changed it, for titles; None where
-        none did.
+    `times`, `shear_rate`: in s and 1/s, shape (n,). `reference`: the truth where the law is known,
+    else the measurement; not every quantity. `measured`: σ12 of training flows, noise included.
+    `training_end`: last time of the training series, or None. `commanded`: the protocol before a
+    known instrument changed it, for titles; None without.
     """
 
     name: str  # name of the run or of the protocol
@@ -95,11 +92,7 @@ class Flow:
 
     @property
     def records_shear_stress(self) -> bool:
-        """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
-
-        Else it is the tensile stress, a strain, a modulus, or a normal stress difference that is
-        data of its own.
-        """
+        """Whether σ12 in shear is recorded, beside which N1 and N2 are told."""
         return self.protocol.quantity == "sigma12"
 
     @property
@@ -128,10 +121,7 @@ class Flow:
         return self.drawn[1]
 
     def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return by what a record and its residual are multiplied so that noise has one size.
-
-        Ones but for a flow curve or a sweep, whose noise is in proportion to each value.
-        """
+        """Return factors that give the noise of a record one size; one but for curves and sweeps."""
         size = sizes_of(record, self.protocol)
         return np.min(size) / size
 
@@ -151,10 +141,9 @@ class Flow:
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
-        """Strain, shape (n,), nan of steady states, which do not know it.
+        """Strain, shape (n,): recorded in creep, amplitude of oscillations, else since the start.
 
-        Where the stress is imposed what was recorded, of oscillations the amplitude, else the
-        strain since the first sample.
+        nan of steady states.
         """
         if self.protocol.control == "steady":
             return np.full(self.times.shape, np.nan)
@@ -168,8 +157,8 @@ class Flow:
     def largest_rate(self) -> float:
         """Largest rate without its sign, in 1/s.
 
-        At a given stress the mean rate of the second half of the record, the samples halved: the
-        slope from sample to sample is of noise.
+        At a given stress the mean over the second half of the samples: slopes between samples are
+        noise.
         """
         if self.records_strain and len(self.times) > 2:
             middle = len(self.times) // 2
@@ -197,12 +186,10 @@ class Flow:
 def comparison_flows(
     data: StudyData, high_deborah: tuple[float, ...], pipkin: Sequence[tuple[float, float]] = ()
 ) -> list[Flow]:
-    """Return the flows of a comparison: training, held out, tests, and where only errors are told.
+    """Return the flows of a comparison: training, held out, and, with a known law, tests.
 
-    All but the first two need a known law.
-
-    `data`: the data of the study. `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi
-    and De of the oscillations over which errors are mapped.
+    `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi and De of oscillations over which
+    errors are mapped.
     """
     flows = [run_flow(run, "training", data) for run in data.fit]
     flows += [run_flow(run, "held_out", data) for run in data.held_out]
@@ -347,28 +334,21 @@ def prepared(data: StudyData) -> StudyData:
 
 
 def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
-    """Return data in which what starts periodic has the cycles before it that learners wait for.
+    """Return data in which periodic starts have the cycles before them that learners wait for.
 
-    `data`: of a study, split. `relaxation_time`: the longest, in s. `relaxes`: whether the known
-    law relaxes, so that a periodic state is solved for.
+    `relaxation_time`: the longest, in s. `relaxes`: whether the known law does, so that a periodic
+    state is solved for.
     """
     return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
 
 
 def thinned_to(data: StudyData, most: int) -> StudyData:
-    """Return data with at most so many samples of each run, evenly chosen in their order.
-
-    Every sample is a step of the integration, and a record of thousands says little more of a law
-    than its hundreds do. What was thinned says so.
-    """
+    """Return data with at most so many samples of each run, evenly chosen in their order."""
     return with_each_run(data, lambda run: thin_run(run, most))
 
 
 def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
-    """Return data whose fitted runs lack the samples that stand alone, and words on them.
-
-    Squares would let them bend the law. Those of runs held out stay, and do not judge.
-    """
+    """Return data whose fitted runs lack outliers, and words on them; held-out runs keep theirs."""
     parts = [without_spikes(run) for run in data.fit.runs]
     told = [f"{len(times)} of {run.name}" for run, times in parts if times]
     if not told:
@@ -416,8 +396,8 @@ def true_terms(
 ) -> tuple[LawTerm, ...] | None:
     """Return what is missing from UCM in a named law; None if it is no sum of library terms.
 
-    `known_relaxation`: whether −σ is known. If not, it is missing too. Raises InputError if there
-    is no such law, or a parameter is missing or outside its range.
+    `known_relaxation`: whether −σ is known, else it is missing too. Raises InputError if there is
+    no such law, or a parameter is missing or out of range.
     """
     known = make_law(law, parameters)
     try:

@@ -1,4 +1,4 @@
-"""A comparison of estimators, or on data, that a program holds."""
+"""Comparison of estimators, or on data, in memory."""
 
 from collections.abc import Iterable, Mapping, Sequence, Sized
 from typing import Any, overload
@@ -68,18 +68,19 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-        For estimators the data set that tests them; for a data set the known `Fluid`, by default
-        upper convected Maxwell with G = 1 Pa and λ = 1 s.
+            The data set that tests estimators; for a data set the known `Fluid`, by default upper
+        convected
+        Maxwell with G = 1 Pa and λ = 1 s.
     train
-        What the estimators were fitted to; needed only for those from a file, which holds no data.
+        What estimators from a file were fitted to; the file holds no data.
     held_out
         Held-out runs of the data set, by name, or a data set of them.
     known_effects
-        For a data set: known effects, as ``[model] effects`` in a study,
-        such as ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
+        Known effects, as ``[model] effects`` in a study, such as
+        ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
     free
-        For a data set: what of the base is also fitted: ``"modulus_Pa"``,
-        ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
+        What of the base is also fitted: ``"modulus_Pa"``, ``"relaxation_time_s"`` (one factor on
+        several modes), or parameters of its law.
     tolerance
         Relative discrepancy that is accepted.
     seed
@@ -87,14 +88,15 @@ def compare(
     progress
         Called with what is going on and the fraction done.
     **options
-        For a data set: what ``[compare]`` in a study may hold, such as ``quick=True``,
-        ``members=5``, ``learners=["tensor_sindy"]``, ``library={"degree": 1}``.
+        Of ``[compare]`` in a study, such as ``quick=True``, ``learners=["tensor_sindy"]``,
+        ``library={"degree": 1}``. From `held_out` on, but for the last three, for a data set only.
 
     Raises
     ------
     InputError
-        If estimators are not fitted, or not to the same runs with the same known part, a run
-        is both fitted and held out, or an option is unknown.
+            If estimators are not fitted, or not to the same runs with the same known part, a run is
+        both
+        fitted and held out, or an option is unknown.
 
     Examples
     --------

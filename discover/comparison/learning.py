@@ -1,4 +1,4 @@
-"""What each learner finds, kept as it is found, so that a run that was stopped can go on."""
+"""Learners of a comparison, their results kept as they are found."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -31,8 +31,8 @@ def train(
 ) -> tuple[LearnerResult, Fluid]:
     """Return what one learner finds in these runs, and the fluid that it makes.
 
-    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `study`: the study,
-    for the learner's settings. `model`: the known part. `progress`: called as it goes.
+    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `model`: the known
+    part.
     """
     options = study.compare
     plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
@@ -84,10 +84,7 @@ def study_library(study: Study) -> TermLibrary:
 
 @dataclass(frozen=True)
 class Learning:
-    """Where learners are trained, or found again.
-
-    `made`: learners that are fitted already: what they found, by learner.
-    """
+    """Where learners are trained, or found again; `made`: results of those fitted already."""
 
     study: Study  # which learners, and with what options
     seed: int
@@ -97,10 +94,7 @@ class Learning:
     def outcomes(
         self, learners: Sequence[str], frame: Frame, progress: Progress
     ) -> dict[str, LearnerOutcome]:
-        """Return what each learner finds, those of this package side by side.
-
-        Whether another one may share a process with threads is not known, so they come after.
-        """
+        """Return what each learner finds, those of this package side by side, then the others."""
         # before the threads: two that load scikit-learn at once find it half loaded
         from discover.learners import tbnn_ude, tensor_sindy  # noqa: F401
 
@@ -124,9 +118,7 @@ class Learning:
     ) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works.
 
-        `frame`: the known part, the runs to learn from and the flows of the page. `progress`:
-        called with what is going on and the fraction done. `part`: of a sweep, the name under which
-        it is kept; its outcomes are looked at in one flow.
+        `part`: name under which a point of a sweep is kept, looked at in one flow.
         """
         store, made, flows = self.store, self.made, frame.flows
         name = part or learner

@@ -1,9 +1,4 @@
-"""What these data cannot decide, in the words and flows of a comparison.
-
-The findings are those of `discover.identify`: exact twins of the law found, rivals that a test on
-the data could not rule out, and the structure of the library at the law found. Here they are put
-beside the flows of the comparison.
-"""
+"""What the data cannot decide, in the flows of a comparison: twins, rivals, structure."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -55,12 +50,10 @@ _PHYSICS_FLOWS = ("training", "held_out", "test")
 
 @dataclass(frozen=True)
 class Rival:
-    """A law that the data do not tell from the chosen one.
+    """Law that the data do not distinguish from the chosen one.
 
-    `errors_to_chosen`: largest relative difference of each quantity over the training and the test
-        flows.
-    `separated_by`: ``{"protocol", "quantity"}`` where the two differ most among flows not yet
-        measured; None where they differ nowhere that was tried.
+    `errors_to_chosen`: largest relative difference of each quantity over training and test flows.
+    `separated_by`: protocol and quantity in which they differ most among flows not yet measured.
     """
 
     law: LawTerms  # its terms, beyond the known part
@@ -92,10 +85,9 @@ def exact_twins(
     flows: Sequence[Flow],
     library: TermLibrary | None = None,
 ) -> list[Rival]:
-    """Return laws that give the same σ12 in every shear flow, the law found put aside.
+    """Return laws that give the same σ12 in every shear flow as the law found.
 
-    `terms`: of the law found. `model`: the known part. `flows`: training and test flows. `library`:
-    the terms that were searched; a twin may be outside.
+    `library`: the terms that were searched; a twin may be outside.
     """
     chosen = LawTerms.of(terms)
     basis = build_library(degree=1)
@@ -123,9 +115,7 @@ def exact_twins(
 def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> list[Rival]:
     """Return the other laws that the posterior holds possible, the likeliest first.
 
-    Those whose effects of the fluid are no sum of library terms have no spelling and are left out.
-
-    `flows`: those in which they are told from the likeliest. `runs`: runs as recorded, by name.
+    Those whose effects are no sum of library terms are left out. `runs`: as recorded, by name.
     """
     fits = [(f, p) for f, p in found.posterior.fits if p >= _POSSIBLE][: 1 + MOST_RIVALS]
     named = [(f, p, t) for f, p in fits[1:] if (t := terms_of(f, found)) is not None]
@@ -237,8 +227,7 @@ def structure_of(
 def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values.
 
-    `flows`: the flows of the comparison; training ones set the box beyond which the law
-    extrapolates.
+    Training flows set the box beyond which the law extrapolates.
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along

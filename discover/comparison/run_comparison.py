@@ -1,4 +1,4 @@
-"""Both learners on identical data, part by part, so that a run that was stopped can go on."""
+"""Comparison of a study, part by part, so that a run that was stopped can go on."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -85,10 +85,8 @@ def sweep_points(
 ) -> list[SweepPoint]:
     """Return what each learner of a study finds at each point of its sweep.
 
-    `asked`: the points, as `sweep_studies` returns them. `learning`: where learners are trained, of
-    the study whose sweep it is. `model`: the known part. `seed`: overrides the study's seed of the
-    noise. `step`: returns what is called with what is going on, of the number of learners that are
-    done and a title.
+    `asked`: from `sweep_studies`. `model`: the known part. `seed`: overrides the study's seed of
+    the noise. `step`: returns progress for so many learners done and a title.
     """
     options, points = learning.study.compare, []
     for i, (law, value, other) in enumerate(asked):
@@ -164,16 +162,13 @@ def compare(
 ) -> Comparison:
     """Run a study's learners on identical data, and weigh what each found with a search's findings.
 
-    The posterior over laws, effects and terms comes first. What is declared as fitted has the
-    values of its likeliest hypothesis, and what that holds of the instrument is taken out of the
-    records, so that learners learn the fluid. Then each learner's law is a hypothesis too.
+    The posterior over laws, effects and terms comes first; its likeliest hypothesis fixes what is
+    declared as fitted, and what it holds of the instrument is taken out of the records, so that
+    learners learn the fluid. Then each learner's law is a hypothesis too.
 
-    `study`: the study. `seed`: overrides the study's seeds, of the noise and of the learners.
-    `progress`: called with what is going on and the fraction done. `store`: where finished learners
-    are kept and found again. `data`, `declared`: data and known part that are at hand, in place of
-    the study's. `made`: learners that are fitted already: what they found, by learner. `library`:
-    the terms that they searched, in place of the study's. Raises InputError if the study asks for
-    something that its data cannot give.
+    `seed`: overrides the study's seeds. `store`: where finished learners are kept. `data`,
+    `declared`: in place of the study's. `made`: results of fitted learners; `library`: the terms
+    that they searched. Raises InputError if the study asks for something that its data cannot give.
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)

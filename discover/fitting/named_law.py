@@ -65,24 +65,22 @@ def fit(
     data
         The runs to fit: transients, creep, flow curves, sweeps, in shear or extension.
     base
-        A fluid whose modes and solvent are taken; its own law is not.
+        Fluid whose modes and solvent are taken, without its law.
     bounds
-        Range (low, high) of constants, by name, inside the law's own: parameters of the law,
-        ``modulus_Pa``, ``relaxation_time_s``. Naming one of the last two fits it, for several modes
-        as one factor on all of them.
+        Range (low, high) of constants by name: parameters of the law, ``modulus_Pa``,
+        ``relaxation_time_s``. Naming one of the last two fits it, for several modes as one factor.
     start
-        Values from which the fit starts, by name, besides the automatic ones.
+        Further starting values, by name.
     fixed
         Constants that are not fitted, by name.
     effects
-        Known effects, as ``[model] effects`` in a study, such as
-        ``{"solvent_viscosity": "fit"}``.
+        Known effects, as ``[model] effects``, such as ``{"solvent_viscosity": "fit"}``.
     held_out
         Names of runs of `data` that only test the fit, or a data set of such runs.
     noise
         Relative noise of the runs, where known.
     most_samples
-        Samples of a run that are used, at most.
+        Most samples used of a run.
     tolerance
         Relative discrepancy that is good enough.
 

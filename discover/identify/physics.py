@@ -1,8 +1,4 @@
-"""Is a law physically sound? Checks that hold for any law, with where it fails.
-
-None of them uses data. A law that fails one may still fit; it should not be carried into a
-simulation of other flows without a second thought.
-"""
+"""Physical soundness of a law: checks that need no data, with where it fails."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -101,9 +97,9 @@ def check_physics(
 ) -> PhysicsReport:
     """Return the checks of a fluid.
 
-    `flows`: flows along which stresses are looked at. `weissenberg`, `deborah`: largest shear rate
-    and frequency of training, times the mean relaxation time: the corner of the box beyond which
-    the law extrapolates.
+    `flows`: those along which stresses are looked at. `weissenberg`, `deborah`: largest rate and
+    frequency of training, times the mean relaxation time: the box beyond which the law
+    extrapolates.
     """
     fluid = replace(fluid, law=in_shared_form(fluid.law))
     along = trajectories(fluid, in_enough_steps(fluid, flows))

@@ -1,10 +1,7 @@
-"""What an experiment can determine of a library, before any fit: no data are used, only protocols.
+"""What an experiment can determine of a library, from its protocols alone, before any fit.
 
-At a nominal law the sensitivities of σ12 to every coefficient of the library are computed exactly.
-Their null space holds the changes of the law that the
-experiment cannot see; its image in N1 and N2 says whether those follow from σ12. Everything is to
-first order around the law; whether a direction stays invisible at finite size is decided in exact
-arithmetic where the law is a polynomial.
+Null space of the exact sensitivities of σ12 to the coefficients at a nominal law, and its image in
+N1 and N2. First order; where the law is a polynomial, exact arithmetic decides on finite sizes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -50,11 +47,7 @@ from tensor_library.terms import parse_term
 def with_sensitivities(
     law: LibraryExpansion, known: Fluid, flows: FlowBatch
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
-    """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients.
-
-    `law`: what it makes is not finite where it diverges. `known`: a fluid with its modes and
-    solvent. `flows`: the runs and their grids.
-    """
+    """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients."""
 
     def observed(coefficients):
         moved = replace(law, coefficients=coefficients)
@@ -93,9 +86,8 @@ class QuantityVerdict:
     """Whether the observed stresses determine a normal stress difference.
 
     `verdict`: ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
-        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
-        of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
-        form of the law; ``"determined"`` otherwise, within the library.
+    experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one of
+    the two normal stresses leaves no trace in σ12; ``"determined"`` within the library otherwise.
     """
 
     quantity: str  # ``"N1"`` or ``"N2"``
@@ -116,9 +108,8 @@ class QuantityVerdict:
 class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
-    `exact`, `weak`: directions of which the experiment sees nothing, and the weakest of the others.
-    `n_exact_with_N1`: number of exact directions that would be left if N1 were measured as well.
-    `one_more`: by quantity, the term beyond the law that leaves it most open.
+    `exact`, `weak`: unseen directions, and the weakest of the others. `n_exact_with_N1`: exact ones
+    left if N1 were measured. `one_more`: by quantity, the further term that leaves it most open.
     """
 
     name: str
@@ -168,7 +159,7 @@ class LawStructure(NotebookView):
 
 @dataclass(frozen=True)
 class Structure(SentenceAndTable):
-    """What an experiment can determine of a library."""
+    """What an experiment can determine of a library, at the known part and at nominal laws."""
 
     laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
     relations: tuple[TermRelation, ...]  # exact relations among terms in shear, at any law
@@ -209,13 +200,10 @@ def analyse_structure(
 ) -> Structure:
     """Return what shear flows can determine of a library's coefficients.
 
-    `runs`: their protocols and sampling times; the stresses are not looked at, except that with
-    `use_normal_stresses` a run must hold N1 or N2 for it to count as measured. `library`: candidate
-    terms. `base`: known part; by default UCM. `nominal`: laws around which to look besides the
-    known part; by default those of `NOMINAL` whose terms the library holds. `modulus`,
-    `relaxation_time`, `solvent_viscosity`: known linear viscoelasticity, in Pa, s and Pa s; the
-    first two numbers, or one for each mode. `use_normal_stresses`: whether N1 and N2, where runs
-    hold them, are observed too.
+    `runs`: their protocols and times; with `use_normal_stresses`, N1 and N2 that they hold count as
+    measured. `base`: known part; by default UCM. `nominal`: laws around which to look besides it;
+    by default those of `NOMINAL` in the library. `modulus`, `relaxation_time`, `solvent_viscosity`:
+    in Pa, s and Pa s, the first two with one value for each mode.
     """
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:

@@ -44,14 +44,11 @@ _EXTENSION = {"extension": in_flow(start_up(0.3), "uniaxial")}
 class Distillation:
     """What a student learned.
 
-    `penalised`, `debiased`: parameters by name, with the penalty and without.
-    `misfit`: root-mean-square of the difference in σ12 over that of the teacher's σ12, debiased,
-        over all training flows.
-    `viscosity_ratio`, `relaxation_time_ratio`: of the debiased surrogate to the teacher's linear
-        limit, where the student is a Maxwell law.
-    `errors`: for each test flow, relative L2 errors ``sigma12``, ``N1`` and ``N2`` of the debiased
-        student (N2's relative to N1's norm), in extension ``tensile_stress``; None where a law runs
-        away.
+    `penalised`, `debiased`: parameters by name, with the penalty and without. `misfit`: rms
+    difference of σ12 over the teacher's, debiased, over all training flows. `viscosity_ratio`,
+    `relaxation_time_ratio`: of a debiased Maxwell student to the teacher's linear limit. `errors`:
+    by test flow, relative L2 errors ``sigma12``, ``N1``, ``N2`` (relative to N1), in extension
+    ``tensile_stress``; None where a law diverges.
     """
 
     student: str
@@ -81,7 +78,7 @@ class Distillation:
 
 
 class _Lesson(eqx.Module):
-    """What is taught: target σ12 over the modulus, shape (flows, n), and how to predict it."""
+    """Training problem: target σ12 over the modulus, shape (flows, n), and how to predict it."""
 
     build: Callable[..., AbstractConstitutiveLaw] = eqx.field(static=True)
     low: Float[Array, " p"]
@@ -169,17 +166,15 @@ def distil(
 ) -> Distillation:
     """Teach one law to another by the shear stress alone.
 
-    Minimises Σ over flows of the mean squared difference of σ12 (in units of the modulus), plus
-    κ Σ |parameter|. The sum over flows, not their mean, is what reproduces the paper's numbers; the
-    penalty biases them by some 2 %, so the minimum without it is found too.
+    Minimises Σ over flows of the mean squared difference of σ12 (over the modulus) plus κ Σ
+    |parameter|, and the same without the penalty, which biases by some 2 %. The sum over flows, not
+    their mean, reproduces the paper's numbers.
 
-    `teacher`: a dimensionless law or a fluid. `student`: key of `STUDENTS` or of `LAWS`, or a
-    `Student`. It has the teacher's moduli and relaxation times. A law of `LAWS` beyond the paper's
-    is taught from several starts. `protocols`: training flows, by default the paper's eight.
-    `penalty`: κ. `n_samples`, `duration`: equally spaced samples of each training flow, and its
-    length in the teacher's units. `tests`: flows on which errors are reported, by default the
-    paper's three and uniaxial extension. Raises InputError if the student is unknown or an argument
-    is out of range.
+    `teacher`: dimensionless law or fluid. `student`: key of `STUDENTS` or `LAWS`, or a `Student`,
+    with the teacher's modes; a law beyond the paper's is taught from several starts. `protocols`:
+    training flows, by default the paper's eight. `penalty`: κ. `n_samples`, `duration`: of each
+    training flow, in the teacher's units. `tests`: flows of `errors`, by default the paper's three
+    and uniaxial extension. Raises InputError if the student is unknown or an argument out of range.
     """
     fluid = teacher if isinstance(teacher, Fluid) else Fluid.dimensionless(teacher)
     pupil = student if isinstance(student, Student) else student_of(student)
@@ -241,12 +236,9 @@ def distil(
 def compare_fluids(
     truth: Fluid, other: Fluid, protocol: FlowProtocol, duration: float = TEST_DURATION
 ) -> dict[str, float] | None:
-    """Return relative L2 errors of σ12, N1 and N2 of one fluid against another in a flow.
+    """Return relative L2 errors ``sigma12``, ``N1``, ``N2`` of one fluid against another in a flow.
 
-    N2's error is relative to N1's norm, since N2 may vanish.
-
-    `truth`, `other`: the reference, and the fluid to compare. The keys are ``sigma12``, ``N1`` and
-    ``N2``, in extension ``tensile_stress``. None where a fluid diverges in this flow.
+    N2's is relative to N1's norm; in extension ``tensile_stress``. None where a fluid diverges.
     """
     times = np.linspace(0.0, duration, 401)
     try:

@@ -1,4 +1,4 @@
-"""What a learner is told of the fluid before it fits."""
+"""Known part of the fluid, as learners are given it."""
 
 import inspect
 from collections.abc import Sequence
@@ -30,11 +30,10 @@ _HELD_BY_BASE = (
 
 @dataclass(frozen=True)
 class KnownPart:
-    """The known fluid, to which a learner adds terms.
+    """Known fluid, to which a learner adds terms.
 
-    `law`: a known dimensionless law; None for upper convected Maxwell.
-    `modulus`, `relaxation_time` in Pa and s, shape (k,).
-    `modulus_covariance`: of the moduli in Pa², shape (k, k); None where they are exact.
+    `law`: dimensionless; None for upper convected Maxwell. `modulus`, `relaxation_time`: in Pa and
+    s, shape (k,). `modulus_covariance`: in Pa², shape (k, k); None where the moduli are exact.
     """
 
     law: AbstractConstitutiveLaw | None
@@ -54,9 +53,8 @@ class KnownPart:
 def known_part(estimator: Any) -> KnownPart:
     """Return what an estimator is told of the fluid: by `base`, or part by part.
 
-    `estimator`: has `base`, `modulus`, `relaxation_time`, `base_law`, `known_relaxation`, and
-    perhaps `solvent_viscosity`. Raises InputError if `base` is no fluid, or something that it holds
-    is given too; or a part is not as it should be.
+    Raises InputError if `base` is no fluid, something that it holds is given too, or a part is
+    unusable.
     """
     base = estimator.base
     if base is None:

@@ -1,4 +1,4 @@
-"""What estimators take as settings, checked when they fit."""
+"""Settings of estimators, checked when they fit."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral
@@ -26,10 +26,7 @@ DEFAULT_DEGREE = 1
 
 
 def check_settings(settings: Mapping[str, Any]) -> None:
-    """Check settings that several estimators share.
-
-    Raises InputError if a count or a seed is no whole number, or `progress` cannot be called.
-    """
+    """Raise InputError if a count or seed is no whole number, or `progress` cannot be called."""
     for name, least in _WHOLE.items():
         value = settings.get(name)
         if value is None:
@@ -54,7 +51,7 @@ def per_mode(name: str, value: PerMode) -> Float[np.ndarray, " k"]:
 
 
 def default_library() -> TermLibrary:
-    """Return the terms that are searched where nobody names others, by commands and in Python."""
+    """Return the terms that are searched where nobody names others."""
     return build_library(degree=DEFAULT_DEGREE)
 
 

@@ -1,4 +1,4 @@
-"""Laws whose constants a distillation teaches to imitate another law."""
+"""Students of a distillation: laws whose constants are taught to imitate another law."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -20,8 +20,7 @@ _POINTS = 5
 class MaxwellSurrogate(AbstractConstitutiveLaw):
     """Maxwell law with a relaxation rate and a modulus of its own: h = g₂ σ − (g₃ − 1) γ̇.
 
-    dσ/dt = L·σ + σ·Lᵀ − g₂ σ + g₃ γ̇, so that in units of the teacher's modulus and time the
-    surrogate's modulus is g₃, its relaxation time 1/g₂ and its viscosity g₃/g₂.
+    In the teacher's units modulus g₃, relaxation time 1/g₂, viscosity g₃/g₂.
     """
 
     relaxation: Float[Array, ""] = eqx.field(converter=as_parameter)  # g₂
@@ -35,10 +34,9 @@ class MaxwellSurrogate(AbstractConstitutiveLaw):
 
 @dataclass(frozen=True)
 class Student:
-    """A law with parameters to teach.
+    """Law with parameters to teach.
 
-    `build`: makes the law from its parameters, in the order of `bounds`.
-    `more_starts`: further starts: several constants may have a misfit with several minima.
+    `build`: from the parameters in the order of `bounds`. `more_starts`: against several minima.
     """
 
     name: str  # for tables
@@ -104,10 +102,7 @@ STUDENTS: Mapping[str, Student] = {
 
 
 def student_of(law: str) -> Student:
-    """Return any law with a name as a student, with all its constants to teach.
-
-    `law`: key of `STUDENTS` or of `LAWS`.
-    """
+    """Return a law by its key in `STUDENTS` or `LAWS` as a student, all its constants free."""
     if law in STUDENTS:
         return STUDENTS[law]
     if law not in LAWS or not LAWS[law].parameters:

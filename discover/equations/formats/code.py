@@ -1,8 +1,7 @@
-"""Laws as Python text that needs nothing of this package: with numpy, or with SymPy.
+"""Laws as Python text with numpy or SymPy alone.
 
-The text is put together from tables and from `repr` of numbers; no name of a file or study reaches
-it except in comments. Matrices of numpy and of SymPy share ``@`` and ``trace()``, so that one table
-serves both; UFL, in a file of its own, changes a few entries of it.
+Made of tables and of `repr` of numbers; names of files or studies occur in comments only. ``@`` and
+``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
 """
 
 import re
@@ -233,7 +232,7 @@ variables_rate = [{rates}]
 def numpy_code(equation: Equation) -> str:
     """Return a module with the law as a function of numpy arrays.
 
-    Raises InputError if the equation has a named law of which nobody said how it is written.
+    Raises InputError if the equation has a named law without written form.
     """
     return filled(
         _NUMPY_TEMPLATE,
@@ -290,9 +289,8 @@ def filled(
 ) -> str:
     """Return a module: a template with the law in a notation.
 
-    `constants`: what holds the constants of a named law; by default a list of one table for each
-    mode. `rates`: A template of what says how structure variables change, for a law that has some.
-    `structure`: fields of the states of the whole fluid, from `structure_fields`.
+    `constants`: holder of a named law's constants; by default a list with a table for each mode.
+    `rates`: template of the rates of structure variables. `structure`: from `structure_fields`.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)

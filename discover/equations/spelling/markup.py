@@ -25,8 +25,7 @@ def law_latex(
 ) -> str:
     """Return a dimensionless law as one LaTeX equation.
 
-    `linear_relaxation`: whether the −σ is there beside h. `named`: A law with a name to whose h the
-    terms are added.
+    `linear_relaxation`: whether the −σ is there. `named`: a law to whose h the terms are added.
     """
     # all on the left, so that each term has the sign that tables and files give it
     text = r"\overset{\nabla}{\boldsymbol{\sigma}}"
@@ -64,10 +63,7 @@ def _factor(term: LawTerm) -> float | None:
 
 
 def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
-    """Return how LaTeX writes the constants and the defined scalars of a law with a name.
-
-    What differs from mode to mode has the index k.
-    """
+    """Return the LaTeX of a named law's constants and defined scalars, with index k by mode."""
     function = named.function
 
     def letter(name: str) -> str:
@@ -171,8 +167,7 @@ def term_mathml(
 ) -> str:
     """Return a term by its canonical spelling, without `math` element.
 
-    `inner`: inner parameters by name; one that is missing stays a letter. `coefficient`: number in
-    front.
+    `inner`: by name; one that is missing stays a letter. `coefficient`: number in front.
     """
     return parse_term(name).spell(MathmlNotation(), coefficient, inner)
 
@@ -183,10 +178,7 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
 
 
 class InUnitsNotation(MathmlNotation):
-    """The same in units, for each mode: τ for σ/G, and λ before γ̇.
-
-    `modes`: how many there are; of several each symbol has the index k.
-    """
+    """MathML in units, for each mode: τ for σ/G, and λ before γ̇, with index k of several modes."""
 
     def __init__(self, modes: int):
         index = "<msub>{}<mi>k</mi></msub>" if modes > 1 else "{}"
@@ -212,12 +204,10 @@ def law_element(
     solvent: bool = False,
     rest: bool = False,
 ) -> str:
-    """Return the whole law, displayed; a long one goes on in the next line.
+    """Return the whole law, displayed; each summand is a `math` element, so that lines break.
 
-    Browsers do not break a `math` element, so each summand is one of its own.
-
-    `modes`: of a law in Pa and s how many there are; 0 for a dimensionless one. `solvent`: whether
-    a law in Pa and s has a solvent. `rest`: whether it has a summand h that stands elsewhere.
+    `modes`: how many a law in Pa and s has; 0 for a dimensionless one. `solvent`: whether that has
+    one. `rest`: whether it has a summand h that stands elsewhere.
     """
     notation = InUnitsNotation(modes) if modes else MathmlNotation()
     stress, rate = notation.tensor("sigma"), notation.tensor("gammadot")

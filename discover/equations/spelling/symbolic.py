@@ -11,10 +11,9 @@ from tensor_library.terms import parse_term
 
 
 def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> sympy.Expr:
-    """Return h as an expression over the non-commuting tensors of `tensor_library.notation`.
+    """Return h over the non-commuting tensors of `tensor_library.notation`.
 
-    Constants of a named law that differ from mode to mode stay letters, and so do its structure
-    variables.
+    Constants that differ from mode to mode, and structure variables, stay letters.
     """
     total: sympy.Expr = sympy.Integer(0)
     notation = SympyNotation()

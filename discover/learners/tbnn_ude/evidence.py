@@ -1,12 +1,10 @@
-"""Which of several laws that fit noisy data alike is the likelier, by what each had to be told.
+"""Laplace evidence of laws that fit noisy data alike, which penalises those that follow the noise.
 
-Two laws may leave the same noise and yet differ in what they took to get there: the one is smooth,
-the other bends wherever the noise does. The evidence of Laplace's approximation counts that: with
-weights w of a standard normal prior and Jacobian J of the residuals in units of the noise,
+With weights w of a standard normal prior and Jacobian J of the residuals over the noise,
 
     −2 ln E = χ² + |w|² + ln det(1 + JᵀJ),
 
-up to a constant that all laws share   [MacKay 1992, Neural Computation 4, 448].
+up to a common constant [MacKay 1992, Neural Computation 4, 448].
 """
 
 from collections.abc import Sequence
@@ -34,11 +32,8 @@ def surprises(
 ) -> Float[np.ndarray, " laws"]:
     """Return −2 ln E of every law; the least is the likeliest.
 
-    It is infinite for a law that diverges, if there is one that does not: in the training flows,
-    or in the same flows at twice the rate, in which every fluid has a finite stress.
-
-    The noise is what the best of them leaves. Where that is correlated, so that no law of these is
-    the whole one, its samples count as fewer, as a first-order autoregression has it.
+    Infinite for a law that diverges in the training flows, or in them at twice the rate, if another
+    does not. The noise is what the best law leaves; correlated samples count as fewer (AR(1)).
     """
     along = [trajectories(law, problem) for law in laws]
     misses = [np.asarray(relative_misses(one, problem)) for one in along]
@@ -69,11 +64,8 @@ def posterior_draws(
 ) -> list[TensorBasisNetwork]:
     """Return laws around a trained one that fit the data about as well.
 
-    They are drawn from the Gaussian of Laplace's approximation. Where the law is bent, or the noise
-    correlated, it reaches beyond the laws that fit: a draw is halved until it does.
-
-    `law`: trained on the problem, with coefficients that vary. `keys`: one for each draw. `fits`:
-    largest relative misfit over that of the law.
+    Drawn from Laplace's Gaussian, and halved until the relative misfit is at most `fits` times that
+    of the law. `keys`: one for each draw.
     """
     along = trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))
@@ -113,7 +105,7 @@ def _told(
 def _sensitivities(
     law: TensorBasisNetwork, along: Along, problem: TrainingProblem
 ) -> tuple[Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
-    """Return the weights of a law, which of them act, and what those change of the residuals."""
+    """Return the weights of a law, which of them act, and their derivatives of the residuals."""
     cloud = cloud_of(along, problem)
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
@@ -127,7 +119,7 @@ def _sensitivities(
 
 
 def _independent(misses: Float[np.ndarray, "runs n"], mask: np.ndarray) -> float:
-    """Return how many independent samples the residuals are worth."""
+    """Return the effective number of independent samples of the residuals."""
     pairs = mask[:, 1:] & mask[:, :-1]
     product = np.sum(np.where(pairs, misses[:, 1:] * misses[:, :-1], 0.0))
     correlation = np.clip(product / max(float(np.sum(misses**2)), 1e-300), 0.0, 0.99)

@@ -1,4 +1,4 @@
-"""What the rounds of one training share, and the rounds that every law goes through."""
+"""Rounds of one training, and what they share."""
 
 from collections.abc import Callable, Sequence
 
@@ -117,7 +117,7 @@ def is_white(residual: Float[np.ndarray, "runs n"], mask: np.ndarray) -> bool:
 
 
 class Session:
-    """What the rounds of one training share: the data, the history, the progress."""
+    """Rounds of one training: they share the data, the history and the progress."""
 
     def __init__(self, problem: TrainingProblem, recipe: DefaultRecipe, progress: Progress | None):
         self.problem, self.recipe, self.progress = problem, recipe, progress
@@ -208,7 +208,7 @@ class Session:
     ) -> TensorBasisNetwork:
         """Return a law trained on almost without prior, round by round while that pays.
 
-        Each round begins with a fresh damping and with a prior as weak as the misfit is by then.
+        Each round begins with a fresh damping and a prior as weak as the misfit is by then.
         """
         for _ in range(_MOST_POLISHES):
             before = misfit
@@ -281,8 +281,7 @@ def _polished(
 ) -> tuple[int, TensorBasisNetwork, TensorBasisNetwork]:
     """Return the tensor that does best in the end, and its law before and after polish.
 
-    The race says little of what a few more steps make of the next ones: before a second tensor
-    is asked for, the first has to be the right one.
+    The race hardly predicts the next steps: the first tensor has to be right before a second.
     """
     ends = []
     for reached, tensor, trial in trials[:_POLISHED]:
@@ -303,7 +302,7 @@ def nearly_constant_functions(
 ) -> list[TensorBasisNetwork]:
     """Return laws whose coefficients vary as little as the residual allows, the last the best.
 
-    Those before it are held to less variation still.
+    Earlier ones are held to less variation still.
     """
     everything = np.ones(N_COEFFICIENTS, bool)
     law = with_tensors(start, everything)
