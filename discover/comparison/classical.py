@@ -12,8 +12,7 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
 from discover.forward import DeclaredModel, make_batch
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
-from discover.laws import LAWS
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import LAWS, UpperConvectedMaxwell
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found
 from discover.loop.task import with_law

@@ -13,21 +13,18 @@ from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.dataset.run import Run, sizes_of
 from discover.equations import law_terms
 from discover.errors import InputError
-from discover.laws import make_law
-from discover.laws.multimode import Fluid
+from discover.laws import Fluid, make_law
 from discover.learners.runs import waiting
-from discover.protocols.control import drawn_against
-from discover.protocols.kinematics import STATES
-from discover.protocols.protocol import (
-    TEST_DURATION,
-    TRAINING_DURATION,
+from discover.protocols import (
     FlowProtocol,
     oscillatory_shear,
     paper_test_protocols,
     recorded_at,
     shear_rates,
-    strains_in_table,
 )
+from discover.protocols.control import drawn_against
+from discover.protocols.kinematics import STATES
+from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
@@ -121,7 +118,7 @@ class Flow:
         return self.drawn[1]
 
     def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return factors that give the noise of a record one size; one but for curves and sweeps."""
+        """Return factors that give the noise of a record one size; ones but for curves, sweeps."""
         size = sizes_of(record, self.protocol)
         return np.min(size) / size
 

@@ -9,8 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from discover.effects import AbstractEffect, ConstitutiveEffect, named_effects
-from discover.effects.library_term import library_term
+from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.learners.results import RecoveredTerm
@@ -20,8 +19,7 @@ from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model
 from discover.study.schema import Study
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 _EFFECTS = {
     "sigma.sigma": ("giesekus_mobility", 1.0),

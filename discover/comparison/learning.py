@@ -10,8 +10,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import physics_of
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent

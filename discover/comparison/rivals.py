@@ -26,9 +26,8 @@ from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
 from discover.study.declared_model import DeclaredModel
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms, spell
-from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
+from tensor_library.law_terms import spell
 
 EXACT = 1e-5
 """Relative difference of σ12 below which two laws count as one: integration error, generously."""

@@ -31,8 +31,7 @@ from discover.comparison.time_left import ComparisonTime
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
-from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, make_law
+from discover.laws import LAWS, Fluid, make_law
 from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found
@@ -46,8 +45,7 @@ from discover.study.declared_model import DeclaredModel, declared_model, forward
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import unknown_name
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 Asked = tuple[str, float, Study]
 """A law, the value of its parameter, and the study of that point."""

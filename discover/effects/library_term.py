@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import build_library
-from tensor_library.terms import CandidateTerm
+from tensor_library import CandidateTerm, LawTerm, build_library
 
 # Terms that are an effect with a name already, or the base law's own
 _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")

@@ -4,8 +4,7 @@ import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
 from discover.laws.textbook.classical import fene_p_terms
-from tensor_library.algebra import anticommutator, identity_like, inner, square, trace
-from tensor_library.law_terms import LawTerm
+from tensor_library import LawTerm, anticommutator, identity_like, inner, square, trace
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):

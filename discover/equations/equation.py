@@ -12,9 +12,8 @@ from numpy.typing import ArrayLike
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.equations.spelling.markup import SEPARATOR, law_element, law_latex
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.expansion import law_of_terms
-from discover.laws.multimode import Fluid
 from discover.summary_view import NotebookView
 from discover.words import percent_of
 from tensor_library.law_terms import Interval, LawTerm, LawTerms

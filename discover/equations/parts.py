@@ -12,19 +12,13 @@ from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, StateEffect, WrittenState, known_effects
 from discover.errors import InputError
-from discover.laws.base import (
-    AbstractConstitutiveLaw,
-    AbstractExtendedLaw,
-    State,
-    as_state,
-    stress_in,
-)
+from discover.laws import LAWS, AbstractConstitutiveLaw, make_law
+from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
 from discover.laws.each_mode import LawOfEachMode, law_of_mode
-from discover.laws.registry import LAWS, make_law, name_of
+from discover.laws.registry import name_of
+from tensor_library import CLOSED_FORMS, LawTerm
 from tensor_library.algebra import Symmetric
-from tensor_library.closed_forms import CLOSED_FORMS
 from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.law_terms import LawTerm
 
 
 @dataclass(frozen=True)

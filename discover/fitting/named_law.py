@@ -15,9 +15,8 @@ from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.fit_uncertainty import uncertainty, what_is_left
 from discover.inference.least_squares import Fit, best_of, fit_batch
-from discover.laws import LAWS
-from discover.laws.multimode import Fluid
-from discover.laws.registry import make_law, starting_values
+from discover.laws import LAWS, Fluid, make_law
+from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
 from discover.loop.run_record import record_runs

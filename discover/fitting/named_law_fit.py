@@ -16,8 +16,7 @@ from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
-from discover.laws import LAWS
-from discover.laws.multimode import Fluid
+from discover.laws import LAWS, Fluid
 from discover.loop.answering import range_of
 from discover.loop.by_quantity import beyond_noise, measured
 from discover.loop.run_record import RunRecord

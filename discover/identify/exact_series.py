@@ -18,8 +18,7 @@ from typing import Any, no_type_check
 
 import numpy as np
 
-from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
-from tensor_library.terms import CandidateTerm, parse_term
+from tensor_library import INVARIANT_NAMES, TENSOR_NAMES, CandidateTerm, parse_term
 
 PRIME = 2**61 - 1
 """Modulus of exact arithmetic in residues: a Mersenne prime of one machine word."""

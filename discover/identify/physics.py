@@ -22,10 +22,9 @@ from discover.identify.physics_flows import (
     time_scale,
     trajectories,
 )
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
-from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly

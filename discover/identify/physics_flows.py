@@ -11,14 +11,12 @@ from jaxtyping import Array, Float
 from discover.equations.equation import mean_relaxation_time
 from discover.forward.fluids import at_samples, in_enough_steps, solve_batch
 from discover.forward.grids.flow_batch import FlowBatch, lay_out
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
-from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
 from discover.words import plainly
-from tensor_library.algebra import to_shear
-from tensor_library.kinematics import uniaxial_extension
+from tensor_library import to_shear, uniaxial_extension
 
 _CYCLES = 3
 _SAMPLES_A_CYCLE = 48

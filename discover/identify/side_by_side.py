@@ -12,10 +12,7 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import (
     FlowProtocol,
@@ -26,9 +23,7 @@ from discover.protocols.protocol import (
 )
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerms
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerms, TermLibrary, parse_term
 
 LAWS_AT_ONCE = 8
 """Laws simulated side by side; fewer are padded, so that any number shares one program."""

@@ -29,18 +29,13 @@ from discover.identify.relations import (
 )
 from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.runs import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 
 
 @compiled

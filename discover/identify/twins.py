@@ -29,16 +29,13 @@ from discover.identify.side_by_side import (
     separations,
     stresses_in_histories,
 )
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms, spell
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
+from tensor_library.law_terms import spell
 
 Proof = Literal["relation", "series", "histories"]
 _Candidate = tuple[LawTerms, Proof, dict[str, str]]

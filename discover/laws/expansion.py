@@ -16,10 +16,8 @@ from discover.laws.base import (
 )
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.programs import on_device
+from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
 from tensor_library.algebra import Symmetric
-from tensor_library.law_terms import LawTerm, LawTerms
-from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import parse_term
 
 
 class LibraryExpansion(AbstractExtendedLaw):

@@ -15,8 +15,7 @@ from scipy.optimize import least_squares
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
 from discover.linear_algebra_threads import in_one_thread
 from discover.programs import compiled

@@ -11,10 +11,8 @@ from jaxtyping import Float
 
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.laws.registry import check_law
-from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.settings import per_mode
 from discover.protocols.kinematics import FOLLOWED
 

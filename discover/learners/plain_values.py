@@ -18,8 +18,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, name_of
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import TermLibrary, parse_term
 
 KIND = "kind"
 

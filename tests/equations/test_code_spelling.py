@@ -11,9 +11,8 @@ from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, 
 
 from discover.equations import Equation, equation_from_json, write_equation
 from discover.errors import InputError
-from tensor_library import LawTerm
+from tensor_library import LawTerm, parse_term
 from tensor_library.notation import RATE, STRESS, UNIT, Trace
-from tensor_library.terms import parse_term
 
 every_law = pytest.mark.parametrize("name", BOTH_SIGNS)
 

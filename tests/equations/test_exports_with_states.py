@@ -26,9 +26,7 @@ from discover.equations import Tested as Where
 from discover.equations.formats.in_a_solver import in_a_solver
 from discover.errors import InputError
 from discover.laws import LibraryExpansion, TensorBasisNetwork, make_law
-from tensor_library import LawTerm
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, TermLibrary, parse_term
 
 ALPHA, MODULUS, TIME = 0.2, 100.0, 1.5
 CRITICAL = {"inverse_critical_rate": 0.5, "build_up_time": 2.0}

@@ -26,8 +26,7 @@ from discover.laws import (
 )
 from discover.protocols import in_flow, stack_protocols, start_up
 from discover.simulate import simulate
-from tensor_library import build_library, parse_term
-from tensor_library.law_terms import LawTerms
+from tensor_library import LawTerms, build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 PTT = "(exp(epsilon*tr(sigma))-1)*sigma"

@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.equations.parts import NamedPart
-from tensor_library.law_terms import LawTerm
+from tensor_library import LawTerm, parse_term
 from tensor_library.notation import LatexNotation, Notation, greek_letter, latex_number, printed
-from tensor_library.terms import parse_term
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
 % The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.

@@ -5,9 +5,8 @@ from collections.abc import Sequence
 import sympy
 
 from discover.equations.parts import NamedPart
-from tensor_library.law_terms import LawTerm
+from tensor_library import LawTerm, parse_term
 from tensor_library.notation import SympyNotation
-from tensor_library.terms import parse_term
 
 
 def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> sympy.Expr:

@@ -15,8 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem

@@ -17,9 +17,7 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward.fluids import in_enough_steps, observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.known_part import KnownPart
@@ -47,8 +45,7 @@ from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
-from tensor_library.algebra import TENSOR_NAMES
-from tensor_library.library import TermLibrary
+from tensor_library import TENSOR_NAMES, TermLibrary
 
 RECIPES = ("default", "thorough", "paper")
 

@@ -22,8 +22,7 @@ from discover.learners.tbnn_ude.variational import (
     trajectories,
 )
 from discover.programs import compiled, on_device
-from tensor_library.algebra import inner, integrity_basis
-from tensor_library.kinematics import rate_of_deformation
+from tensor_library import inner, integrity_basis, rate_of_deformation
 
 STATES_PER_RUN = 8
 """Enough to see where a coefficient varies; every state is 16 rows of each least-squares step."""

@@ -14,10 +14,7 @@ from discover.dataset.run import Run
 from discover.forward import Records
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
 from discover.learners.runs import laid_out
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms

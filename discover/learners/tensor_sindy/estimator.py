@@ -12,9 +12,7 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
 from discover.learners.known_part import KnownPart
