@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
+from discover import protocols
 from discover.dataset.material_functions import as_compared
 from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.dataset.run import Run, sizes_of
@@ -15,13 +16,6 @@ from discover.equations import law_terms
 from discover.errors import InputError
 from discover.laws import Fluid, make_law
 from discover.learners.runs import waiting
-from discover.protocols import (
-    FlowProtocol,
-    oscillatory_shear,
-    paper_test_protocols,
-    recorded_at,
-    shear_rates,
-)
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
 from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
@@ -62,7 +56,7 @@ class Flow:
 
     name: str  # name of the run or of the protocol
     kind: FlowKind  # what it is for. Only ``training`` was seen by the learners
-    protocol: FlowProtocol  # the shear rate
+    protocol: protocols.FlowProtocol  # the shear rate
     times: Float[np.ndarray, " n"]
     rate: Float[np.ndarray, " n"]
     reference: Stresses
@@ -70,11 +64,11 @@ class Flow:
     is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
-    commanded: FlowProtocol | None = None
+    commanded: protocols.FlowProtocol | None = None
     weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
 
     @property
-    def _imposed(self) -> FlowProtocol:
+    def _imposed(self) -> protocols.FlowProtocol:
         return self.protocol if self.commanded is None else self.commanded
 
     @property
@@ -193,17 +187,17 @@ def comparison_flows(
     truth = data.truth
     if truth is None:
         return flows
-    for name, protocol in paper_test_protocols().items():
+    for name, protocol in protocols.paper_test_protocols().items():
         times = np.linspace(0.0, TEST_DURATION, 401)
         flows.append(_truth_flow(name, "test", protocol, times, truth))
     for deborah in high_deborah:
-        protocol = oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
+        protocol = protocols.oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
         times = _late_cycle(deborah)
         flows.append(
             _truth_flow(f"high_deborah_{deborah:g}", "high_deborah", protocol, times, truth)
         )
     for weissenberg, deborah in pipkin:
-        protocol = oscillatory_shear(weissenberg, deborah)
+        protocol = protocols.oscillatory_shear(weissenberg, deborah)
         times = _late_cycle(deborah, samples=61)
         name = f"pipkin_{weissenberg:g}_{deborah:g}"
         flows.append(_truth_flow(name, "pipkin", protocol, times, truth))
@@ -247,7 +241,7 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
-    rates = shear_rates(protocol, times)
+    rates = protocols.shear_rates(protocol, times)
     return Flow(
         name,
         kind,
@@ -261,11 +255,13 @@ def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
     )
 
 
-def _exactly(truth: Fluid, protocol: FlowProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
+def _exactly(
+    truth: Fluid, protocol: protocols.FlowProtocol, times: np.ndarray
+) -> dict[str, np.ndarray]:
     return stresses(simulate(truth, protocol, times), protocol)
 
 
-def _oscillates(protocol: FlowProtocol, rates: np.ndarray) -> bool:
+def _oscillates(protocol: protocols.FlowProtocol, rates: np.ndarray) -> bool:
     if protocol.control != "rate":  # the slope of a noisy strain changes its sign at any time
         return False
     changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
@@ -285,10 +281,10 @@ def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
         return None
 
 
-def stresses(stress: ShearStress, protocol: FlowProtocol) -> dict[str, np.ndarray]:
+def stresses(stress: ShearStress, protocol: protocols.FlowProtocol) -> dict[str, np.ndarray]:
     """Return the compared quantities of a solution; in extension the tensile stress comes first."""
     return {
-        "sigma12": recorded_at(protocol, stress.components),
+        "sigma12": protocols.recorded_at(protocol, stress.components),
         "N1": stress.first_normal_stress_difference,
         "N2": stress.second_normal_stress_difference,
     }

@@ -6,20 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from discover import identify
 from discover.comparison.bands import flow_run
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
 from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.grids.flow_batch import lay_out
-from discover.identify import (
-    LawStructure,
-    Structure,
-    Twin,
-    analyse_structure,
-    check_physics,
-    find_twins,
-)
 from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
@@ -94,7 +87,7 @@ def exact_twins(
     library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    twins = find_twins(library, chosen, model.law)
+    twins = identify.find_twins(library, chosen, model.law)
     twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
     if not twins:
         return []
@@ -146,13 +139,13 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
     return rivals
 
 
-def _concerns_shear(twin: Twin, size: int) -> bool:
+def _concerns_shear(twin: identify.Twin, size: int) -> bool:
     """Return whether a twin is no larger than the law, or predicts other normal stresses."""
     no_larger = len(twin.law.coefficients) <= size
     return no_larger or max(twin.difference.N1, twin.difference.N2) > EXACT
 
 
-def _rival_of(twin: Twin, beyond: Sequence[str]) -> Rival:
+def _rival_of(twin: identify.Twin, beyond: Sequence[str]) -> Rival:
     place = None
     if twin.separated_by:
         best = max(twin.separated_by, key=lambda s: s.difference)
@@ -195,7 +188,7 @@ def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | N
     return replace(rival, errors_to_chosen=worst, separated_by=place)
 
 
-def law_structure(structure: Structure | None) -> LawStructure | None:
+def law_structure(structure: identify.Structure | None) -> identify.LawStructure | None:
     """Return the structure at the law found, or at the known part where that law diverges."""
     if structure is None or not structure.laws:
         return None
@@ -208,10 +201,10 @@ def structure_of(
     library: TermLibrary,
     model: DeclaredModel,
     use_normal_stresses: bool,
-) -> Structure:
+) -> identify.Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""
     found = LawTerms.of(terms)
-    return analyse_structure(
+    return identify.analyse_structure(
         runs,
         library,
         base=model.law,
@@ -235,7 +228,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     deborah = time * max(_frequency(flow) for flow in training)
     protocols = [flow.protocol for flow in along]
     times = [_thinned(flow.times) for flow in along]
-    return check_physics(
+    return identify.check_physics(
         fluid,
         lay_out(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
         [flow.title for flow in along],

@@ -11,17 +11,7 @@ import pandas as pd
 
 from discover.forward.fluids import in_enough_steps
 from discover.forward.grids.flow_batch import FlowBatch
-from discover.identify.physics_flows import (
-    Cycles,
-    Trajectories,
-    cycles,
-    is_stable,
-    is_steady,
-    steady_shear,
-    steady_uniaxial_extension,
-    time_scale,
-    trajectories,
-)
+from discover.identify import physics_flows
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
@@ -101,8 +91,8 @@ def check_physics(
     extrapolates.
     """
     fluid = replace(fluid, law=in_shared_form(fluid.law))
-    along = trajectories(fluid, in_enough_steps(fluid, flows))
-    beyond = cycles(
+    along = physics_flows.trajectories(fluid, in_enough_steps(fluid, flows))
+    beyond = physics_flows.cycles(
         fluid,
         [weissenberg * factor for factor in _BOX_FACTORS],
         [deborah * factor for factor in _DEBORAH_FACTORS],
@@ -120,7 +110,7 @@ def check_physics(
     )
 
 
-def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+def _conformation(along: physics_flows.Trajectories, names: Sequence[str]) -> PhysicsCheck:
     name = "conformation tensor positive definite"
     run, value = along.lowest(along.smallest_conformation)
     if run is None:
@@ -138,7 +128,7 @@ def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
     )
 
 
-def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
+def _free_energy(along: physics_flows.Trajectories, names: Sequence[str]) -> PhysicsCheck:
     name = "dissipation non-negative"
     run, value = along.lowest(along.dissipation)
     if run is None:
@@ -158,7 +148,7 @@ def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
     )
 
 
-def _work(beyond: Cycles) -> PhysicsCheck:
+def _work(beyond: physics_flows.Cycles) -> PhysicsCheck:
     name = "work over a cycle non-negative"
     # at the Weissenberg number of training, which is the first
     usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
@@ -178,16 +168,16 @@ def _work(beyond: Cycles) -> PhysicsCheck:
 
 def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
     name = "flow curve monotonic"
-    slowest = time_scale(fluid)
+    slowest = physics_flows.time_scale(fluid)
     rates = SHEAR_RATES / slowest
     stress = np.asarray(fluid.solvent_viscosity) * rates
     steady = np.ones(rates.size, dtype=bool)
     modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
     for number, (modulus, time) in enumerate(modes):
         law = law_of_mode(fluid.law, number)
-        found, _, residual = steady_shear(law, jnp.asarray(time * rates))
+        found, _, residual = physics_flows.steady_shear(law, jnp.asarray(time * rates))
         stress = stress + modulus * np.asarray(found)[:, 3]
-        steady &= is_steady(np.asarray(residual))
+        steady &= physics_flows.is_steady(np.asarray(residual))
     last = rates.size if steady.all() else int(np.argmin(steady))
     falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
     if falling.size:
@@ -256,8 +246,10 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     for number in numbers:
         law = law_of_mode(fluid.law, number)
         scaled = jnp.asarray(same * (times[number] / times[slowest]))
-        _, jacobian, residual = steady_uniaxial_extension(law, scaled)
-        found = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+        _, jacobian, residual = physics_flows.steady_uniaxial_extension(law, scaled)
+        found = physics_flows.is_steady(np.asarray(residual)) & physics_flows.is_stable(
+            np.asarray(jacobian)
+        )
         good &= found[: rates.size]
     return rates.size if good.all() else int(np.argmin(good))
 
@@ -301,7 +293,7 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     return PhysicsCheck(name, worst <= _LINEAR_TOLERANCE, worst, "at rest", text + ".")
 
 
-def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
+def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
     name = "integrates beyond training"
     finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)

@@ -17,18 +17,9 @@ from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
 from discover.forward.integrators.stepping import follow
+from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
-from discover.identify.side_by_side import (
-    SAME,
-    Difference,
-    Separation,
-    differences,
-    histories_for,
-    joint_library,
-    separations,
-    stresses_in_histories,
-)
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.statistics import HALF_BAND
@@ -58,8 +49,10 @@ class Twin(NotebookView):
     law: LawTerms  # the twin, beyond the known part
     proof: Proof
     keeps_N1: bool  # whether N1 is the same too
-    difference: Difference  # largest difference of σ12, N1 and N2 in random histories
-    separated_by: tuple[Separation, ...] = ()  # experiments that would tell the two apart
+    difference: side_by_side.Difference  # largest difference of σ12, N1 and N2 in random histories
+    separated_by: tuple[
+        side_by_side.Separation, ...
+    ] = ()  # experiments that would tell the two apart
     order: int | None = None
     change: Mapping[str, str] = field(default_factory=dict)
 
@@ -78,7 +71,7 @@ class Twin(NotebookView):
         apart = []
         if not self.keeps_N1:
             apart.append(f"N1 by {percent_of(self.difference.N1)}")
-        if self.difference.N2 > SAME:
+        if self.difference.N2 > side_by_side.SAME:
             apart.append(f"N2 by {percent_of(self.difference.N2)} of N1")
         text += f"; {' and '.join(apart)} apart" if apart else "; N2 is the same too"
         if self.separated_by:
@@ -113,7 +106,7 @@ def find_twins(
     """
     base = UpperConvectedMaxwell() if base is None else base
     law = law if isinstance(law, LawTerms) else LawTerms.of(law)
-    library = joint_library(library, [law])
+    library = side_by_side.joint_library(library, [law])
     found: list[_Candidate] = []
     if isinstance(base, UpperConvectedMaxwell):
         found += _by_series(library, law, base.linear_relaxation)
@@ -127,19 +120,19 @@ def find_twins(
     if not unique:
         return []
     laws = [law, *(one[0] for one in unique)]
-    stresses = stresses_in_histories(library, laws, base)
-    apart = differences(stresses)
-    same = [i for i, d in enumerate(apart) if d.sigma12 <= SAME]
+    stresses = side_by_side.stresses_in_histories(library, laws, base)
+    apart = side_by_side.differences(stresses)
+    same = [i for i, d in enumerate(apart) if d.sigma12 <= side_by_side.SAME]
     if not same:
         return []
     kept = [(unique[i], apart[i]) for i in same]
     places = [0, *(1 + i for i in same)]
-    told = separations(library, [laws[i] for i in places], stresses[places], base)
+    told = side_by_side.separations(library, [laws[i] for i in places], stresses[places], base)
     return [
         Twin(
             law=twin,
             proof=proof,
-            keeps_N1=d.N1 <= 10.0 * SAME,
+            keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
             difference=d,
             separated_by=by,
             order=DEFAULT_ORDER if proof == "series" else None,
@@ -273,7 +266,7 @@ class HiddenStresses:
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random histories that it survives."""
-    flows = histories_for(law)
+    flows = side_by_side.histories_for(law)
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)

@@ -8,13 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
+from discover.statistics.noise import whiteness
 from discover.statistics.noise.noise_model import independent_samples
-from discover.statistics.noise.whiteness import (
-    FEWEST_FAST,
-    FEWEST_TESTED,
-    SIGNIFICANCE,
-    noise_probability,
-)
 
 
 @dataclass(frozen=True)
@@ -52,7 +47,7 @@ def fast_part(values: Float[np.ndarray, " n"]) -> float:
     From the median of third differences, which smooth sequences and a few jumps hardly change
     [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73, 625]. Zero for fewer than `FEWEST_FAST`.
     """
-    if len(values) < FEWEST_FAST:
+    if len(values) < whiteness.FEWEST_FAST:
         return 0.0
     return _median_difference([values], 3)
 
@@ -96,11 +91,11 @@ def noise_floor(
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
     measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    probability = noise_probability(residual, weight, measured, further)
+    probability = whiteness.noise_probability(residual, weight, measured, further)
     samples = np.count_nonzero(weight > 0, axis=1)
-    tested = samples >= FEWEST_TESTED
-    known = probability is not None and probability > SIGNIFICANCE
-    if not known and not np.any(tested) and np.all(samples >= FEWEST_FAST):
+    tested = samples >= whiteness.FEWEST_TESTED
+    known = probability is not None and probability > whiteness.SIGNIFICANCE
+    if not known and not np.any(tested) and np.all(samples >= whiteness.FEWEST_FAST):
         return _pooled_fast_part(residual, weight)
     if not known and probability is not None:
         return float(np.mean(fast))
@@ -123,9 +118,9 @@ def _limited_size(values: Float[np.ndarray, " n"]) -> float:
 
     A loud stretch counts in full; up to three samples are no stretch, two at an end.
     """
-    if len(values) < FEWEST_FAST:
+    if len(values) < whiteness.FEWEST_FAST:
         return float(np.linalg.norm(values))
-    beside = 1.4826 * median_filter(np.abs(values), FEWEST_FAST, mode="mirror")
+    beside = 1.4826 * median_filter(np.abs(values), whiteness.FEWEST_FAST, mode="mirror")
     return float(np.linalg.norm(np.clip(values, -_LARGEST * beside, _LARGEST * beside)))
 
 
@@ -134,13 +129,13 @@ def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
 
     A run counts as much as any other, so that one bad sample could decide alone.
     """
-    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST
+    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST
     return told if np.any(told) else np.ones_like(told)
 
 
 def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
     """Return whether any run is long enough to say how noisy it is."""
-    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST))
+    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST))
 
 
 def is_noise(
@@ -150,8 +145,8 @@ def is_noise(
     further: Sequence[float] = (),
 ) -> bool:
     """Return whether residuals may be noise, white or of first order; runs too short may be."""
-    probability = noise_probability(residual, weight, measured, further)
-    return probability is None or probability > SIGNIFICANCE
+    probability = whiteness.noise_probability(residual, weight, measured, further)
+    return probability is None or probability > whiteness.SIGNIFICANCE
 
 
 _BLOCK, _FEWEST_BLOCKS = 8, 3

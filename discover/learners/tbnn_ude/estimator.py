@@ -24,14 +24,7 @@ from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
 from discover.learners.settings import PerMode, default_library
-from discover.learners.tbnn_ude.ensemble import (
-    MemberPredictions,
-    choose_member,
-    coefficient_spread,
-    member_misfits,
-    member_predictions,
-    train_others,
-)
+from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
 from discover.learners.tbnn_ude.problem import (
@@ -181,11 +174,11 @@ class TBNNUDE(RunPrediction):
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
-        misfits = member_misfits(members, problem)
+        misfits = ensemble.member_misfits(members, problem)
         resolved, surprise = _resolved(recipe), None
         if isinstance(recipe, DefaultRecipe) and np.min(misfits) > resolved and trained[0].varies:
             surprise = surprises(members, problem)
-        chosen, fits = choose_member(trained, misfits, resolved, surprise)
+        chosen, fits = ensemble.choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
         self.members_ = members
@@ -221,7 +214,7 @@ class TBNNUDE(RunPrediction):
                 "n_constants": _count_of_numbers(best.law, best.varies),
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
-                "coefficient_spread_of_members": coefficient_spread(members, cloud),
+                "coefficient_spread_of_members": ensemble.coefficient_spread(members, cloud),
                 "members": [
                     {
                         "misfit": float(misfit),
@@ -237,7 +230,7 @@ class TBNNUDE(RunPrediction):
 
     def predict_members(
         self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-    ) -> MemberPredictions:
+    ) -> ensemble.MemberPredictions:
         """Return σ12, N1 and N2 of every member in a flow, with their bands.
 
         Parameters
@@ -246,7 +239,7 @@ class TBNNUDE(RunPrediction):
             Any flow, also one that no training saw; times in s, shape (n,), from 0 on.
         """
         check_is_fitted(self, "ensemble_fluids_")
-        return member_predictions(self.ensemble_fluids_, protocol, times)
+        return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
 
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         flows = lay_out(
@@ -288,7 +281,7 @@ class TBNNUDE(RunPrediction):
                     pool.map(lambda key: self._train(problem, key, recipe, known, say), keys[1:])
                 )
             return [first, *others], "trained from initial weights of their own"
-        others, agreement = train_others(problem, first, keys[1:], recipe, say)
+        others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
     def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:

@@ -16,15 +16,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude import variational
 from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import (
-    Along,
-    Rebuild,
-    rebuilt,
-    side_by_side,
-    trajectories,
-)
 
 
 def surprises(
@@ -35,7 +29,7 @@ def surprises(
     Infinite for a law that diverges in the training flows, or in them at twice the rate, if another
     does not. The noise is what the best law leaves; correlated samples count as fewer (AR(1)).
     """
-    along = [trajectories(law, problem) for law in laws]
+    along = [variational.trajectories(law, problem) for law in laws]
     misses = [np.asarray(relative_misses(one, problem)) for one in along]
     squares = np.array([np.sum(one**2) for one in misses])
     squares = np.where(np.isfinite(squares), squares, np.inf)
@@ -56,7 +50,7 @@ def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
     """Return whether a law's stress stays finite in the training flows at twice the rate."""
     twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
     faster = eqx.tree_at(lambda tree: tree.flows, problem, twice)
-    return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster).states))))
+    return bool(np.all(np.isfinite(np.asarray(variational.trajectories(law, faster).states))))
 
 
 def posterior_draws(
@@ -67,7 +61,7 @@ def posterior_draws(
     Drawn from Laplace's Gaussian, and halved until the relative misfit is at most `fits` times that
     of the law. `keys`: one for each draw.
     """
-    along = trajectories(law, problem)
+    along = variational.trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))
     least = float(np.sqrt(np.sum(misses**2)))
     precision = _independent(misses, problem.records.seen) / max(least**2, 1e-300)
@@ -80,7 +74,7 @@ def posterior_draws(
         step = np.zeros_like(start)
         step[acts] = spread @ np.asarray(jax.random.normal(key, (spread.shape[1],)))
         for _ in range(_HALVINGS):
-            drawn = rebuilt(rebuild, jnp.asarray(start + step))
+            drawn = variational.rebuilt(rebuild, jnp.asarray(start + step))
             left = np.asarray(law_misfit(drawn, problem))
             if np.max(np.abs(left)) < np.inf and np.linalg.norm(left) <= fits * least:
                 found.append(drawn)
@@ -93,7 +87,7 @@ _HALVINGS = 8
 
 
 def _told(
-    law: TensorBasisNetwork, along: Along, problem: TrainingProblem, precision: float
+    law: TensorBasisNetwork, along: variational.Along, problem: TrainingProblem, precision: float
 ) -> float:
     """Return |w|² + ln det(1 + JᵀJ), over the weights that act."""
     rebuild, acts, columns = _sensitivities(law, along, problem)
@@ -103,16 +97,16 @@ def _told(
 
 
 def _sensitivities(
-    law: TensorBasisNetwork, along: Along, problem: TrainingProblem
-) -> tuple[Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
+    law: TensorBasisNetwork, along: variational.Along, problem: TrainingProblem
+) -> tuple[variational.Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
     """Return the weights of a law, which of them act, and their derivatives of the residuals."""
     cloud = cloud_of(along, problem)
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
     varies = np.any(np.asarray(law.network_mask) > 0)
-    make = Rebuild.with_network if varies else Rebuild.of_constants
+    make = variational.Rebuild.with_network if varies else variational.Rebuild.of_constants
     rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
-    _, jacobian = side_by_side(rebuild.start, rebuild, problem)
+    _, jacobian = variational.side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
     _, columns = problem.records.linearised(along.recorded, jacobian)
     return rebuild, acts, np.asarray(columns)[..., acts].reshape(-1, int(np.sum(acts)))

@@ -18,17 +18,8 @@ from discover.learners.files import Provenance
 from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import PerMode, check_library, default_library
+from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
-from discover.learners.tensor_sindy.report import (
-    by_evidence,
-    compare_rules,
-    covariance_of_terms,
-    inclusion,
-    noise_of,
-    path_table,
-    recovered_terms,
-    rival_table,
-)
 from discover.learners.tensor_sindy.search import (
     SupportSearch,
     choose_by_held_out,
@@ -189,13 +180,13 @@ class TensorSINDy(RunPrediction):
         elif self.selection == "one_standard_error" and held_out is not None:
             number = choose_by_one_standard_error(held_out)
         else:
-            number = by_evidence(search, path)
+            number = report.by_evidence(search, path)
         chosen = path[number]
 
         self.search_ = search
         self.library_ = library
-        self.terms_ = recovered_terms(search, chosen)
-        self.covariance_ = covariance_of_terms(search, chosen)
+        self.terms_ = report.recovered_terms(search, chosen)
+        self.covariance_ = report.covariance_of_terms(search, chosen)
         self.coefficients_ = np.zeros(len(library))
         self.inner_ = np.array(library.inner_default, dtype=float)
         for term in self.terms_:
@@ -216,19 +207,19 @@ class TensorSINDy(RunPrediction):
             train_seconds=time.perf_counter() - started,
             loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
-                "path": path_table(search, path, held_out),
+                "path": report.path_table(search, path, held_out),
                 "chosen": number,
                 "selection": self.selection,
-                "selectors": compare_rules(search, path, held_out, chosen),
-                "inclusion": inclusion(search),
-                "rivals": rival_table(search, chosen),
+                "selectors": report.compare_rules(search, path, held_out, chosen),
+                "inclusion": report.inclusion(search),
+                "rivals": report.rival_table(search, chosen),
                 "covariance": None if covariance is None else covariance.tolist(),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,
                 "misfit": misfit,
-                "noise": noise_of(chosen, rows),
+                "noise": report.noise_of(chosen, rows),
                 "n_observations": rows,
             },
             message=(
