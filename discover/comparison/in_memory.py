@@ -11,8 +11,8 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.learners.files import fingerprint_of
-from discover.learners.known_part import known_part
 from discover.learners.run_prediction import RunPrediction
+from discover.learners.settings import known_part
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study

@@ -161,8 +161,7 @@ def distilled(
     kept = None if store is None else store.load("distillation")
     if kept is not None:
         return kept["rows"]
-    from discover.learners.distillation import distil
-    from discover.learners.students import STUDENTS
+    from discover.learners.distillation import STUDENTS, distil
 
     teacher = study.data.synthetic.law
     students = [name for name in STUDENTS if name != teacher]

@@ -10,7 +10,12 @@ from jaxtyping import Real
 from numpy.typing import ArrayLike
 
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
-from discover.equations.spelling.markup import SEPARATOR, law_element, law_latex
+from discover.equations.spelling.markup import (
+    SEPARATOR,
+    extra_term_expression,
+    law_element,
+    law_latex,
+)
 from discover.errors import InputError
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.expansion import law_of_terms
@@ -188,8 +193,6 @@ class Equation(NotebookView):
 
     def sympy(self) -> "sympy.Expr":
         """Return h of a mode as a SymPy expression over non-commuting tensors."""
-        from discover.equations.spelling.symbolic import extra_term_expression
-
         return extra_term_expression(self.terms, self.named)
 
     def latex(self) -> str:

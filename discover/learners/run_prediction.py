@@ -16,10 +16,15 @@ from discover.dataset.run import Run
 from discover.forward.fluids import in_enough_steps, observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
-from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
-from discover.learners.settings import ARITHMETIC, check_settings
+from discover.learners.settings import (
+    ARITHMETIC,
+    KnownPart,
+    check_settings,
+    known_part,
+    require_known_rate,
+)
 from discover.linear_algebra_threads import in_one_thread
 from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
@@ -53,7 +58,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     learner: ClassVar[str]
     """Name of the learner, in files and tables."""
 
-    _saved: ClassVar[tuple[str, ...]]
+    _saved: ClassVar[tuple[str, ...]] = (
+        "n_features_in_", "law_", "fluid_", "terms_", "result_", "provenance_",
+    )  # fmt: skip
     """Attributes of the fit that a file holds."""
 
     _index = ("term",)

@@ -174,7 +174,8 @@ def test_moduli_of_two_structures_are_those_that_scipy_ends_at():
     strain = np.array([amplitude / frequency])
     run = Run(
         "sweep", np.ones(1), protocols.oscillations(strain, np.array([frequency])),
-        strain * frequency, np.ones(1), strain=strain, storage_modulus=np.ones(1), loss_modulus=np.ones(1),
+        strain * frequency, np.ones(1), strain=strain, storage_modulus=np.ones(1),
+        loss_modulus=np.ones(1),
     )  # fmt: skip
     storage, loss = predicted(run.records, name, model=ALONE)[:, 0]
 

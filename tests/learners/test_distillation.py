@@ -5,8 +5,7 @@ import pytest
 
 from discover import laws
 from discover.errors import InputError
-from discover.learners.distillation import compare_fluids, distil
-from discover.learners.students import STUDENTS
+from discover.learners.distillation import STUDENTS, compare_fluids, distil
 from discover.protocols import in_flow, oscillatory_shear, start_up
 
 FEW = {"fast": oscillatory_shear(2.0, 1.0), "slow": oscillatory_shear(1.0, 0.5)}

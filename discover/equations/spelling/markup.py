@@ -1,11 +1,21 @@
-"""Laws as LaTeX and MathML."""
+"""Laws as LaTeX, MathML and SymPy expressions."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from discover.equations.parts import NamedPart
 from tensor_library import LawTerm, parse_term
-from tensor_library.notation import LatexNotation, Notation, greek_letter, latex_number, printed
+from tensor_library.notation import (
+    LatexNotation,
+    Notation,
+    SympyNotation,
+    greek_letter,
+    latex_number,
+    printed,
+)
+
+if TYPE_CHECKING:
+    import sympy
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
 % The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
@@ -252,3 +262,26 @@ def _whole_stress(notation: InUnitsNotation, modes: int, solvent: bool) -> str:
     added = f"<mo>+</mo><msub><mi>η</mi><mi>s</mi></msub>{_TENSORS['gammadot']}" if solvent else ""
     stress = f"{_TENSORS['sigma']}<mo>=</mo>{total}{notation.modulus}{notation.stress}{added}"
     return f"<mspace width='2em'/>{stress}"
+
+
+def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> "sympy.Expr":
+    """Return h over the non-commuting tensors of `tensor_library.notation`.
+
+    Constants that differ from mode to mode, and structure variables, stay letters.
+    """
+    import sympy
+
+    total: sympy.Expr = sympy.Integer(0)
+    notation = SympyNotation()
+    if named is not None:
+        letters = {name: sympy.Float(value) for name, value in named.constants[0].items()}
+        letters |= {name: sympy.Symbol(name) for name in named.differing}
+        function = named.function
+        letters |= {name: sympy.Symbol(name) for name in (*function.where, *function.rates)}
+        where, summands = function.spell(notation, letters)
+        total = sympy.Add(*summands)
+        for name, value in reversed(where):
+            total = total.subs(letters[name], value)
+    for term in terms:
+        total = total + parse_term(term.term).spell(notation, term.coefficient, term.inner)
+    return total

@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -15,20 +15,16 @@ from sklearn.utils.validation import check_is_fitted
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.forward.fluids import in_enough_steps, observed_in_batch
-from discover.forward.grids.flow_batch import lay_out
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
-from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import PerMode, default_library
+from discover.learners.settings import KnownPart, PerMode, default_library
 from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
 from discover.learners.tbnn_ude.problem import (
-    STRAIN_STEP,
     DefaultRecipe,
     Trained,
     TrainingProblem,
@@ -43,6 +39,7 @@ from tensor_library import TENSOR_NAMES, TermLibrary
 RECIPES = ("default", "thorough", "paper")
 
 
+@dataclass(eq=False, repr=False)
 class TBNNUDE(RunPrediction):
     """A tensor-basis neural network inside the differential equation, from shear stress alone.
 
@@ -110,47 +107,21 @@ class TBNNUDE(RunPrediction):
     """
 
     learner = "tbnn_ude"
-    _saved = (
-        "n_features_in_",
-        "law_",
-        "fluid_",
-        "terms_",
-        "result_",
-        "members_",
-        "ensemble_fluids_",
-        "ensemble_",
-        "fitting_",
-        "provenance_",
-    )
+    _saved = (*RunPrediction._saved, "members_", "ensemble_fluids_", "ensemble_", "fitting_")
     _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
-    def __init__(
-        self,
-        recipe: str | DefaultRecipe | PaperRecipe = "default",
-        modulus: PerMode = 1.0,
-        relaxation_time: PerMode = 1.0,
-        known_relaxation: bool = True,
-        base_law: AbstractConstitutiveLaw | None = None,
-        n_members: int = 3,
-        projection_library: TermLibrary | None = None,
-        quick: bool = False,
-        random_state: int = 0,
-        progress: Progress | None = None,
-        base: Fluid | None = None,
-        solvent_viscosity: float = 0.0,
-    ):
-        self.recipe = recipe
-        self.modulus = modulus
-        self.relaxation_time = relaxation_time
-        self.known_relaxation = known_relaxation
-        self.base_law = base_law
-        self.n_members = n_members
-        self.projection_library = projection_library
-        self.quick = quick
-        self.random_state = random_state
-        self.progress = progress
-        self.base = base
-        self.solvent_viscosity = solvent_viscosity
+    recipe: str | DefaultRecipe | PaperRecipe = "default"
+    modulus: PerMode = 1.0
+    relaxation_time: PerMode = 1.0
+    known_relaxation: bool = True
+    base_law: AbstractConstitutiveLaw | None = None
+    n_members: int = 3
+    projection_library: TermLibrary | None = None
+    quick: bool = False
+    random_state: int = 0
+    progress: Progress | None = None
+    base: Fluid | None = None
+    solvent_viscosity: float = 0.0
 
     def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
         started = time.perf_counter()
@@ -240,17 +211,6 @@ class TBNNUDE(RunPrediction):
         """
         check_is_fitted(self, "ensemble_fluids_")
         return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
-
-    def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        flows = lay_out(
-            [run.protocol for run in runs],
-            [run.time for run in runs],
-            strain_step=STRAIN_STEP,
-            relaxation_time=self.fluid_.settling_time,
-        )
-        flows = in_enough_steps(self.fluid_, flows)
-        observed = np.asarray(observed_in_batch(self.fluid_, flows))
-        return [observed[i, : len(run), 0] for i, run in enumerate(runs)]
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):

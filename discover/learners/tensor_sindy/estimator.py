@@ -1,6 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import jax.numpy as jnp
@@ -15,9 +16,8 @@ from discover.inference.engine.left_out import left_out
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
-from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode, check_library, default_library
+from discover.learners.settings import KnownPart, PerMode, check_library, default_library
 from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
 from discover.learners.tensor_sindy.search import (
@@ -36,6 +36,7 @@ _ROUNDS = 8
 """Lines of text that a search is expected to say."""
 
 
+@dataclass(eq=False, repr=False)
 class TensorSINDy(RunPrediction):
     """Sparse regression on a frame-invariant library, from shear stress alone.
 
@@ -115,51 +116,23 @@ class TensorSINDy(RunPrediction):
     """
 
     learner = "tensor_sindy"
-    _saved = (
-        "n_features_in_",
-        "law_",
-        "fluid_",
-        "terms_",
-        "result_",
-        "library_",
-        "coefficients_",
-        "inner_",
-        "covariance_",
-        "provenance_",
-    )
+    _saved = (*RunPrediction._saved, "library_", "coefficients_", "inner_", "covariance_")
     _saved_types = (LearnerResult, RecoveredTerm, Provenance)
 
-    def __init__(
-        self,
-        library: TermLibrary | None = None,
-        optimizer: str | BaseOptimizer = "stlsq",
-        modulus: PerMode = 1.0,
-        relaxation_time: PerMode = 1.0,
-        solvent_viscosity: float = 0.0,
-        known_relaxation: bool = True,
-        base_law: AbstractConstitutiveLaw | None = None,
-        use_normal_stresses: bool = False,
-        selection: str = "evidence",
-        max_terms: int = 5,
-        progress: Progress | None = None,
-        base: Fluid | None = None,
-        modulus_covariance: Float[np.ndarray, "c c"] | None = None,
-        random_state: int = 0,
-    ):
-        self.library = library
-        self.optimizer = optimizer
-        self.modulus = modulus
-        self.relaxation_time = relaxation_time
-        self.solvent_viscosity = solvent_viscosity
-        self.known_relaxation = known_relaxation
-        self.base_law = base_law
-        self.use_normal_stresses = use_normal_stresses
-        self.selection = selection
-        self.max_terms = max_terms
-        self.progress = progress
-        self.base = base
-        self.modulus_covariance = modulus_covariance
-        self.random_state = random_state
+    library: TermLibrary | None = None
+    optimizer: str | BaseOptimizer = "stlsq"
+    modulus: PerMode = 1.0
+    relaxation_time: PerMode = 1.0
+    solvent_viscosity: float = 0.0
+    known_relaxation: bool = True
+    base_law: AbstractConstitutiveLaw | None = None
+    use_normal_stresses: bool = False
+    selection: str = "evidence"
+    max_terms: int = 5
+    progress: Progress | None = None
+    base: Fluid | None = None
+    modulus_covariance: Float[np.ndarray, "c c"] | None = None
+    random_state: int = 0
 
     def _learn(self, runs: list[Run], known: KnownPart) -> None:
         started = time.perf_counter()

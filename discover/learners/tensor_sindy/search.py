@@ -14,8 +14,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Key, Search
-from discover.learners.known_part import KnownPart
-from discover.learners.settings import ARITHMETIC
+from discover.learners.settings import ARITHMETIC, KnownPart
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
 from tensor_library.library import TermLibrary
