@@ -32,7 +32,7 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.laws.registry import laws_table as laws
     from discover.laws.registry import register_law as register_law
     from discover.learners import register_learner as register_learner
-    from discover.learners.files import load as load
+    from discover.learners.load import load as load
     from discover.learners.tbnn_ude import TBNNUDE as TBNNUDE
     from discover.learners.tensor_sindy import TensorSINDy as TensorSINDy
     from discover.loop.in_memory import close_loop as close_loop
@@ -102,7 +102,7 @@ _PLACES = {
     "discover.laws": ("AbstractConstitutiveLaw", "Fluid", "make_law"),
     "discover.laws.registry": ("register_law",),
     "discover.learners": ("register_learner",),
-    "discover.learners.files": ("load",),
+    "discover.learners.load": ("load",),
     "discover.learners.tbnn_ude": ("TBNNUDE",),
     "discover.learners.tensor_sindy": ("TensorSINDy",),
     "discover.protocols": (

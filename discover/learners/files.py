@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +21,6 @@ from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
 from discover.learners.plain_values import PlainReader, PlainWriter
 from discover.plain_numbers import parse_json
-
-if TYPE_CHECKING:
-    from discover.learners.tbnn_ude import TBNNUDE
-    from discover.learners.tensor_sindy import TensorSINDy
 
 FORMAT, VERSION = "discover estimator", 1
 _HEADER = "estimator.json"
@@ -138,41 +134,6 @@ class EstimatorFile:
             f"{self._path} is damaged ({type(error).__name__}: {first}). Copy it again, or fit "
             "again."
         )
-
-
-def load(path: str | Path) -> "TensorSINDy | TBNNUDE":
-    """Return the fitted estimator in a file that its `save` wrote; it predicts the same numbers.
-
-    Parameters
-    ----------
-    path
-        The file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, it is something else or damaged, or it needs a law that is not
-        registered here.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> law = dc.load("law.discover")  # doctest: +SKIP
-    >>> law.predict(test)  # doctest: +SKIP
-    """
-    if not isinstance(path, str | os.PathLike):
-        raise InputError(f"load takes the path of a file; got a {type(path).__name__}.")
-    from discover.learners.tbnn_ude import TBNNUDE
-    from discover.learners.tensor_sindy import TensorSINDy
-
-    learners = {one.learner: one for one in (TensorSINDy, TBNNUDE)}
-    file = EstimatorFile(path)
-    if file.learner not in learners:
-        raise InputError(
-            f"{path} holds an estimator of the kind {file.learner!r}; known are "
-            f"{', '.join(learners)}."
-        )
-    return learners[file.learner]._from_file(file)
 
 
 _UNREADABLE = (
