@@ -226,33 +226,20 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference = {key: value for key, value in candidates.items() if value is not None}
     of_states = run.protocol.control in STATES
     return Flow(
-        run.name,
-        kind,
-        run.protocol,
-        run.time,
-        run.rate,
-        reference,
-        run.recorded if kind == "training" else None,
-        is_truth=exact is not None,
+        run.name, kind, run.protocol, run.time, run.rate, reference,
+        run.recorded if kind == "training" else None, is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
-        oscillatory=_oscillates(run.protocol, run.rate),
-        weight=run.weight,
-    )
+        oscillatory=_oscillates(run.protocol, run.rate), weight=run.weight,
+    )  # fmt: skip
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
     rates = protocols.shear_rates(protocol, times)
     return Flow(
-        name,
-        kind,
-        protocol,
-        times,
-        rates,
-        _exactly(truth, protocol, times),
-        is_truth=True,
+        name, kind, protocol, times, rates, _exactly(truth, protocol, times), is_truth=True,
         training_end=TRAINING_DURATION if kind == "test" else None,
         oscillatory=_oscillates(protocol, rates),
-    )
+    )  # fmt: skip
 
 
 def _exactly(

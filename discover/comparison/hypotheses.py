@@ -60,18 +60,10 @@ def search_hypotheses(
         if term.closed_form is None and term.name not in _EFFECTS
     ]
     task = Task.of_runs(
-        dataset,
-        forward_model(declared),
-        fit,
-        list(data.held_out.names),
-        [*named, *terms],
-        MOST_EFFECTS,
-        noise=study.loop.noise,
-        most_samples=study.compare.most_samples,
-        progress=say,
-        loading=study.compare.loading,
-        computed=study.data.synthetic is not None,
-    )
+        dataset, forward_model(declared), fit, list(data.held_out.names), [*named, *terms],
+        MOST_EFFECTS, noise=study.loop.noise, most_samples=study.compare.most_samples, progress=say,
+        loading=study.compare.loading, computed=study.data.synthetic is not None,
+    )  # fmt: skip
     return search(task)
 
 

@@ -137,14 +137,9 @@ def compare(
     made = {name: (e.result_, e.fluid_) for name, e in estimators.items()}
     library = getattr(sparse, "library_", None)
     return compare_study(
-        _study(data, model, asked, tolerance),
-        seed,
-        say,
-        data=data,
-        declared=model,
-        made=made,
+        _study(data, model, asked, tolerance), seed, say, data=data, declared=model, made=made,
         library=library,
-    )
+    )  # fmt: skip
 
 
 def _study(

@@ -121,14 +121,10 @@ def _with_values(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
         for known in declared.effects
     )
     return replace(
-        declared,
-        law=make_law(declared.law_name, parameters) if free else declared.law,
-        parameters=parameters,
-        modulus=modulus,
-        relaxation_time=relaxation_time,
-        effects=effects,
+        declared, law=make_law(declared.law_name, parameters) if free else declared.law,
+        parameters=parameters, modulus=modulus, relaxation_time=relaxation_time, effects=effects,
         free=(),
-    )
+    )  # fmt: skip
 
 
 def _found(ended: Ended) -> list[KnownEffect]:

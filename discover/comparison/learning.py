@@ -61,14 +61,9 @@ def train(
         from discover.learners.tbnn_ude import TBNNUDE
 
         estimator = TBNNUDE(
-            recipe=options.recipe,
-            n_members=options.members,
-            quick=options.quick,
-            projection_library=library,
-            progress=progress,
-            random_state=seed,
-            **shared,
-        )
+            recipe=options.recipe, n_members=options.members, quick=options.quick,
+            projection_library=library, progress=progress, random_state=seed, **shared,
+        )  # fmt: skip
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
     asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)

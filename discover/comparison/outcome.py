@@ -53,15 +53,9 @@ class LearnerOutcome(TermTables):
         """Return the outcome of a fit, with the fluid it found simulated in every flow."""
         predictions = {flow.key: predict(fluid, flow) for flow in flows}
         return cls(
-            result.learner,
-            result.terms,
-            result.train_seconds,
-            result.loss_history,
-            result.details,
-            result.message,
-            predictions,
-            bands=_bands(result, fluid, flows),
-        )
+            result.learner, result.terms, result.train_seconds, result.loss_history, result.details,
+            result.message, predictions, bands=_bands(result, fluid, flows),
+        )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
         """Return everything as JSON-able values; `from_state` undoes it exactly."""

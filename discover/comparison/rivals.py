@@ -205,15 +205,10 @@ def structure_of(
     """Return what the flows of these runs determine, at the known part and at the law found."""
     found = LawTerms.of(terms)
     return identify.analyse_structure(
-        runs,
-        library,
-        base=model.law,
-        nominal={FOUND: found} if found.coefficients else {},
-        modulus=model.modulus,
-        relaxation_time=model.relaxation_time,
-        solvent_viscosity=model.solvent_viscosity,
-        use_normal_stresses=use_normal_stresses,
-    )
+        runs, library, base=model.law, nominal={FOUND: found} if found.coefficients else {},
+        modulus=model.modulus, relaxation_time=model.relaxation_time,
+        solvent_viscosity=model.solvent_viscosity, use_normal_stresses=use_normal_stresses,
+    )  # fmt: skip
 
 
 def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:

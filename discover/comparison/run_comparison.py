@@ -272,18 +272,12 @@ def _of_material(
         bands[flow.key] = Band(middle, middle, middle).claiming(())
     why = f"A {simple.material.title} has no law for it, and it was not measured."
     return Comparison(
-        name=study.name,
-        data_summary=data_in_words(data, study),
+        name=study.name, data_summary=data_in_words(data, study),
         known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
-        flows=flows,
-        before=before,
-        outcomes={},
-        posterior=_titled(simple, study),
-        bands=bands,
-        statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")],
-        seed=seed,
+        flows=flows, before=before, outcomes={}, posterior=_titled(simple, study), bands=bands,
+        statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
         conditions=material_and_temperature(data.dataset, study.data.material),
-    )
+    )  # fmt: skip
 
 
 def _titled(found: LoopResult, study: Study) -> LoopResult:
@@ -329,22 +323,14 @@ def _with_what_is_open(
     others = explanations_apart(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(
-        comparison.verdict,
-        frame.shown,
-        bands,
-        structure,
-        {name: one.inside for name, one in spread.items()},
-        study.compare.use_normal_stresses,
+        comparison.verdict, frame.shown, bands, structure,
+        {name: one.inside for name, one in spread.items()}, study.compare.use_normal_stresses,
         len(terms),
-    )
+    )  # fmt: skip
     return replace(
-        comparison,
-        bands=bands,
-        classical=fit_classical_laws(found, frame, study.compare.laws),
-        rivals=(*twins, *others),
-        statements=statements,
-        structure=structure,
-    )
+        comparison, bands=bands, classical=fit_classical_laws(found, frame, study.compare.laws),
+        rivals=(*twins, *others), statements=statements, structure=structure,
+    )  # fmt: skip
 
 
 def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:

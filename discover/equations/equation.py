@@ -132,14 +132,9 @@ class Equation(NotebookView):
         """
         named, terms = parts or law_parts(fluid.law)
         return cls(
-            terms,
-            tuple(map(float, fluid.modulus)),
-            tuple(map(float, fluid.relaxation_time)),
-            fluid.law.linear_relaxation,
-            float(fluid.solvent_viscosity),
-            named=named,
-            **stated,
-        )
+            terms, tuple(map(float, fluid.modulus)), tuple(map(float, fluid.relaxation_time)),
+            fluid.law.linear_relaxation, float(fluid.solvent_viscosity), named=named, **stated,
+        )  # fmt: skip
 
     @property
     def mean_relaxation_time(self) -> float:

@@ -140,20 +140,12 @@ def fit(
         records += record_runs(held, ahead, held_out=True)
     active = [known.name for known in forward.effects]
     return NamedLawFit(
-        law,
-        _constants(model, best, names, covariance, declared),
-        covariance,
-        degrees,
+        law, _constants(model, best, names, covariance, declared), covariance, degrees,
         augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
-        what_is_left(best, batch, fitted, expectation),
-        tuple(records),
-        model,
-        best.theta,
-        declared_law(forward, best.theta, {}),
-        data.name,
-        tolerance,
-    )
+        what_is_left(best, batch, fitted, expectation), tuple(records), model, best.theta,
+        declared_law(forward, best.theta, {}), data.name, tolerance,
+    )  # fmt: skip
 
 
 def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:

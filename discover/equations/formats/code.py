@@ -235,13 +235,9 @@ def numpy_code(equation: Equation) -> str:
     Raises InputError if the equation has a named law without written form.
     """
     return filled(
-        _NUMPY_TEMPLATE,
-        equation,
-        CodeNotation(),
-        "np.zeros((3, 3))",
-        rates=_NUMPY_RATES,
+        _NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))", rates=_NUMPY_RATES,
         structure=structure_fields(equation, CodeNotation(), "numpy"),
-    )
+    )  # fmt: skip
 
 
 def sympy_code(equation: Equation) -> str:
@@ -262,15 +258,9 @@ def sympy_code(equation: Equation) -> str:
     for name in () if named is None else named.function.rates:
         constants += f'{name} = sympy.Symbol("{name}", real=True)\n'
     return filled(
-        _SYMPY_TEMPLATE,
-        equation,
-        _SympyCodeNotation(),
-        "sympy.zeros(3, 3)",
-        constants,
-        "",
-        _SYMPY_RATES,
-        structure_fields(equation, _SympyCodeNotation(), "sympy"),
-    )
+        _SYMPY_TEMPLATE, equation, _SympyCodeNotation(), "sympy.zeros(3, 3)", constants, "",
+        _SYMPY_RATES, structure_fields(equation, _SympyCodeNotation(), "sympy"),
+    )  # fmt: skip
 
 
 _OF_VARIABLES = """
@@ -318,24 +308,17 @@ def filled(
             )
     return template.format(
         header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
-        relaxation=" - s" if equation.linear_relaxation else "",
-        modulus=_numbers(equation.modulus),
+        relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
-        solvent=repr(float(equation.solvent_viscosity)),
-        tested=_tested(equation),
+        solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
         constants=table if constants is None else constants,
-        mode=", mode" if variables else ", mode=0" if named else "",
-        of_mode=", k" if named else "",
-        also=", variables" if variables else "",
-        also_k=", variables[k]" if variables else "",
+        mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
+        also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
         of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
-        variables_rate=changing,
-        **structure,
-        **stepped(equation, len(variables)),
-        where=where,
+        variables_rate=changing, **structure, **stepped(equation, len(variables)), where=where,
         extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
-    )
+    )  # fmt: skip
 
 
 def _constants(equation: Equation) -> str:

@@ -42,13 +42,9 @@ def read_rheotool(text: str) -> Equation:
         named, found = law_parts(named.built())
         terms = tuple(t for t in found if t.coefficient and t.inner.get("epsilon") != 0.0)
     return Equation(
-        terms,
-        moduli,
-        times,
-        solvent_viscosity=sum(solvents),
-        title="rheoTool constitutiveProperties",
-        named=named,
-    )
+        terms, moduli, times, solvent_viscosity=sum(solvents),
+        title="rheoTool constitutiveProperties", named=named,
+    )  # fmt: skip
 
 
 def _mode(entries: dict[str, Any]) -> tuple[str, dict[str, float], float, float, float]:

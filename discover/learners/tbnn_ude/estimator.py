@@ -260,14 +260,9 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
 
 def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
     return make_problem(
-        runs,
-        known.modulus,
-        known.relaxation_time,
-        solvent_viscosity=known.solvent_viscosity,
-        known_relaxation=known.linear_relaxation,
-        base=known.law,
-        **limits,
-    )
+        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity,
+        known_relaxation=known.linear_relaxation, base=known.law, **limits,
+    )  # fmt: skip
 
 
 _WORTH_TRAINING_ON = 1.5
