@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 from scipy.stats import norm
@@ -58,17 +58,8 @@ def as_html(part: Any) -> str:
         )
 
 
-@runtime_checkable
-class HasLine(Protocol):
-    """A result that is one line of a table of its kind."""
-
-    def line(self) -> Mapping[str, Any]:
-        """Return the columns of the line."""
-        ...
-
-
-def table_of(results: Sequence[HasLine]) -> pd.DataFrame:
-    """Return results of one kind as a table, one line each."""
+def table_of(results: Sequence[Any]) -> pd.DataFrame:
+    """Return results of one kind as a table, by their `line()`."""
     return pd.DataFrame([dict(result.line()) for result in results])
 
 

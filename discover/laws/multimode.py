@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,15 +18,6 @@ from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
-
-
-@runtime_checkable
-class HasSpectrum(Protocol):
-    """Linear data that know their relaxation modes, such as a `LinearSweep`."""
-
-    def relaxation_spectrum(self, **options: Any) -> Any:
-        """Return modes with `modulus` in Pa and `relaxation_time` in s, both of shape (k,)."""
-        ...
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
@@ -150,7 +141,7 @@ class Fluid(eqx.Module):
 
     @classmethod
     def from_sweep(
-        cls, sweep: HasSpectrum | None, law: AbstractConstitutiveLaw | None = None, **options: Any
+        cls, sweep: Any, law: AbstractConstitutiveLaw | None = None, **options: Any
     ) -> "Fluid":
         """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
 
@@ -178,7 +169,7 @@ class Fluid(eqx.Module):
                 "There is no linear sweep to take the modes from: the data set has no lve.csv. "
                 "Give the modes: Fluid(law, modulus, relaxation_time), in Pa and s."
             )
-        if not isinstance(sweep, HasSpectrum):
+        if not hasattr(sweep, "relaxation_spectrum"):
             raise InputError(
                 "The modes come from a linear sweep, such as data.linear_sweep; got a "
                 f"{type(sweep).__name__}."

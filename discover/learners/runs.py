@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -143,13 +143,7 @@ _CHANGE = 0.01
 """A rate is held while it stays within this fraction of what it was first."""
 
 
-@runtime_checkable
-class _Laid(Protocol):
-    @property
-    def flows(self) -> FlowBatch: ...
-
-
-_Problem = TypeVar("_Problem", bound=_Laid)
+_Problem = TypeVar("_Problem", bound=Any)  # a learner's, with its `flows`
 
 
 def shorter_where_it_pays(
@@ -176,8 +170,8 @@ def shorter_where_it_pays(
 
 
 def shortened_rightly(
-    whole: _Laid,
-    shorter: _Laid,
+    whole: Any,
+    shorter: Any,
     recorded: tuple[Sequence[Float[np.ndarray, " _"]], Sequence[Float[np.ndarray, " _"]]],
     misfit: float,
 ) -> str:
