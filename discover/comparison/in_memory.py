@@ -49,18 +49,11 @@ def compare(
 
 
 def compare(
-    first: Sequence[RunPrediction] | Dataset,
-    second: Dataset | Fluid | None = None,
-    *,
-    train: Dataset | None = None,
-    held_out: HeldOut = (),
-    known_effects: Mapping[str, Any] | None = None,
-    free: Sequence[str] = (),
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-    progress: Progress | None = None,
-    **options: Any,
-) -> Comparison:
+    first: Sequence[RunPrediction] | Dataset, second: Dataset | Fluid | None = None, *,
+    train: Dataset | None = None, held_out: HeldOut = (),
+    known_effects: Mapping[str, Any] | None = None, free: Sequence[str] = (),
+    tolerance: float = TOLERANCE, seed: int = 0, progress: Progress | None = None, **options: Any,
+) -> Comparison:  # fmt: skip
     """Compare fitted estimators on runs that no fit saw, or fit both learners to data and compare.
 
     Parameters

@@ -21,13 +21,9 @@ from tensor_library.library import TermLibrary, build_library
 
 
 def train(
-    learner: str,
-    study: Study,
-    model: DeclaredModel,
-    runs: Sequence[Run],
-    seed: int = 0,
+    learner: str, study: Study, model: DeclaredModel, runs: Sequence[Run], seed: int = 0,
     progress: Progress = silent,
-) -> tuple[LearnerResult, Fluid]:
+) -> tuple[LearnerResult, Fluid]:  # fmt: skip
     """Return what one learner finds in these runs, and the fluid that it makes.
 
     `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `model`: the known

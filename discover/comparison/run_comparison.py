@@ -148,16 +148,12 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
 
 @in_one_thread
 def compare(
-    study: Study,
-    seed: int | None = None,
-    progress: Progress = silent,
-    store: RunFolder | None = None,
-    *,
-    data: StudyData | None = None,
+    study: Study, seed: int | None = None, progress: Progress = silent,
+    store: RunFolder | None = None, *, data: StudyData | None = None,
     declared: DeclaredModel | None = None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
     library: TermLibrary | None = None,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """Run a study's learners on identical data, and weigh what each found with a search's findings.
 
     The posterior over laws, effects and terms comes first; its likeliest hypothesis fixes what is
@@ -294,13 +290,9 @@ def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
 
 
 def _with_what_is_open(
-    comparison: Comparison,
-    found: Found,
-    frame: Frame,
-    data: StudyData,
-    study: Study,
+    comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
     library: TermLibrary,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
         statements = make_statements("no_signal", frame.shown, {}, None, {})

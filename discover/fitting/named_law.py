@@ -40,19 +40,11 @@ Bounds = Mapping[str, tuple[float, float]]
 
 @in_one_thread
 def fit(
-    law: str,
-    data: Dataset,
-    *,
-    base: Fluid | None = None,
-    bounds: Bounds | None = None,
-    start: Mapping[str, float] | None = None,
-    fixed: Mapping[str, float] | None = None,
-    effects: Mapping[str, Any] | None = None,
-    held_out: HeldOut = (),
-    noise: float | None = None,
-    most_samples: int = MOST_SAMPLES,
-    tolerance: float = TOLERANCE,
-) -> NamedLawFit:
+    law: str, data: Dataset, *, base: Fluid | None = None, bounds: Bounds | None = None,
+    start: Mapping[str, float] | None = None, fixed: Mapping[str, float] | None = None,
+    effects: Mapping[str, Any] | None = None, held_out: HeldOut = (), noise: float | None = None,
+    most_samples: int = MOST_SAMPLES, tolerance: float = TOLERANCE,
+) -> NamedLawFit:  # fmt: skip
     """Fit one named law to runs.
 
     Modes come from `base`, else from the linear sweep of the data, else one mode is fitted.
@@ -169,13 +161,9 @@ def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
 
 
 def _declared(
-    law: str,
-    data: Dataset,
-    base: Fluid | None,
-    runs: Sequence[Run],
-    given: tuple[dict, dict, dict],
-    effects: Mapping[str, Any] | None,
-) -> DeclaredModel:
+    law: str, data: Dataset, base: Fluid | None, runs: Sequence[Run],
+    given: tuple[dict, dict, dict], effects: Mapping[str, Any] | None,
+) -> DeclaredModel:  # fmt: skip
     """Return the law with its modes, and what of them is free."""
     bounds, start, fixed = given
     own = LAWS[law].parameters

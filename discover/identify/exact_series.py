@@ -58,13 +58,9 @@ def _word(word: str, tensors: Mapping[str, Sequence[Any]]) -> tuple[Any, ...]:
 
 
 def exact_terms(
-    terms: Sequence[CandidateTerm],
-    stress: Components,
-    rate: Any,
-    one: Any = 1,
-    zero: Any = 0,
+    terms: Sequence[CandidateTerm], stress: Components, rate: Any, one: Any = 1, zero: Any = 0,
     form_values: Mapping[str, Any] | None = None,
-) -> list[Components]:
+) -> list[Components]:  # fmt: skip
     """Return the components of every term at one state.
 
     `stress`: σ11, σ22, σ33, σ12, `rate`: γ̇, over any ring with unit `one` and `zero`.

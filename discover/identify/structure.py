@@ -184,15 +184,10 @@ class Structure(SentenceAndTable):
 
 
 def analyse_structure(
-    runs: Sequence[Run],
-    library: TermLibrary,
-    base: AbstractConstitutiveLaw | None = None,
-    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
-    modulus: Any = 1.0,
-    relaxation_time: Any = 1.0,
-    solvent_viscosity: float = 0.0,
-    use_normal_stresses: bool = False,
-) -> Structure:
+    runs: Sequence[Run], library: TermLibrary, base: AbstractConstitutiveLaw | None = None,
+    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None, modulus: Any = 1.0,
+    relaxation_time: Any = 1.0, solvent_viscosity: float = 0.0, use_normal_stresses: bool = False,
+) -> Structure:  # fmt: skip
     """Return what shear flows can determine of a library's coefficients.
 
     `runs`: their protocols and times; with `use_normal_stresses`, N1 and N2 that they hold count as
@@ -234,14 +229,9 @@ def analyse_structure(
 
 
 def _at(
-    known: Fluid,
-    flows: FlowBatch,
-    samples: Bool[np.ndarray, "runs n"],
-    library: TermLibrary,
-    name: str,
-    law: LawTerms,
-    observed: Sequence[str],
-) -> LawStructure | None:
+    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], library: TermLibrary,
+    name: str, law: LawTerms, observed: Sequence[str],
+) -> LawStructure | None:  # fmt: skip
     """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
     coefficients, inner = law.over(library)

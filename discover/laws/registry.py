@@ -137,15 +137,11 @@ def _same_law(made: AbstractConstitutiveLaw, law: AbstractConstitutiveLaw) -> bo
 
 
 def register_law(
-    name: str,
-    build: Callable[..., AbstractConstitutiveLaw] | None = None,
-    parameters: Mapping[str, tuple[float, float]] | None = None,
-    title: str = "",
-    source: str = "",
-    written: Callable[[], IsotropicFunction] | None = None,
-    *,
+    name: str, build: Callable[..., AbstractConstitutiveLaw] | None = None,
+    parameters: Mapping[str, tuple[float, float]] | None = None, title: str = "", source: str = "",
+    written: Callable[[], IsotropicFunction] | None = None, *,
     extra_term: Callable[..., Symmetric] | None = None,
-) -> NamedLaw:
+) -> NamedLaw:  # fmt: skip
     """Make a law of one's own known by name to studies, loops and exports in this process.
 
     An installed package does so in every process: see docs/adding-a-law.md.

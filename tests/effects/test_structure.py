@@ -45,16 +45,10 @@ def critical_of(name):
 def independent_of(name, critical=None, exponent=EXPONENT):
     two = FAMILY[name].levels == 2
     return Structured(
-        critical or critical_of(name),
-        (BUILD_UP, SLOWNESS * BUILD_UP) if two else (BUILD_UP,),
-        2.0 / 3.0 if two else exponent,
-        SHARE if two else 0.0,
-        by_stress=name.endswith("stress"),
-        in_modulus="modulus" in name,
-        modulus=MODULUS,
-        relaxation_time=TIME,
-        mobility=MOBILITY,
-    )
+        critical or critical_of(name), (BUILD_UP, SLOWNESS * BUILD_UP) if two else (BUILD_UP,),
+        2.0 / 3.0 if two else exponent, SHARE if two else 0.0, by_stress=name.endswith("stress"),
+        in_modulus="modulus" in name, modulus=MODULUS, relaxation_time=TIME, mobility=MOBILITY,
+    )  # fmt: skip
 
 
 def run_of(name, protocol):

@@ -1,7 +1,5 @@
 """Laws that leave the package and come back: every form says the same law, or refuses."""
 
-import importlib.util
-import itertools
 import json
 import re
 
@@ -9,6 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from independent.homogeneous import UNIT
+from readers import by_rheotool, followed, module_of, shear_quantities
 
 from discover import equations
 from discover.equations import Tested as WhereTested
@@ -45,13 +45,6 @@ MIXED = equations.Equation(
 )
 
 
-def load(path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture(scope="module")
 def simulated():
     """The mixed law in start-up, by the package's own integrator."""
@@ -65,32 +58,16 @@ def simulated():
     )
 
 
-def runge_kutta(rate, state, times, steps=40):
-    """Integrate state' = rate(state) and return the states at the times."""
-    states = [state]
-    for start, end in itertools.pairwise(times):
-        h = (end - start) / steps
-        for _ in range(steps):
-            k1 = rate(state)
-            k2 = rate(state + 0.5 * h * k1)
-            k3 = rate(state + 0.5 * h * k2)
-            state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(state + h * k3))
-        states.append(state)
-    return np.array(states)
-
-
 def agree(found, wanted, tolerance=1e-6):
     return np.max(np.abs(found - wanted)) <= tolerance * np.max(np.abs(wanted))
 
 
-def test_the_python_function_simulates_what_the_package_simulates(tmp_path, simulated):
-    path = tmp_path / "law.py"
-    path.write_text(equations.write_equation(MIXED, "python"), encoding="utf-8")
-    module = load(path)
-    found = np.array(module.simulate_shear(lambda t: RATE, TIMES))
-    assert agree(found, simulated)
-    assert module.TESTED["judged_in"]["Wi"] == [2.0, 3.0]
-    assert "discover" not in re.findall(r"^(?:import|from) (\w+)", path.read_text(), re.M)
+def test_the_python_function_simulates_what_the_package_simulates(simulated):
+    text = equations.write_equation(MIXED, "python")
+    module = module_of(text)
+    assert agree(np.array(module["simulate_shear"](lambda t: RATE, TIMES)), simulated)
+    assert module["TESTED"]["judged_in"]["Wi"] == [2.0, 3.0]
+    assert "discover" not in re.findall(r"^(?:import|from) (\w+)", text, re.M)
 
 
 def test_json_gives_back_the_same_equation():
@@ -111,57 +88,15 @@ def test_every_form_says_where_the_law_was_tested(form):
         assert "Learned in Wi 1 to 2, De 0.25 to 1." in text
 
 
-def rheotool_shear(text, times):
-    """Start-up shear by the equations in rheoTool's sources, from the numbers in a dictionary.
-
-    PTT.C, Giesekus.C and Oldroyd_B.C in the stress, FENE_P.C in the conformation.
-    """
-    kind = re.search(r"type\s+([\w-]+);", text)[1]
-    numbers = {m[1]: float(m[2]) for m in re.finditer(r"(\w+) \[[^\]]*\] (\S+);", text)}
-    eta, time = numbers["etaP"], numbers["lambda"]
-    gradient = np.zeros((3, 3))
-    gradient[0, 1] = RATE
-    twice = gradient + gradient.T
-
-    def convected(tensor):
-        return gradient @ tensor + tensor @ gradient.T
-
-    if kind == "FENE-P":
-        limit = numbers["L2"]
-        a = limit / (limit - 3)
-
-        def spring(tensor):
-            return 1 / (1 - np.trace(tensor) / limit)
-
-        states = runge_kutta(
-            lambda c: convected(c) - (spring(c) * c - a * np.eye(3)) / time, np.eye(3), times
-        )
-        tau = np.array([eta / time * (spring(c) * c - a * np.eye(3)) for c in states])
-    else:
-
-        def rate(tau):
-            change = convected(tau) + eta / time * twice
-            if kind == "Giesekus":
-                return change - numbers["alpha"] / eta * tau @ tau - tau / time
-            if kind == "PTT":
-                change = change - 0.5 * numbers["zeta"] * (tau @ twice + twice @ tau)
-                z = numbers["epsilon"] * time / eta * np.trace(tau)
-                linear = re.search(r"destructionFunctionType\s+linear;", text)
-                return change - (1 + z if linear else np.exp(z)) * tau / time
-            assert kind == "Oldroyd-B"
-            return change - tau / time
-
-        tau = runge_kutta(rate, np.zeros((3, 3)), times)
-    tau = tau + numbers["etaS"] * twice
-    return np.array([tau[:, 0, 1], tau[:, 0, 0] - tau[:, 1, 1], tau[:, 1, 1] - tau[:, 2, 2]])
+def rheotool_shear(text):
+    return shear_quantities(by_rheotool(text, RATE * UNIT["shear"], TIMES))
 
 
 def by_stress_rate(fluid):
     """The same flow by a fluid of this package, one compiled right-hand side."""
     shear_rate = jnp.asarray(RATE)
     rate = jax.jit(lambda state: fluid.state_rate(state, shear_rate))
-    start = np.zeros((fluid.n_modes, 4))
-    states = runge_kutta(lambda state: np.asarray(rate(state)), start, TIMES)
+    states = followed(lambda y, _: np.asarray(rate(y)), np.zeros((fluid.n_modes, 4)), None, TIMES)
     total = np.array([fluid.stress(jnp.asarray(state), shear_rate) for state in states])
     return np.array([total[:, 3], total[:, 0] - total[:, 1], total[:, 1] - total[:, 2]])
 
@@ -186,7 +121,7 @@ def test_rheotools_own_equations_give_the_stress_of_the_law(name):
     for read, term in zip(equations.read_rheotool(text).terms, equation.terms, strict=True):
         assert (read.term, dict(read.inner)) == (term.term, dict(term.inner))
         assert read.coefficient == pytest.approx(term.coefficient, rel=1e-12)
-    by_source = rheotool_shear(text, TIMES)
+    by_source = rheotool_shear(text)
     by_law = by_stress_rate(Fluid(law, 50.0, 0.8, 2.0))
     assert agree(by_source[:2], by_law[:2], 1e-5)
     assert np.max(np.abs(by_source[2] - by_law[2])) < 1e-5 * np.max(np.abs(by_source[1]))
@@ -207,7 +142,7 @@ def test_terms_that_only_rescale_become_another_modulus_and_time():
     """dσ/dt = (1 − c)γ̇ + ... − (1 + b)σ − α σ·σ is a Giesekus law in other units."""
     terms = (LawTerm("gammadot", 0.2), LawTerm("sigma", 0.5), LawTerm("sigma.sigma", 0.3))
     equation = equations.Equation(terms, (10.0,), (2.0,))
-    found = rheotool_shear(equations.write_equation(equation, "rheotool"), TIMES)
+    found = rheotool_shear(equations.write_equation(equation, "rheotool"))
     assert agree(found[0], by_stress_rate(equation.fluid())[0], 1e-5)
     # as in the paper's runs, where the relaxation too was left to the learner
     bare = equations.Equation((LawTerm("sigma", 0.98),), linear_relaxation=False)

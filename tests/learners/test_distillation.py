@@ -55,13 +55,9 @@ def test_a_law_taught_to_itself_is_recovered(teacher, student, truth):
 def test_another_law_leaves_an_error_and_a_false_second_normal_stress():
     # negative control of the test above: PTT has N2 = 0, Giesekus has not
     result = distil(
-        laws.Giesekus(0.3),
-        "ptt_linear",
-        FEW,
-        n_samples=41,
-        duration=6.0,
+        laws.Giesekus(0.3), "ptt_linear", FEW, n_samples=41, duration=6.0,
         tests={"startup": start_up(2.0)},
-    )
+    )  # fmt: skip
     assert result.misfit > 1e-3
     assert result.errors["startup"]["N2"] > 0.05
 

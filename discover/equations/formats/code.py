@@ -268,15 +268,10 @@ _OF_VARIABLES = """
 
 
 def filled(
-    template: str,
-    equation: Equation,
-    notation: CodeNotation,
-    nothing: str,
-    constants: str | None = None,
-    indent: str = "    ",
-    rates: str = "",
+    template: str, equation: Equation, notation: CodeNotation, nothing: str,
+    constants: str | None = None, indent: str = "    ", rates: str = "",
     structure: Mapping[str, str] = NOTHING,
-) -> str:
+) -> str:  # fmt: skip
     """Return a module: a template with the law in a notation.
 
     `constants`: holder of a named law's constants; by default a list with a table for each mode.

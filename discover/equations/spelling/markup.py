@@ -206,13 +206,9 @@ _SIGN = "<mo form='infix'>{}</mo>"
 
 
 def law_element(
-    terms: Sequence[LawTerm],
-    linear_relaxation: bool,
-    named: NamedPart | None = None,
-    modes: int = 0,
-    solvent: bool = False,
-    rest: bool = False,
-) -> str:
+    terms: Sequence[LawTerm], linear_relaxation: bool, named: NamedPart | None = None,
+    modes: int = 0, solvent: bool = False, rest: bool = False,
+) -> str:  # fmt: skip
     """Return the whole law, displayed; each summand is a `math` element, so that lines break.
 
     `modes`: how many a law in Pa and s has; 0 for a dimensionless one. `solvent`: whether that has

@@ -280,13 +280,9 @@ def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "run
 
 
 def minimise(
-    weights: Float[Array, " p"],
-    objective: Objective,
-    steps: int,
-    callback: Callback | None = None,
-    target: float = 0.0,
-    pace: Sequence[float] | None = None,
-) -> Float[Array, " p"]:
+    weights: Float[Array, " p"], objective: Objective, steps: int, callback: Callback | None = None,
+    target: float = 0.0, pace: Sequence[float] | None = None,
+) -> Float[Array, " p"]:  # fmt: skip
     """Return better weights after at most `steps` Levenberg–Marquardt steps.
 
     `callback`: called after every step with the relative misfit of the best weights. `target`,

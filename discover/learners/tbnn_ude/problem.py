@@ -66,15 +66,10 @@ class TrainingProblem(eqx.Module):
 
 
 def make_problem(
-    runs: Sequence[Run],
-    modulus: Float[np.ndarray, " k"],
-    relaxation_time: Float[np.ndarray, " k"],
-    strain_step: float = STRAIN_STEP,
-    solvent_viscosity: float = 0.0,
-    known_relaxation: bool = True,
-    base: AbstractConstitutiveLaw | None = None,
-    **limits: Any,
-) -> TrainingProblem:
+    runs: Sequence[Run], modulus: Float[np.ndarray, " k"], relaxation_time: Float[np.ndarray, " k"],
+    strain_step: float = STRAIN_STEP, solvent_viscosity: float = 0.0, known_relaxation: bool = True,
+    base: AbstractConstitutiveLaw | None = None, **limits: Any,
+) -> TrainingProblem:  # fmt: skip
     """Return the training problem of some runs.
 
     `modulus`, `relaxation_time`: modes, in Pa and s. `strain_step`: of the integration; the error

@@ -111,13 +111,9 @@ def train_constants(
 
 
 def train_along(
-    problem: TrainingProblem,
-    key: PRNGKeyArray,
-    found: TensorBasisNetwork,
-    groups: Sequence[Sequence[int]],
-    recipe: DefaultRecipe,
-    progress: Progress | None,
-) -> Trained:
+    problem: TrainingProblem, key: PRNGKeyArray, found: TensorBasisNetwork,
+    groups: Sequence[Sequence[int]], recipe: DefaultRecipe, progress: Progress | None,
+) -> Trained:  # fmt: skip
     """Return a law whose tensors are given, from initial weights of its own.
 
     `found`: trained law, of which invariant scale, base and known relaxation are kept. `groups`:
