@@ -135,8 +135,13 @@ class TermLibrary:
     ) -> Float[Array, "n 3 3"] | Float[Array, "n 4"]:
         """Return the value of every term at one state, shape (n, 3, 3) or (n, 4).
 
-        `stress`, `rate`: dimensionless, both (3, 3) or both (4,). `inner`: in the order of
-        `inner_names`, shape (n_inner,); by default the forms' defaults.
+        Parameters
+        ----------
+        stress, rate
+            Dimensionless, both of shape (3, 3) or (4,).
+        inner
+                In the order of `inner_names`, dimensionless, shape (n_inner,); by default the
+            forms' own.
         """
         levels, monomial_of_term, form_of_term, tensor_of_term = self._layout
         invariants = scalar_invariants(stress, rate)

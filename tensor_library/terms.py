@@ -30,8 +30,14 @@ _NO_POWERS = (0,) * len(INVARIANT_NAMES)
 class CandidateTerm:
     """One term that a constitutive law may hold.
 
-    `tensor`: index into `TENSOR_NAMES`. `powers`: exponent of each invariant of `INVARIANT_NAMES`.
-    `closed_form`: key of `CLOSED_FORMS`, or None.
+    Attributes
+    ----------
+    tensor
+        Index into `TENSOR_NAMES`.
+    powers
+        Exponent of each invariant of `INVARIANT_NAMES`.
+    closed_form
+        Key of `CLOSED_FORMS`, or None.
 
     Examples
     --------
@@ -100,9 +106,15 @@ class CandidateTerm:
         rate: Symmetric,
         inner: Mapping[str, Float[Array, ""]] | None = None,
     ) -> Symmetric:
-        """Return the value of the term at one dimensionless state, both (3, 3) or both (4,).
+        """Return the value of the term at one state.
 
-        `inner`: inner parameters by name; the form's default where one is missing.
+        Parameters
+        ----------
+        stress, rate
+            Dimensionless, both of shape (3, 3) or (4,).
+        inner
+                Inner parameters by name, dimensionless, of shape (); the form's default where one
+            is missing.
         """
         invariants = scalar_invariants(stress, rate)
         value = integrity_basis(stress, rate)[self.tensor]
@@ -124,8 +136,14 @@ class CandidateTerm:
     ) -> T:
         """Return the term in a notation, as a factor: a sum of tensors is bracketed.
 
-        `coefficient`: number in front, if any. `inner`: by name; one that is missing stays a
-        letter.
+        Parameters
+        ----------
+        notation
+            How to write it.
+        coefficient
+            Number in front, if any.
+        inner
+            Inner parameters by name; one that is missing stays a letter.
         """
         factors = [] if coefficient is None else [notation.number(coefficient)]
         if self.form is not None:
