@@ -8,17 +8,9 @@ from typing import Any
 
 
 def answer_calls(package: str, answer: Callable[..., Any]) -> None:
-    """Let a package be called.
+    """Let a package be called: ``discover.laws()`` and ``discover.laws.Giesekus`` share a name.
 
-    The name of a package is taken: once it is imported, it is what its parent holds under that
-    name. So a function of the same name has to be the package itself.
-
-    Parameters
-    ----------
-    package
-        Its full name; called from its ``__init__``.
-    answer
-        What a call calls.
+    `package`: its full name. `answer`: what a call calls.
     """
 
     class CallablePackage(ModuleType):

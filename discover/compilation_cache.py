@@ -1,4 +1,4 @@
-"""Keep compiled programs between runs of the software."""
+"""Compiled programs kept between runs of the software."""
 
 import os
 import re
@@ -28,21 +28,11 @@ _ENTRY = re.compile(r".*-[0-9a-f]{64}-cache")
 
 
 def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
-    """Let JAX keep what it compiled, so that a second start does not compile again.
+    """Let JAX keep what it compiled, in a folder that only this user can write.
 
-    Called when something that computes is first used (`discover.first_use`), and by the tests'
-    ``conftest`` before that; ``import discover`` alone changes no global setting.
-
-    Parameters
-    ----------
-    folder
-        Where to keep it; by default the folder that JAX was told to use, or else
-        ``discover/compiled`` in the user's cache folder. Set ``DISCOVER_NO_CACHE`` to any value to
-        keep nothing.
-
-    Returns
-    -------
-    The folder, or None where nothing can be kept, or others can write: see `is_ours_alone`.
+    Called when something that computes is first used (`discover.first_use`). `folder`: by default
+    what JAX was told to use, or ``discover/compiled`` in the user's cache folder;
+    ``DISCOVER_NO_CACHE`` keeps nothing. Returns the folder, or None where nothing is kept.
     """
     import jax
 
@@ -74,9 +64,9 @@ def enable_compilation_cache(folder: str | Path | None = None) -> Path | None:
 
 @cache
 def is_ours_alone(folder: Path) -> bool:
-    """Return whether only this user can write to a folder; says so, once, where others can.
+    """Return whether only this user can write to a folder; warns once where others can.
 
-    What lies in a cache is machine code, and is run: whoever can write there acts as this user.
+    A cache holds machine code: whoever can write there acts as this user.
     """
     if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's own
         return True
@@ -97,10 +87,9 @@ def is_ours_alone(folder: Path) -> bool:
 
 
 def remove_cut_short(folder: Path) -> None:
-    """Remove programs that a full disk or a kill left incomplete.
+    """Remove programs that a full disk or a kill left incomplete, of which JAX would warn for ever.
 
-    JAX neither writes them at once nor writes them anew, so that it would warn at every later
-    start. Each file is looked at once, at the first start after it was written.
+    Each file is looked at once, at the first start after it was written.
     """
     stamp = folder / "checked"
     since = stamp.stat().st_mtime - 1.0 if stamp.is_file() else 0.0

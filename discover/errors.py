@@ -44,23 +44,12 @@ class Problems:
         self._found.append(text)
 
     def require_none(self, where: str = "") -> None:
-        """Raise what was collected.
-
-        Parameters
-        ----------
-        where
-            The file or folder, for a list of several.
-
-        Raises
-        ------
-        InputError
-            If there is a problem: its text, or a list with one problem a line, each once.
-        """
+        """Raise InputError with what was collected: one problem, or a list of several."""
         if self._found:
             raise InputError(self.listed(where))
 
     def listed(self, where: str = "") -> str:
-        """Return what was collected, each problem once: its text alone, or a list under a place."""
+        """Return each problem once: its text alone, or a list under a place."""
         found = list(dict.fromkeys(self._found))
         if len(found) == 1:
             return found[0]

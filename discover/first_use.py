@@ -1,8 +1,7 @@
 """What is set up when something that computes is first used: double precision, kept programs.
 
-Importing this module does it. Whatever needs JAX imports it before JAX, so that it holds in every
-process: in a script, in a notebook, and in a worker that only unpickles a fitted estimator.
-``import discover`` alone does not import it.
+Importing this module does it; whatever needs JAX imports it before JAX, so that it holds in every
+process, also a worker that unpickles an estimator. ``import discover`` alone does not.
 """
 
 import os
@@ -13,11 +12,7 @@ from discover.errors import InputError
 
 
 def enable_x64() -> None:
-    """Make JAX compute in float64.
-
-    Sparse regression and reference solutions need it. Whatever computes calls this when it is first
-    used (`discover.first_use`); ``import discover`` alone changes no global setting.
-    """
+    """Make JAX compute in float64, which sparse regression and reference solutions need."""
     import jax
 
     jax.config.update("jax_enable_x64", True)
@@ -27,15 +22,9 @@ _SINGLE = ("float32", "complex64")
 
 
 def set_up() -> None:
-    """Turn on double precision and keep compiled programs between starts.
+    """Turn on double precision and keep compiled programs, unless the user has chosen.
 
-    A cache folder, or double precision, that the user has chosen already is left as it is.
-
-    Raises
-    ------
-    InputError
-        If JAX holds arrays of single precision that were made before. Programs compiled before are
-        no harm: JAX compiles them again.
+    Raises InputError if JAX holds arrays of single precision that were made before.
     """
     import jax
 
@@ -48,11 +37,7 @@ def set_up() -> None:
 
 
 def _keep_developers_messages(jax) -> None:
-    """Keep from standard error what XLA and JAX write there for those who build them.
-
-    Such as alarms of slow compilation, a program of another processor in the cache, an accelerator
-    that nobody asked for. Whoever chose a level gets what they asked for.
-    """
+    """Keep developers' messages of XLA and JAX from standard error by default."""
     by_jax = jax.config.jax_logging_level not in (None, "NOTSET")
     # JAX itself sets the level of XLA to 1 where nobody did
     if not by_jax and os.environ.get("TF_CPP_MIN_LOG_LEVEL", "1") == "1":

@@ -13,11 +13,7 @@ _read: dict[tuple[int, int], str] | None = None
 
 @contextmanager
 def inputs_kept() -> Iterator[None]:
-    """Have every file that is read while the context lasts kept as it is.
-
-    A session in Python reads and writes one folder again and again, and knows what it does; so this
-    holds for commands.
-    """
+    """Keep every file that a command reads from being written over while the context lasts."""
     global _read
     before, _read = _read, {}
     try:
@@ -33,13 +29,7 @@ def note_input(path: str | Path, status: os.stat_result) -> None:
 
 
 def require_not_read(path: str | Path, status: os.stat_result) -> None:
-    """Refuse to replace or remove a file that this command has read.
-
-    Raises
-    ------
-    InputError
-        If it is one, by whatever name.
-    """
+    """Raise InputError if a file to be replaced or removed was read by this command."""
     source = (_read or {}).get((status.st_dev, status.st_ino))
     # the number of a file that is gone may be given to another
     if source is not None and os.path.exists(source) and os.path.samefile(source, path):

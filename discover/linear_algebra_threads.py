@@ -1,4 +1,4 @@
-"""One thread for each product of matrices, while many small ones are wanted."""
+"""Linear algebra in one thread, while many small products are wanted."""
 
 import os
 from collections.abc import Callable
@@ -13,11 +13,9 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 def in_one_thread(function: _Function) -> _Function:
     """Return a function that runs with linear algebra in the thread that calls it.
 
-    OpenBLAS lets a thread for each core spin while it waits for the next product. The matrices here
-    have some hundred rows, and trials run side by side in threads of their own: a product then
-    takes up to thirty times the processor, and the search around it waits for it. Afterwards all is
-    as it was, and a number of threads that the user chose in the environment stays as it is.
-    OpenBLAS takes a number from the main thread only, so elsewhere the function runs as it would.
+    OpenBLAS threads spin while they wait: with matrices of some hundred rows and trials side by
+    side a product takes up to thirty times the processor. A number of threads chosen in the
+    environment stays. OpenBLAS takes a number from the main thread only.
     """
 
     @wraps(function)

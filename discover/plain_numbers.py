@@ -1,4 +1,4 @@
-"""Real numbers that a caller gives: text, truth values and complex numbers are none."""
+"""Numbers that a caller gives, and results as plain JSON."""
 
 import json
 from collections.abc import Mapping
@@ -12,21 +12,10 @@ from discover.errors import InputError
 
 
 def as_numbers(name: str, value: Any, finite: bool = True) -> np.ndarray:
-    """Return real numbers as an array of any shape.
+    """Return real numbers, or sequences of them, as an array of any shape.
 
-    Parameters
-    ----------
-    name
-        Of the argument, for the message.
-    value
-        A number, an array, or sequences of numbers.
-    finite
-        Whether they have to be finite.
-
-    Raises
-    ------
-    InputError
-        If it, or something in it, is no such number.
+    Text, truth values and complex numbers are none. Raises InputError, which names `name`, if it or
+    something in it is no such number, or not `finite`.
     """
     try:
         given = np.asarray(value)
@@ -98,13 +87,7 @@ def json_text(content: Any) -> str:
 
 
 def parse_json(content: bytes) -> Any:
-    """Return what JSON of bounded size, depth and number of values holds.
-
-    Raises
-    ------
-    ValueError
-        If it is no JSON, nested too deeply, or holds more values than any result does.
-    """
+    """Return what JSON of bounded size, depth and number of values holds, else raise ValueError."""
     containers, values = content.count(b"[") + content.count(b"{"), content.count(b",")
     if containers > _MOST_CONTAINERS or values > _MOST_VALUES:
         raise ValueError(f"more than {_MOST_CONTAINERS} lists or {_MOST_VALUES} values")

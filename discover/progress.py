@@ -1,4 +1,4 @@
-"""One shape of progress, for everything that takes long."""
+"""Progress of everything that takes long."""
 
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +28,7 @@ def checked(progress: Progress | None) -> Progress | None:
 
 
 class Stopped(BaseException):
-    """What ends work that nobody waits for any more; no error, so that nothing takes it for one."""
+    """End of work that nobody waits for any more; no error, so that nothing takes it for one."""
 
 
 _stop: ContextVar[Event | None] = ContextVar("stop", default=None)
@@ -52,14 +52,7 @@ def require_wanted() -> None:
 
 
 def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callable[[str], Progress]:
-    """Return what gives each part of a task the progress of its share.
-
-    Parameters
-    ----------
-    shares
-        Of the time that the task takes, by part, in the order in which they run; relative to each
-        other. Time left is told from the fraction done, so they are measured, not guessed.
-    """
+    """Return what gives each part of a task the progress of its measured share of the time."""
     total, begins, at = sum(shares.values()), {}, 0.0
     for name, share in shares.items():
         begins[name], at = at / total, at + share
@@ -75,9 +68,9 @@ def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callabl
 def by_time(
     progress: Progress | None, clock: Callable[[], float] = time.perf_counter
 ) -> Callable[..., None]:
-    """Return what passes on lines with the seconds still to come, as the fraction of all time.
+    """Return what passes on lines with the seconds to come, as the fraction of all time.
 
-    While the seconds are not known, None, a fraction stands in their place. It never falls.
+    It never falls. While the seconds are not known (None), a fraction stands in their place.
     """
     begun = progress.begun if isinstance(progress, FollowedBy) else clock()
     largest = 0.0
@@ -120,10 +113,7 @@ class FollowedBy:
 
 
 def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:
-    """Return what passes lines on, each as one of about so many.
-
-    How many there will be is not known beforehand, so the fraction stays below 0.95.
-    """
+    """Return what passes lines on, each as one of about so many; the fraction stays below 0.95."""
     lines = 0
 
     def say(line: str) -> None:
@@ -135,10 +125,7 @@ def by_lines(progress: Progress | None, expected: int) -> Callable[[str], None]:
 
 
 def by_steps(progress: Progress | None) -> Callable[[int, int, float], None]:
-    """Return what passes on steps of at most so many, with their loss.
-
-    Of trainings one after another, the fraction is the largest so far.
-    """
+    """Return what passes on steps of at most so many, with their loss; the fraction never falls."""
     largest = 0.0
 
     def say(step: int, total: int, loss: float) -> None:
@@ -156,8 +143,7 @@ _registered: list[Callable[[], object]] = []
 def on_stop(callback: Callable[[], object]) -> Iterator[None]:
     """Have a function called if the program is stopped while the context lasts.
 
-    Whatever decides to stop the program calls `run_stop_callbacks`, from a thread of its own.
-    Nothing is called if the context ends by itself.
+    Whatever stops the program calls `run_stop_callbacks`, from a thread of its own.
     """
     _registered.append(callback)
     try:

@@ -1,4 +1,4 @@
-"""Results that are constants with intervals: as a table, as intervals, as a figure."""
+"""Views of results that are constants with intervals: table, intervals, figure."""
 
 import html
 from abc import ABC, abstractmethod
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import pandas as pd
 from scipy.stats import norm
@@ -15,7 +15,7 @@ from discover.errors import InputError
 
 
 class NotebookView:
-    """A result that shows itself in a notebook; a class says with `_shown` of which parts."""
+    """Result that shows itself in a notebook; a class says with `_shown` of which parts."""
 
     def _shown(self) -> Iterable[Any]:
         """Return sentences, tables and other results, in the order in which they are shown."""
@@ -43,14 +43,7 @@ class SentenceAndTable(NotebookView, ABC):
 
 
 def as_html(part: Any) -> str:
-    """Return one part of a view as HTML; text is escaped.
-
-    Parameters
-    ----------
-    part
-        A sentence, a table, or what has a ``_repr_html_`` of its own. An empty table or sentence
-        gives nothing, and so does a column without any entry.
-    """
+    """Return a sentence (escaped), table or view as HTML; nothing of what is empty."""
     if isinstance(part, str):
         return f"<p>{html.escape(part)}</p>" if part else ""
     if not isinstance(part, pd.DataFrame):
@@ -65,38 +58,19 @@ def as_html(part: Any) -> str:
         )
 
 
-@runtime_checkable
-class HasLine(Protocol):
-    """A result that is one line of a table of its kind."""
-
-    def line(self) -> Mapping[str, Any]:
-        """Return the columns of the line."""
-        ...
-
-
-def table_of(results: Sequence[HasLine]) -> pd.DataFrame:
-    """Return results of one kind as a table, one line each."""
+def table_of(results: Sequence[Any]) -> pd.DataFrame:
+    """Return results of one kind as a table, by their `line()`."""
     return pd.DataFrame([dict(result.line()) for result in results])
 
 
 class PageView:
-    """A result with a page in the report; a class says with `_page` who writes it."""
+    """Result with a page in the report; a class says with `_page` who writes it."""
 
     _page: ClassVar[str]
     """Module and function, with a colon between: from the result to the text of the page."""
 
     def to_html(self, path: str | Path) -> Path:
-        """Write the report on this result as one self-contained file.
-
-        Parameters
-        ----------
-        path
-            The file, such as ``comparison.html``; replaced if it is there.
-
-        Returns
-        -------
-        The file.
-        """
+        """Write the report on this result as one self-contained file, replaced if it is there."""
         # the report stands above the results that it shows, and brings matplotlib with it: it is
         # named here, and loaded only when somebody wants a page
         module, _, function = self._page.partition(":")
@@ -114,22 +88,11 @@ _HALF_95 = float(norm.ppf(0.975))
 
 @dataclass(frozen=True)
 class Estimate:
-    """A constant that a fit gave.
+    """Constant that a fit gave.
 
-    Attributes
-    ----------
-    key
-        Its names in the index of a summary, one for each level.
-    value
-        In its unit.
-    ci95
-        95 % interval, in the same unit; None where there is none.
-    unit
-        ``"1"`` for a dimensionless one.
-    error
-        Standard error; None for that of a normal distribution with this interval.
-    notes
-        Further columns of a summary.
+    `key`: its names in the index of a summary. `ci95`: None where there is none. `unit`: ``"1"`` if
+    dimensionless. `error`: standard error; None for that of a normal distribution with this
+    interval. `notes`: further columns of a summary.
     """
 
     key: tuple[str, ...]
@@ -147,13 +110,7 @@ class Estimate:
         return 0.5 * (self.ci95[1] - self.ci95[0]) / _HALF_95
 
     def interval(self, level: float) -> tuple[float, float] | tuple[None, None]:
-        """Return the interval of another probability: each side as far as a normal one's.
-
-        Parameters
-        ----------
-        level
-            Probability, between 0 and 1.
-        """
+        """Return the interval of another probability: each side as far as a normal one's."""
         if self.ci95 is None:
             return None, None
         share = float(norm.ppf(0.5 + 0.5 * level)) / _HALF_95
@@ -162,10 +119,7 @@ class Estimate:
 
 
 class SummaryView(NotebookView):
-    """A result with constants; a class says with `_estimates` which, and with `_figure` who draws.
-
-    Of an estimator these are the terms of its law.
-    """
+    """Result with constants; a class says with `_estimates` which, and with `_figure` who draws."""
 
     _index: ClassVar[tuple[str, ...]] = ("constant",)
     """Names of the levels of the index."""
@@ -183,10 +137,8 @@ class SummaryView(NotebookView):
     def summary(self) -> pd.DataFrame:
         """Return the constants, one line each: value, standard error, 95 % interval, unit, notes.
 
-        Returns
-        -------
-        Columns ``value``, ``standard_error``, ``low``, ``high``, ``unit``, and what there is to say
-        of each, such as whether it is ``determined``.
+        Columns ``value``, ``standard_error``, ``low``, ``high``, ``unit``, and notes such as
+        ``determined``.
         """
         estimates = self._estimates()
         index = self._index_of(estimates)
@@ -198,17 +150,7 @@ class SummaryView(NotebookView):
     def conf_int(self, level: float = 0.95) -> pd.DataFrame:
         """Return confidence intervals of the constants, columns ``low`` and ``high``.
 
-        They hold if the law is right: see ``summary`` for how well it describes the runs.
-
-        Parameters
-        ----------
-        level
-            Probability, between 0 and 1.
-
-        Raises
-        ------
-        InputError
-            If `level` is none.
+        They hold if the law is right: see ``summary``. Raises InputError unless 0 < `level` < 1.
         """
         if isinstance(level, bool) or not isinstance(level, int | float) or not 0.0 < level < 1.0:
             raise InputError(f"level must be a number between 0 and 1; got {level!r}. Try 0.95.")

@@ -61,21 +61,9 @@ def _as_tuple(value: Any) -> Any:
 
 
 def validated(model: type[_Model], content: object, where: str) -> _Model:
-    """Return the model that nested dictionaries and lists hold.
+    """Return the model that nested dictionaries and lists, of TOML or JSON, hold.
 
-    Parameters
-    ----------
-    model
-        What is wanted.
-    content
-        As TOML and JSON give it.
-    where
-        The file, or the place in it, for messages.
-
-    Raises
-    ------
-    InputError
-        If keys are unknown or missing or values are wrong; names all of them.
+    Raises InputError, which names `where`, for all unknown or missing keys and wrong values.
     """
     try:
         return model.model_validate(content)
@@ -215,15 +203,7 @@ def _models(annotation: Any):
 
 
 def require_new_name(name: str, known: Sequence[str], what: str) -> None:
-    """Check a name that is to be registered.
-
-    Parameters
-    ----------
-    known
-        Names that are taken.
-    what
-        What it is to name, in the singular.
-    """
+    """Raise InputError unless a name may be registered: well formed, and not among `known`."""
     if not isinstance(name, str) or not name.isidentifier() or name != name.lower():
         raise InputError(
             f"The name of a {what} must be lower-case letters, digits and underscores; got "

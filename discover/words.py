@@ -1,4 +1,4 @@
-"""Lists and shares as sentences have them, for all rooms."""
+"""Words and numbers as sentences have them."""
 
 import difflib
 import math
@@ -41,8 +41,7 @@ def p_value(probability: float) -> str:
 def nearest(given: object, known: Iterable[str]) -> str | None:
     """Return what is spelled most like a text; None where nothing is.
 
-    Capitals do not count, nor do an ending of files in common and the order of words, and a hyphen
-    or a blank is an underscore.
+    Capitals, a common ending of files, hyphens for underscores and the order of words do not count.
     """
     # of a longer text no name is meant, and difflib would take minutes
     wanted = _plain(str(given)[:_LONGEST])
@@ -70,18 +69,9 @@ def did_you_mean(given: object, known: Iterable[str]) -> str:
 
 
 def unknown_name(what: str, given: object, known: Iterable[str], owner: str = "") -> str:
-    """Return what is said of a name that nobody knows: what was got, meant, and may be written.
+    """Return what is said of an unknown name: what was got, meant, and may be written.
 
-    Parameters
-    ----------
-    what
-        What it was to name, in the singular.
-    given
-        The name.
-    known
-        Names that would do.
-    owner
-        What has no such thing, as the subject of a sentence: 'The law giesekus'.
+    `what`: what it was to name, in the singular. `owner`: what has no such thing, as a subject.
     """
     names = list(known)
     text = str(given)
@@ -157,10 +147,7 @@ _EFFECTS = {
 
 
 def effect_title(name: str) -> str:
-    """Return an effect as readers know it: its name in words, or its term in the field's letters.
-
-    Studies and JSON keep the name itself.
-    """
+    """Return an effect as readers know it: its name in words, or its term in letters."""
     if "sigma" in name or "gammadot" in name:
         return readable(name)
     return _EFFECTS.get(name, name.replace("_", " "))
@@ -173,10 +160,7 @@ def effects_title(names: Sequence[str], bench: Collection[str] = ()) -> str:
 
 
 def interval(bounds: Sequence[float | None] | None) -> str:
-    """Return an interval with as many digits as tell two of its width; a dash where none is known.
-
-    An interval of which an end is not known is none.
-    """
+    """Return an interval with as many digits as tell two of its width; a dash without two ends."""
     low, high = bounds or (None, None)
     if low is None or high is None or math.isnan(low) or math.isnan(high):
         return "–"

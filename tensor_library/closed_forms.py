@@ -1,8 +1,7 @@
-"""Scalar functions of the invariants that no polynomial of low degree replaces.
+"""Closed-form scalar multipliers of terms, and the registry of named things.
 
-Each has one inner parameter, which enters nonlinearly and so is fitted apart from the
-coefficients. All vanish at zero stress, so that a term keeps the small-strain limit of the law
-it is added to. Forms of a user's own are registered (see docs/adding-a-term.md).
+Each has one inner parameter, fitted apart from the coefficients, and vanishes at zero stress. For a
+user's own see docs/adding-a-term.md.
 """
 
 import math
@@ -27,8 +26,8 @@ class ExtensionWarning(UserWarning):
 class Registry(MutableMapping[str, T]):
     """Things of one kind by name, in the order in which they became known.
 
-    `kind`: what they are, in the singular, for messages. `group`: group of entry points that bring
-    more of them, such as ``"discover.laws"``. `built_in`: makes those that are always there.
+    `kind`: the singular, for messages. `group`: entry points that bring more, such as
+    ``"discover.laws"``. `built_in`: makes those that are always there.
     """
 
     def __init__(self, kind: str, group: str, built_in: Callable[[], Mapping[str, T]]):
@@ -114,30 +113,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A scalar function of tr σ with one inner parameter.
+    """Scalar function of tr σ with one inner parameter.
 
     Attributes
     ----------
-    name
-        Key under which a library description asks for it.
-    spelling
-        Canonical text, used in reports and JSON.
+    name, spelling
+        Key in a library description, and canonical text.
     inner_name, inner_default, inner_bounds
-        The inner parameter, the value a fit starts from, and where it is admissible.
+        Inner parameter, where a fit starts, and its admissible range.
     function
-        ``f(trace_of_stress, inner)``: of the dimensionless trace and one number, both of shape (),
-        in jax.numpy.
+        ``f(trace_of_stress, inner)``, dimensionless, both of shape (), in jax.numpy.
     complexity
-        Number of operations, as a measure of how much the form costs in model selection.
+        Number of operations, for model selection.
     source
-        Where the form comes from.
+        Literature.
     expression
-        The same as `function`, of SymPy symbols: from it the form is written in any notation. None
-        for a form that is built in, which every notation knows.
+        `function` of SymPy symbols; None for a built-in form.
 
     Examples
     --------
-    >>> from tensor_library import CLOSED_FORMS
     >>> CLOSED_FORMS["exp"].spelling
     '(exp(epsilon*tr(sigma))-1)'
     """
@@ -196,28 +190,19 @@ _SPELLING = re.compile(r"\([a-z0-9_+\-*/^().]*tr\(sigma\)[a-z0-9_+\-*/^().]*\)")
 
 
 def register_closed_form(form: ClosedForm) -> ClosedForm:
-    """Make a closed form of one's own known to libraries, studies and exports in this process.
+    """Make a closed form of one's own, with its `expression`, known in this process.
 
     An installed package does so in every process: see docs/adding-a-term.md.
-
-    Parameters
-    ----------
-    form
-        With its `expression`.
-
-    Returns
-    -------
-    The form.
 
     Raises
     ------
     ValueError
-        If its name, spelling or inner parameter is taken or cannot be written, its default is out
-        of bounds, it does not vanish at zero stress, or `function` and `expression` differ.
+            If its name, spelling or inner parameter is taken or cannot be written, its default is
+        out of
+        bounds, it does not vanish at zero stress, or `function` and `expression` differ.
 
     Examples
     --------
-    >>> from tensor_library import register_closed_form
     >>> register_closed_form(form)  # doctest: +SKIP
     """
     known = CLOSED_FORMS.present

@@ -1,4 +1,4 @@
-"""An isotropic tensor function written out, so that a law that is no sum of terms can leave too."""
+"""Isotropic tensor functions written out, for laws that are no sums of terms."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -31,20 +31,15 @@ def scalars(*names: str) -> Any:
 
 @dataclass(frozen=True)
 class IsotropicFunction:
-    """h = Σ gₙ Tₙ(σ, γ̇), with each gₙ an expression in the invariants and in constants.
+    """h = Σ gₙ Tₙ(σ, γ̇), with each gₙ an expression in invariants and constants.
 
-    `coefficients`: gₙ by the name of the tensor in `TENSOR_NAMES`, SymPy expressions over
-        `scalars`.
-    `where`: scalars defined on the way, in order, each over what stands before it.
-    `letters`: LaTeX of those constants and scalars whose names are no letters.
-    `rates`: of each structure variable of the law by its name, in the order of the law's state: its
-        rate of change over 1/λ, over `scalars`, the variables and what is defined on the way.
-
-    Raises ValueError if there is no such tensor, or a name is none that a program could have.
+    `coefficients`: gₙ by tensor of `TENSOR_NAMES`, over `scalars`. `where`: scalars defined on the
+    way, in order. `letters`: LaTeX of constants whose names are no letters. `rates`: of each
+    structure variable in the order of the state, over 1/λ. Raises ValueError if a tensor or name is
+    unusable.
 
     Examples
     --------
-    >>> from tensor_library.isotropic_function import IsotropicFunction, scalars
     >>> IsotropicFunction({"sigma": scalars("epsilon") * scalars("tr(sigma)")}).constants
     ('epsilon',)
     """
@@ -78,8 +73,7 @@ class IsotropicFunction:
     ) -> tuple[list[tuple[str, T]], list[T]]:
         """Return what is defined on the way, by name, and the summands of h, in a notation.
 
-        `notation`: how to write it. `letters`: how the constants, the structure variables and the
-        scalars defined on the way are written.
+        `letters`: how constants, structure variables and defined scalars are written.
         """
         known = _with_invariants(notation, letters)
         defined = [(name, notation.scalar(one, known)) for name, one in self.where.items()]
@@ -95,10 +89,7 @@ class IsotropicFunction:
         return defined, summands
 
     def spell_rates(self, notation: Notation[T], letters: Mapping[str, T]) -> list[tuple[str, T]]:
-        """Return the rate of change of each structure variable over 1/λ, by its name.
-
-        Parameters as in `spell`.
-        """
+        """Return the rate of change of each structure variable over 1/λ, as `spell` does."""
         known = _with_invariants(notation, letters)
         return [(name, notation.scalar(one, known)) for name, one in self.rates.items()]
 

@@ -1,8 +1,7 @@
 """Kinematics of homogeneous flows.
 
-A velocity gradient is stored in one of three ways: the scalar shear rate of simple shear, which
-costs least; the four components (L11, L22, L33, L12) of a flow whose third axis is principal, which
-holds shear, every extension and both at once; and the full (3, 3) tensor.
+A velocity gradient is the scalar shear rate; the four components (L11, L22, L33, L12) of a flow
+whose third axis is principal; or the full (3, 3) tensor.
 """
 
 import jax.numpy as jnp
@@ -18,8 +17,6 @@ def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
 
     Examples
     --------
-    >>> import jax.numpy as jnp
-    >>> from tensor_library import simple_shear
     >>> simple_shear(jnp.asarray(2.0))[0].tolist()
     [0.0, 2.0, 0.0]
     """
@@ -31,8 +28,6 @@ def uniaxial_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
 
     Examples
     --------
-    >>> import jax.numpy as jnp
-    >>> from tensor_library import uniaxial_extension
     >>> jnp.diag(uniaxial_extension(jnp.asarray(2.0))).tolist()
     [2.0, -1.0, -1.0]
     """
@@ -44,8 +39,6 @@ def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
 
     Examples
     --------
-    >>> import jax.numpy as jnp
-    >>> from tensor_library import planar_extension
     >>> jnp.diag(planar_extension(jnp.asarray(2.0))).tolist()
     [2.0, -2.0, 0.0]
     """
@@ -53,18 +46,10 @@ def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
 
 
 def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
-    """Return γ̇ = L + Lᵀ.
-
-    Parameters
-    ----------
-    velocity_gradient
-        L in 1/s, or dimensionless, shape (3, 3); its components 11, 22, 33, 12, where no other is
-        there; or the scalar shear rate of simple shear.
+    """Return γ̇ = L + Lᵀ, of L in any of its three forms, in 1/s or dimensionless.
 
     Examples
     --------
-    >>> import jax.numpy as jnp
-    >>> from tensor_library import rate_of_deformation
     >>> rate_of_deformation(jnp.asarray(2.0)).tolist()  # of simple shear: 11, 22, 33, 12
     [0.0, 0.0, 0.0, 2.0]
     """
@@ -78,23 +63,13 @@ def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
 
 
 def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
-    """Return L·σ + σ·Lᵀ, the change of stress in a flow that carries the material lines along.
+    """Return L·σ + σ·Lᵀ, what the upper convected derivative subtracts from dσ/dt [Oldroyd 1950].
 
-    This is what the upper convected derivative subtracts from dσ/dt   [Oldroyd 1950].
-
-    Parameters
-    ----------
-    stress
-        σ, shape (3, 3), or its four components 11, 22, 33, 12.
-    velocity_gradient
-        As in `rate_of_deformation`: shape (3, 3) for a full σ, else (4,) or (), in 1/s or
-        dimensionless.
+    `stress`: (3, 3) with a full L, else four components with (4,) or () of L.
 
     Examples
     --------
-    >>> import jax.numpy as jnp
-    >>> from tensor_library import upper_convected_production
-    >>> stress, rate = jnp.asarray([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
+    >>> stress, rate = jnp.array([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
     >>> upper_convected_production(stress, rate).tolist()  # σ11 grows with 2 γ̇ σ12
     [12.0, 0.0, 0.0, 0.0]
     """

@@ -1,4 +1,4 @@
-"""A law as a sum of terms: one term with its coefficient, and the whole sum over a library."""
+"""Laws as sums of terms: one term with its coefficient, and the sum over a library."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
@@ -22,14 +22,13 @@ class LawTerm:
     Attributes
     ----------
     term
-        Its spelling, as `parse_term` reads it; kept in its canonical form.
+        Canonical spelling.
     coefficient
         c, dimensionless.
     inner
-        Inner parameters of a closed form by name, dimensionless; the form's default is put in where
-        one is missing, so that every format writes the same number.
+        Inner parameters of a closed form by name; the form's default where one is missing.
     ci95
-        95 % interval of c, or None where c was declared or the interval not computed.
+        95 % interval of c; None where declared or not computed.
 
     Raises
     ------
@@ -38,7 +37,6 @@ class LawTerm:
 
     Examples
     --------
-    >>> from tensor_library import LawTerm
     >>> LawTerm("(exp(epsilon*tr(sigma))-1)*sigma", 1.0, {"epsilon": 0.3}).inner
     {'epsilon': 0.3}
     """
@@ -81,18 +79,13 @@ class LawTerm:
 
 @dataclass(frozen=True)
 class LawTerms:
-    """A sum of terms as a library holds it: each once, and one value of each inner parameter.
+    """Sum of terms as a library holds it: each once, one value of each inner parameter.
 
-    Attributes
-    ----------
-    coefficients
-        Canonical spelling → coefficient, dimensionless; empty for h = 0.
-    inner
-        Inner parameters of closed forms by name, dimensionless.
+    `coefficients`: canonical spelling → coefficient; empty for h = 0. `inner`: by name.
+    Dimensionless.
 
     Examples
     --------
-    >>> from tensor_library import LawTerm, LawTerms
     >>> LawTerms.of([LawTerm("sigma.sigma", 0.2)])
     LawTerms(coefficients={'sigma.sigma': 0.2}, inner={})
     """
@@ -104,10 +97,7 @@ class LawTerms:
     def of(cls, terms: Iterable[LawTerm]) -> "LawTerms":
         """Return the sum of these terms.
 
-        Raises
-        ------
-        ValueError
-            If a term stands there twice, or an inner parameter has two values.
+        Raises ValueError if a term stands there twice, or an inner parameter has two values.
         """
         coefficients: dict[str, float] = {}
         inner: dict[str, float] = {}
@@ -146,10 +136,7 @@ class LawTerms:
         )
 
     def over(self, library: TermLibrary) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " m"]]:
-        """Return coefficients over a library that holds the terms, and its inner parameters.
-
-        A form's default where the sum has no value of its inner parameter.
-        """
+        """Return coefficients over a library that holds the terms, and its inner parameters."""
         coefficients = np.zeros(len(library))
         for name, value in self.coefficients.items():
             coefficients[library.names.index(name)] = value

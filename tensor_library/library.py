@@ -1,4 +1,4 @@
-"""Libraries of candidate terms, built from a short description."""
+"""Libraries of candidate terms."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -25,18 +25,10 @@ N_INVARIANTS = len(INVARIANT_NAMES)
 
 @dataclass(frozen=True)
 class TermLibrary:
-    """An ordered set of candidate terms, evaluated together.
-
-    Hashable, so that it can be a static field of a JAX module.
-
-    Attributes
-    ----------
-    terms
-        The candidate terms, without repetition.
+    """Ordered set of candidate terms without repetition, evaluated together; hashable.
 
     Examples
     --------
-    >>> from tensor_library import TermLibrary, parse_term
     >>> library = TermLibrary((parse_term("sigma"), parse_term("sigma.sigma")))
     >>> library.names
     ('sigma', 'sigma.sigma')
@@ -141,19 +133,15 @@ class TermLibrary:
     def evaluate(
         self, stress: Symmetric, rate: Symmetric, inner: Float[Array, " m"] | None = None
     ) -> Float[Array, "n 3 3"] | Float[Array, "n 4"]:
-        """Return the value of every term at one state.
+        """Return the value of every term at one state, shape (n, 3, 3) or (n, 4).
 
         Parameters
         ----------
         stress, rate
-            Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
+            Dimensionless, both of shape (3, 3) or (4,).
         inner
-            Inner parameters in the order of `inner_names`, dimensionless, shape (n_inner,); their
-            defaults if None.
-
-        Returns
-        -------
-        Shape (n, 3, 3) or (n, 4).
+                In the order of `inner_names`, dimensionless, shape (n_inner,); by default the
+            forms' own.
         """
         levels, monomial_of_term, form_of_term, tensor_of_term = self._layout
         invariants = scalar_invariants(stress, rate)
@@ -184,17 +172,14 @@ def build_library(
 
     Parameters
     ----------
-    tensors
-        Canonical names from `TENSOR_NAMES`.
+    tensors, invariants
+            From `TENSOR_NAMES` and `INVARIANT_NAMES`; by default all invariants that can differ
+        from zero
+        in simple shear (tr γ̇³ vanishes there).
     degree
         Highest total degree of the invariant multipliers, 0 to 4.
-    closed_forms
-        Keys of `CLOSED_FORMS`, each multiplied with every tensor of `closed_form_tensors`.
-    invariants
-        Canonical names from `INVARIANT_NAMES`; by default all that can differ from zero in
-        simple shear (tr γ̇³ vanishes there, and no shear experiment can see it).
-    closed_form_tensors
-        Tensors that the closed forms multiply.
+    closed_forms, closed_form_tensors
+        Keys of `CLOSED_FORMS`, each multiplied with every one of these tensors.
     extra
         Further terms in canonical spelling, such as ``tr(sigma)*sigma``.
 
@@ -205,7 +190,6 @@ def build_library(
 
     Examples
     --------
-    >>> from tensor_library import build_library
     >>> len(build_library(degree=0)), len(build_library(degree=1, closed_forms=["exp"]))
     (8, 65)
     """

@@ -1,4 +1,4 @@
-"""A candidate term: tensor × invariant multipliers × closed-form scalar."""
+"""Candidate terms: tensor × invariant multipliers × closed-form scalar."""
 
 import re
 from collections.abc import Mapping
@@ -41,7 +41,6 @@ class CandidateTerm:
 
     Examples
     --------
-    >>> from tensor_library import CandidateTerm
     >>> CandidateTerm(tensor=1, powers=(1, 0, 0, 0, 0, 0, 0, 0)).name
     'tr(sigma)*sigma'
     """
@@ -112,10 +111,10 @@ class CandidateTerm:
         Parameters
         ----------
         stress, rate
-            Dimensionless stress and rate of deformation, both (3, 3) or both (4,).
+            Dimensionless, both of shape (3, 3) or (4,).
         inner
-            Inner parameters by name, dimensionless, of shape (); the form's default where one is
-            missing.
+                Inner parameters by name, dimensionless, of shape (); the form's default where one
+            is missing.
         """
         invariants = scalar_invariants(stress, rate)
         value = integrity_basis(stress, rate)[self.tensor]
@@ -142,7 +141,7 @@ class CandidateTerm:
         notation
             How to write it.
         coefficient
-            Number in front; none if None.
+            Number in front, if any.
         inner
             Inner parameters by name; one that is missing stays a letter.
         """
@@ -177,17 +176,9 @@ class CandidateTerm:
 
 
 def parse_term(name: str) -> CandidateTerm:
-    """Return the term with this canonical spelling.
+    """Return the term with this canonical spelling, which is matched, never evaluated.
 
-    Parameters
-    ----------
-    name
-        Such as ``sigma``, ``tr(sigma)*sigma`` or ``(exp(epsilon*tr(sigma))-1)*sigma``.
-
-    Raises
-    ------
-    ValueError
-        If the text is not a canonical spelling. The text is matched, never evaluated.
+    Raises ValueError if the text is none.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""What a posterior predicts of any flow: σ12, N1 and N2 with their 95 % bands."""
+"""Predictions of a posterior in any flow: σ12, N1 and N2 with their 95 % bands."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -46,10 +46,7 @@ _SEED = 20261128
 class Band:
     """σ12 (or what is recorded), N1 and N2 of one flow with their 95 % bands, in Pa.
 
-    Attributes
-    ----------
-    middle, low, high
-        By quantity, shape (n,); not finite where no claim can be made.
+    By quantity, shape (n,); not finite where no claim can be made.
     """
 
     middle: Mapping[str, Float[np.ndarray, " n"]]
@@ -90,16 +87,10 @@ class _Part:
 def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> dict[str, Band]:
     """Return the band of each flow, by its key; those in which most hypotheses diverge have none.
 
-    Hypotheses are weighed by their evidence, their constants drawn. Where none is all there is, all
-    that describe the runs as well count, N1 and N2 may differ as these do, every stress is missed
-    by what runs left out are, in proportion to the rate beyond the fastest, and N2 is as likely
-    anything from −2/7 N1 to zero. Measured runs are predicted as recorded, flaws of the instrument
-    included, other flows for the fluid alone.
-
-    Parameters
-    ----------
-    runs
-        Runs as recorded, by name.
+    Hypotheses are weighed by evidence, constants drawn. Where none is all there is, all that
+    describe the runs as well count, every stress is missed as runs left out are (more beyond the
+    fastest rate), and N2 is as likely anything from −2/7 N1 to zero. Runs are predicted as
+    recorded, other flows for the fluid alone. `runs`: as recorded, by name.
     """
     parts = _parts(found)
     if not parts or not flows:
@@ -242,10 +233,7 @@ def _band(
 
 
 def _missed(found: Found, fit: Fit, run: Run) -> float:
-    """Return the deviation, over its size, by which a run may be missed.
-
-    It is that of runs left out of the law relied on, by more for laws that describe the runs worse.
-    """
+    """Return the deviation, over its size, by which a run may be missed, from runs left out."""
     posterior = found.posterior
     best = fit if posterior.left is None else posterior.left.fit
     missed, fastest = posterior.missed(best), posterior.problem.fitted.fastest

@@ -12,8 +12,7 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
 from discover.forward import DeclaredModel, make_batch
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
-from discover.laws import LAWS
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import LAWS, UpperConvectedMaxwell
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found
 from discover.loop.task import with_law
@@ -27,12 +26,10 @@ _STARTS = (0.03, 0.3)
 
 @dataclass(frozen=True)
 class ClassicalFit:
-    """A classical law fitted to the training runs, with the effects of the instrument found.
+    """Classical law fitted to the training runs, with the effects of the instrument found.
 
-    `misfit`: relative misfit of the fitted runs, mean over runs; None where it cannot be
-        integrated.
-    `criterion`: −2 times the log evidence, above that of the best of these laws; None likewise.
-    `errors`: relative errors of what is recorded by flow, in flows that no fit saw.
+    `misfit`: relative, mean over runs. `criterion`: −2 log evidence above the best of these laws.
+    Both None where it cannot be integrated. `errors`: relative, by flow that no fit saw.
     """
 
     law: str  # key of `LAWS`
@@ -61,12 +58,9 @@ class ClassicalFit:
 def fit_classical_laws(
     found: Found, frame: Frame, further: Sequence[str] = ()
 ) -> tuple[ClassicalFit, ...]:
-    """Fit the classical laws to the training runs and judge them in flows that no fit saw.
+    """Fit the classical laws, and `further` ones, to the training runs; test them in other flows.
 
     The declared law is set aside; modes, solvent and known effects stay.
-
-    `found`: the search among hypotheses, whose runs are fitted. `frame`: the flows that judge.
-    `further`: names of more laws.
     """
     judged = [flow for flow in frame.shown if flow.kind in ("held_out", "test")]
     best = found.posterior.fits[0][0] if found.posterior.fits else None

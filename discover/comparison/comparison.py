@@ -1,4 +1,4 @@
-"""The result of comparing two learners on identical data."""
+"""Result of comparing learners on identical data."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -33,10 +33,7 @@ _VERDICTS: Mapping[str, FitVerdict] = {
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One data set of a sweep over laws and a parameter.
-
-    `law`, `parameter`, `value`: what made the data.
-    """
+    """Data set of a sweep over laws and a parameter."""
 
     law: str
     parameter: str
@@ -69,31 +66,31 @@ class Comparison(PageView, HasAnswer, SummaryView):
     outcomes
         By learner.
     posterior
-        What a search among laws, effects and terms and the learners' proposals say together.
+        Of the search among laws, effects and terms with the learners' proposals.
     bands
-        What the posterior predicts with its 95 % band, by the key of the flow.
+        Predictions of the posterior with their 95 % bands, by the key of the flow.
     shares
-        Probability of each learner's law among all that were fitted, were one of them all there is.
+        Probability of each learner's law among all fitted, were one of them all there is.
     lack_of_fit
-        What each learner's law leaves of the training runs.
+        Of each learner's law to the training runs.
     truth
-        The terms a perfect learner would find, or None.
+        Terms that a perfect learner would find, or None.
     noise
         Relative noise of synthetic data, or None.
     rivals, statements
         What the data do not determine.
     structure
-        What the training flows can determine of the library; None where that was not asked.
+        What the training flows can determine of the library; None where not asked.
     classical
-        The classical laws fitted to the same runs.
+        Classical laws fitted to the same runs.
     sweep
         The same again over a parameter.
     distillations
         What simpler laws learn from the true one, JSON-able rows.
     seed
-        Seed of the learners.
+        Of the learners.
     known
-        The known part as an equation; None where it cannot be written out.
+        Known part as an equation; None where it cannot be written out.
     known_effects
         Effects of the instrument that the data were corrected for.
     conditions
@@ -212,13 +209,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
         return relative_errors(predictions[flow.key], flow.reference)
 
     def error_map(self, who: str) -> dict[tuple[float, float], dict[str, float | None]]:
-        """Return errors over the Pipkin diagram: (Wi, De) → quantity → relative error.
-
-        Parameters
-        ----------
-        who
-            A learner, or ``"before"``.
-        """
+        """Return errors of a learner, or ``"before"``: (Wi, De) → quantity → relative error."""
         return {
             (flow.amplitude, flow.frequency or 0.0): self.errors(who, flow)
             for flow in self.flows_of("pipkin")

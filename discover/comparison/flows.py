@@ -1,4 +1,4 @@
-"""The flows on which learned laws are looked at, with what is known of the truth in each."""
+"""Flows in which learned laws are compared, with what is known of the truth in each."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,26 +8,17 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_simpson
 
+from discover import protocols
 from discover.dataset.material_functions import as_compared
 from discover.dataset.records.thinning import thin_run, without_spikes
 from discover.dataset.run import Run, sizes_of
 from discover.equations import law_terms
 from discover.errors import InputError
-from discover.laws import make_law
-from discover.laws.multimode import Fluid
+from discover.laws import Fluid, make_law
 from discover.learners.runs import waiting
 from discover.protocols.control import drawn_against
 from discover.protocols.kinematics import STATES
-from discover.protocols.protocol import (
-    TEST_DURATION,
-    TRAINING_DURATION,
-    FlowProtocol,
-    oscillatory_shear,
-    paper_test_protocols,
-    recorded_at,
-    shear_rates,
-    strains_in_table,
-)
+from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strains_in_table
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
@@ -55,20 +46,17 @@ DRAWN: tuple[FlowKind, ...] = ("training", "held_out", "test")
 
 @dataclass(frozen=True)
 class Flow:
-    """A flow, when to look at it, and what is known of the stresses.
+    """Flow, its samples, and what is known of the stresses.
 
-    `times`, `shear_rate`: samples, shape (n,), in s and 1/s.
-    `reference`: the truth where the law is known, the measurement otherwise; not every quantity.
-    `measured`: σ12 that the learners saw, noise included, for training flows.
-    `training_end`: last time of the training series, beyond which a prediction extrapolates in
-        time; or None.
-    `commanded`: the protocol before an instrument that is known changed it, for titles; None where
-        none did.
+    `times`, `shear_rate`: in s and 1/s, shape (n,). `reference`: the truth where the law is known,
+    else the measurement; not every quantity. `measured`: σ12 of training flows, noise included.
+    `training_end`: last time of the training series, or None. `commanded`: the protocol before a
+    known instrument changed it, for titles; None without.
     """
 
     name: str  # name of the run or of the protocol
     kind: FlowKind  # what it is for. Only ``training`` was seen by the learners
-    protocol: FlowProtocol  # the shear rate
+    protocol: protocols.FlowProtocol  # the shear rate
     times: Float[np.ndarray, " n"]
     rate: Float[np.ndarray, " n"]
     reference: Stresses
@@ -76,11 +64,11 @@ class Flow:
     is_truth: bool = False  # whether `reference` is exact and not a measurement
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
-    commanded: FlowProtocol | None = None
+    commanded: protocols.FlowProtocol | None = None
     weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
 
     @property
-    def _imposed(self) -> FlowProtocol:
+    def _imposed(self) -> protocols.FlowProtocol:
         return self.protocol if self.commanded is None else self.commanded
 
     @property
@@ -95,11 +83,7 @@ class Flow:
 
     @property
     def records_shear_stress(self) -> bool:
-        """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
-
-        Else it is the tensile stress, a strain, a modulus, or a normal stress difference that is
-        data of its own.
-        """
+        """Whether σ12 in shear is recorded, beside which N1 and N2 are told."""
         return self.protocol.quantity == "sigma12"
 
     @property
@@ -128,10 +112,7 @@ class Flow:
         return self.drawn[1]
 
     def even(self, record: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-        """Return by what a record and its residual are multiplied so that noise has one size.
-
-        Ones but for a flow curve or a sweep, whose noise is in proportion to each value.
-        """
+        """Return factors that give the noise of a record one size; ones but for curves, sweeps."""
         size = sizes_of(record, self.protocol)
         return np.min(size) / size
 
@@ -151,10 +132,9 @@ class Flow:
 
     @property
     def strain(self) -> Float[np.ndarray, " n"]:
-        """Strain, shape (n,), nan of steady states, which do not know it.
+        """Strain, shape (n,): recorded in creep, amplitude of oscillations, else since the start.
 
-        Where the stress is imposed what was recorded, of oscillations the amplitude, else the
-        strain since the first sample.
+        nan of steady states.
         """
         if self.protocol.control == "steady":
             return np.full(self.times.shape, np.nan)
@@ -168,8 +148,8 @@ class Flow:
     def largest_rate(self) -> float:
         """Largest rate without its sign, in 1/s.
 
-        At a given stress the mean rate of the second half of the record, the samples halved: the
-        slope from sample to sample is of noise.
+        At a given stress the mean over the second half of the samples: slopes between samples are
+        noise.
         """
         if self.records_strain and len(self.times) > 2:
             middle = len(self.times) // 2
@@ -197,29 +177,27 @@ class Flow:
 def comparison_flows(
     data: StudyData, high_deborah: tuple[float, ...], pipkin: Sequence[tuple[float, float]] = ()
 ) -> list[Flow]:
-    """Return the flows of a comparison: training, held out, tests, and where only errors are told.
+    """Return the flows of a comparison: training, held out, and, with a known law, tests.
 
-    All but the first two need a known law.
-
-    `data`: the data of the study. `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi
-    and De of the oscillations over which errors are mapped.
+    `high_deborah`: De of the flows γ̇ = 3 cos(De t). `pipkin`: Wi and De of oscillations over which
+    errors are mapped.
     """
     flows = [run_flow(run, "training", data) for run in data.fit]
     flows += [run_flow(run, "held_out", data) for run in data.held_out]
     truth = data.truth
     if truth is None:
         return flows
-    for name, protocol in paper_test_protocols().items():
+    for name, protocol in protocols.paper_test_protocols().items():
         times = np.linspace(0.0, TEST_DURATION, 401)
         flows.append(_truth_flow(name, "test", protocol, times, truth))
     for deborah in high_deborah:
-        protocol = oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
+        protocol = protocols.oscillatory_shear(HIGH_DEBORAH_AMPLITUDE, deborah)
         times = _late_cycle(deborah)
         flows.append(
             _truth_flow(f"high_deborah_{deborah:g}", "high_deborah", protocol, times, truth)
         )
     for weissenberg, deborah in pipkin:
-        protocol = oscillatory_shear(weissenberg, deborah)
+        protocol = protocols.oscillatory_shear(weissenberg, deborah)
         times = _late_cycle(deborah, samples=61)
         name = f"pipkin_{weissenberg:g}_{deborah:g}"
         flows.append(_truth_flow(name, "pipkin", protocol, times, truth))
@@ -248,40 +226,29 @@ def run_flow(run: Run, kind: FlowKind, data: StudyData) -> Flow:
         reference = {key: value for key, value in candidates.items() if value is not None}
     of_states = run.protocol.control in STATES
     return Flow(
-        run.name,
-        kind,
-        run.protocol,
-        run.time,
-        run.rate,
-        reference,
-        run.recorded if kind == "training" else None,
-        is_truth=exact is not None,
+        run.name, kind, run.protocol, run.time, run.rate, reference,
+        run.recorded if kind == "training" else None, is_truth=exact is not None,
         training_end=float(run.time[-1]) if kind == "training" and not of_states else None,
-        oscillatory=_oscillates(run.protocol, run.rate),
-        weight=run.weight,
-    )
+        oscillatory=_oscillates(run.protocol, run.rate), weight=run.weight,
+    )  # fmt: skip
 
 
 def _truth_flow(name, kind, protocol, times, truth: Fluid) -> Flow:
-    rates = shear_rates(protocol, times)
+    rates = protocols.shear_rates(protocol, times)
     return Flow(
-        name,
-        kind,
-        protocol,
-        times,
-        rates,
-        _exactly(truth, protocol, times),
-        is_truth=True,
+        name, kind, protocol, times, rates, _exactly(truth, protocol, times), is_truth=True,
         training_end=TRAINING_DURATION if kind == "test" else None,
         oscillatory=_oscillates(protocol, rates),
-    )
+    )  # fmt: skip
 
 
-def _exactly(truth: Fluid, protocol: FlowProtocol, times: np.ndarray) -> dict[str, np.ndarray]:
+def _exactly(
+    truth: Fluid, protocol: protocols.FlowProtocol, times: np.ndarray
+) -> dict[str, np.ndarray]:
     return stresses(simulate(truth, protocol, times), protocol)
 
 
-def _oscillates(protocol: FlowProtocol, rates: np.ndarray) -> bool:
+def _oscillates(protocol: protocols.FlowProtocol, rates: np.ndarray) -> bool:
     if protocol.control != "rate":  # the slope of a noisy strain changes its sign at any time
         return False
     changes = np.count_nonzero(np.diff(np.sign(rates[np.abs(rates) > 0])))
@@ -301,10 +268,10 @@ def predict(fluid: Fluid, flow: Flow) -> dict[str, np.ndarray] | None:
         return None
 
 
-def stresses(stress: ShearStress, protocol: FlowProtocol) -> dict[str, np.ndarray]:
+def stresses(stress: ShearStress, protocol: protocols.FlowProtocol) -> dict[str, np.ndarray]:
     """Return the compared quantities of a solution; in extension the tensile stress comes first."""
     return {
-        "sigma12": recorded_at(protocol, stress.components),
+        "sigma12": protocols.recorded_at(protocol, stress.components),
         "N1": stress.first_normal_stress_difference,
         "N2": stress.second_normal_stress_difference,
     }
@@ -347,28 +314,21 @@ def prepared(data: StudyData) -> StudyData:
 
 
 def settled_by(data: StudyData, relaxation_time: float, relaxes: bool) -> StudyData:
-    """Return data in which what starts periodic has the cycles before it that learners wait for.
+    """Return data in which periodic starts have the cycles before them that learners wait for.
 
-    `data`: of a study, split. `relaxation_time`: the longest, in s. `relaxes`: whether the known
-    law relaxes, so that a periodic state is solved for.
+    `relaxation_time`: the longest, in s. `relaxes`: whether the known law does, so that a periodic
+    state is solved for.
     """
     return with_each_run(data, lambda run: waiting(run, relaxation_time, relaxes))
 
 
 def thinned_to(data: StudyData, most: int) -> StudyData:
-    """Return data with at most so many samples of each run, evenly chosen in their order.
-
-    Every sample is a step of the integration, and a record of thousands says little more of a law
-    than its hundreds do. What was thinned says so.
-    """
+    """Return data with at most so many samples of each run, evenly chosen in their order."""
     return with_each_run(data, lambda run: thin_run(run, most))
 
 
 def without_spikes_in_fit(data: StudyData) -> tuple[StudyData, str]:
-    """Return data whose fitted runs lack the samples that stand alone, and words on them.
-
-    Squares would let them bend the law. Those of runs held out stay, and do not judge.
-    """
+    """Return data whose fitted runs lack outliers, and words on them; held-out runs keep theirs."""
     parts = [without_spikes(run) for run in data.fit.runs]
     told = [f"{len(times)} of {run.name}" for run, times in parts if times]
     if not told:
@@ -416,8 +376,8 @@ def true_terms(
 ) -> tuple[LawTerm, ...] | None:
     """Return what is missing from UCM in a named law; None if it is no sum of library terms.
 
-    `known_relaxation`: whether −σ is known. If not, it is missing too. Raises InputError if there
-    is no such law, or a parameter is missing or outside its range.
+    `known_relaxation`: whether −σ is known, else it is missing too. Raises InputError if there is
+    no such law, or a parameter is missing or out of range.
     """
     known = make_law(law, parameters)
     try:

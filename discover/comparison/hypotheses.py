@@ -1,4 +1,4 @@
-"""The posterior of a comparison: a search's hypotheses and what the learners propose, weighed."""
+"""Posterior of a comparison: a search's hypotheses and the learners' proposals, weighed."""
 
 import queue
 from collections.abc import Callable, Mapping, Sequence
@@ -9,8 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from discover.effects import AbstractEffect, ConstitutiveEffect, named_effects
-from discover.effects.library_term import library_term
+from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.learners.results import RecoveredTerm
@@ -20,8 +19,7 @@ from discover.progress import Progress, Stopped, may_be_stopped
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel, forward_model
 from discover.study.schema import Study
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 _EFFECTS = {
     "sigma.sigma": ("giesekus_mobility", 1.0),
@@ -42,11 +40,8 @@ def search_hypotheses(
 ) -> Found:
     """Return the posterior over what a search finds beside the known part.
 
-    Candidates are every effect with a name, of fluid and instrument, and every library term.
-
-    `data`: runs as recorded. `declared`: the known part; what of it is to be fitted is fitted with
-    every hypothesis. `library`: candidate terms of the study. `say`: called with a line of text now
-    and then.
+    Candidates are every named effect, of fluid and instrument, and every library term. What of the
+    known part is to be fitted is fitted with every hypothesis. `say`: takes a line of text.
     """
     dataset = data.dataset
     runs = {run.name: run for run in dataset.runs}
@@ -65,29 +60,19 @@ def search_hypotheses(
         if term.closed_form is None and term.name not in _EFFECTS
     ]
     task = Task.of_runs(
-        dataset,
-        forward_model(declared),
-        fit,
-        list(data.held_out.names),
-        [*named, *terms],
-        MOST_EFFECTS,
-        noise=study.loop.noise,
-        most_samples=study.compare.most_samples,
-        progress=say,
-        loading=study.compare.loading,
-        computed=study.data.synthetic is not None,
-    )
+        dataset, forward_model(declared), fit, list(data.held_out.names), [*named, *terms],
+        MOST_EFFECTS, noise=study.loop.noise, most_samples=study.compare.most_samples, progress=say,
+        loading=study.compare.loading, computed=study.data.synthetic is not None,
+    )  # fmt: skip
     return search(task)
 
 
 @dataclass(frozen=True)
 class Proposed:
-    """What a learner proposed, as a hypothesis fitted with all that is free.
+    """Proposal of a learner, as a hypothesis fitted with all that is free.
 
-    `terms`: its terms with coefficients and intervals of that fit; as the learner had them where
-        the hypothesis cannot be fitted.
-    `share`: posterior probability of the hypothesis among all that were fitted, were one of them
-        all there is; zero where it was not fitted.
+    `terms`: with coefficients and intervals of that fit, or as the learner had them. `share`:
+    posterior probability among all fitted, were one of them all there is; zero where not fitted.
     """
 
     terms: tuple[RecoveredTerm, ...]
@@ -100,9 +85,7 @@ def with_proposals(
 ) -> tuple[Found, dict[str, Proposed]]:
     """Return the posterior over the search's hypotheses and those of learners, and each of these.
 
-    A learner's terms stand beside what the likeliest hypothesis holds of the instrument.
-
-    `terms`: by learner.
+    A learner's terms stand beside the instrument of the likeliest hypothesis.
     """
     search, problem = found.posterior.search, found.posterior.problem
     alive = search.alive()
@@ -186,10 +169,7 @@ def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[R
 
 
 def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
-    """Return what a hypothesis adds to the law as library terms; None where it is no sum of these.
-
-    Effects of the instrument add nothing.
-    """
+    """Return what a hypothesis adds to the law as library terms; None if it is no such sum."""
     problem, terms = found.posterior.problem, []
     for name in fit.names:
         effect = problem.effects[name]
@@ -208,15 +188,10 @@ _LOOK_UP = 0.5  # seconds, for an interrupt on systems where a wait cannot be in
 
 
 def at_once(parts: Mapping[str, Callable[[Progress], R]], progress: Progress) -> dict[str, R]:
-    """Return what each part returns, all of them computed side by side.
+    """Return what each part returns, all computed side by side.
 
-    A part that is compiled or integrated leaves Python to the others. What each says of its
-    progress is passed on in the thread of the caller, with the mean of their fractions, so that
-    whoever listens need not know of threads. If one fails, or the caller is interrupted, the others
-    end where they next ask or say something.
-
-    `parts`: each takes what it tells of its progress; none may depend on another. `progress`:
-    called with the name of a part and what it says.
+    Progress is passed on in the thread of the caller, with the mean of the fractions. If one part
+    fails, or the caller is interrupted, the others end where they next ask or say something.
     """
     if len(parts) < 2:
         return {name: part(_named(name, progress)) for name, part in parts.items()}

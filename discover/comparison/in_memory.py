@@ -1,4 +1,4 @@
-"""A comparison of estimators, or on data, that a program holds."""
+"""Comparison of estimators, or on data, in memory."""
 
 from collections.abc import Iterable, Mapping, Sequence, Sized
 from typing import Any, overload
@@ -11,8 +11,8 @@ from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.laws.registry import name_of
 from discover.learners.files import fingerprint_of
-from discover.learners.known_part import known_part
 from discover.learners.run_prediction import RunPrediction
+from discover.learners.settings import known_part
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
@@ -49,18 +49,11 @@ def compare(
 
 
 def compare(
-    first: Sequence[RunPrediction] | Dataset,
-    second: Dataset | Fluid | None = None,
-    *,
-    train: Dataset | None = None,
-    held_out: HeldOut = (),
-    known_effects: Mapping[str, Any] | None = None,
-    free: Sequence[str] = (),
-    tolerance: float = TOLERANCE,
-    seed: int = 0,
-    progress: Progress | None = None,
-    **options: Any,
-) -> Comparison:
+    first: Sequence[RunPrediction] | Dataset, second: Dataset | Fluid | None = None, *,
+    train: Dataset | None = None, held_out: HeldOut = (),
+    known_effects: Mapping[str, Any] | None = None, free: Sequence[str] = (),
+    tolerance: float = TOLERANCE, seed: int = 0, progress: Progress | None = None, **options: Any,
+) -> Comparison:  # fmt: skip
     """Compare fitted estimators on runs that no fit saw, or fit both learners to data and compare.
 
     Parameters
@@ -68,18 +61,19 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-        For estimators the data set that tests them; for a data set the known `Fluid`, by default
-        upper convected Maxwell with G = 1 Pa and λ = 1 s.
+            The data set that tests estimators; for a data set the known `Fluid`, by default upper
+        convected
+        Maxwell with G = 1 Pa and λ = 1 s.
     train
-        What the estimators were fitted to; needed only for those from a file, which holds no data.
+        What estimators from a file were fitted to; the file holds no data.
     held_out
         Held-out runs of the data set, by name, or a data set of them.
     known_effects
-        For a data set: known effects, as ``[model] effects`` in a study,
-        such as ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
+        Known effects, as ``[model] effects`` in a study, such as
+        ``{"stress_gain": "fit", "rate_rise_time": {"tau": 0.02}}``.
     free
-        For a data set: what of the base is also fitted: ``"modulus_Pa"``,
-        ``"relaxation_time_s"``, with several modes one factor on all, or parameters of its law.
+        What of the base is also fitted: ``"modulus_Pa"``, ``"relaxation_time_s"`` (one factor on
+        several modes), or parameters of its law.
     tolerance
         Relative discrepancy that is accepted.
     seed
@@ -87,14 +81,15 @@ def compare(
     progress
         Called with what is going on and the fraction done.
     **options
-        For a data set: what ``[compare]`` in a study may hold, such as ``quick=True``,
-        ``members=5``, ``learners=["tensor_sindy"]``, ``library={"degree": 1}``.
+        Of ``[compare]`` in a study, such as ``quick=True``, ``learners=["tensor_sindy"]``,
+        ``library={"degree": 1}``. From `held_out` on, but for the last three, for a data set only.
 
     Raises
     ------
     InputError
-        If estimators are not fitted, or not to the same runs with the same known part, a run
-        is both fitted and held out, or an option is unknown.
+            If estimators are not fitted, or not to the same runs with the same known part, a run is
+        both
+        fitted and held out, or an option is unknown.
 
     Examples
     --------
@@ -135,14 +130,9 @@ def compare(
     made = {name: (e.result_, e.fluid_) for name, e in estimators.items()}
     library = getattr(sparse, "library_", None)
     return compare_study(
-        _study(data, model, asked, tolerance),
-        seed,
-        say,
-        data=data,
-        declared=model,
-        made=made,
+        _study(data, model, asked, tolerance), seed, say, data=data, declared=model, made=made,
         library=library,
-    )
+    )  # fmt: skip
 
 
 def _study(

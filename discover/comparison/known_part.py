@@ -30,10 +30,9 @@ _INSIDE = 1e-3
 
 @dataclass(frozen=True)
 class Frame:
-    """What learners are given, and how what they find is seen beside the records.
+    """What learners are given, and how what they find appears in the records.
 
-    `made`: what the instrument makes of the stress of a run, by its name; empty where it does
-        nothing.
+    `made`: the instrument in the stress of a run, by its name.
     """
 
     model: DeclaredModel  # the known part, nothing of it left to be fitted
@@ -77,13 +76,10 @@ def known_part(
     high_deborah: tuple[float, ...],
     pipkin: Sequence[tuple[float, float]],
 ) -> Frame:
-    """Return the known part with what the likeliest hypothesis says of constants and instrument.
+    """Return the known part with constants and instrument of the likeliest hypothesis.
 
-    What is declared as fitted has the values of that hypothesis. What it holds of the instrument is
-    taken out of the records where it can be undone, so that learners learn the fluid.
-
-    `declared`, `data`: the declared model, and the data as recorded. `ended`: the posterior. Raises
-    InputError if learners cannot be told of a declared effect.
+    What that holds of the instrument is taken out of the records where it can be undone. Raises
+    InputError if learners cannot be given a declared effect.
     """
     data = _dated(ended, data)
     model = absorbed(_with_values(declared, ended))
@@ -125,14 +121,10 @@ def _with_values(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
         for known in declared.effects
     )
     return replace(
-        declared,
-        law=make_law(declared.law_name, parameters) if free else declared.law,
-        parameters=parameters,
-        modulus=modulus,
-        relaxation_time=relaxation_time,
-        effects=effects,
+        declared, law=make_law(declared.law_name, parameters) if free else declared.law,
+        parameters=parameters, modulus=modulus, relaxation_time=relaxation_time, effects=effects,
         free=(),
-    )
+    )  # fmt: skip
 
 
 def _found(ended: Ended) -> list[KnownEffect]:

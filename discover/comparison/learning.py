@@ -1,4 +1,4 @@
-"""What each learner finds, kept as it is found, so that a run that was stopped can go on."""
+"""Learners of a comparison, their results kept as they are found."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +10,7 @@ from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.rivals import physics_of
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent
@@ -22,17 +21,13 @@ from tensor_library.library import TermLibrary, build_library
 
 
 def train(
-    learner: str,
-    study: Study,
-    model: DeclaredModel,
-    runs: Sequence[Run],
-    seed: int = 0,
+    learner: str, study: Study, model: DeclaredModel, runs: Sequence[Run], seed: int = 0,
     progress: Progress = silent,
-) -> tuple[LearnerResult, Fluid]:
+) -> tuple[LearnerResult, Fluid]:  # fmt: skip
     """Return what one learner finds in these runs, and the fluid that it makes.
 
-    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `study`: the study,
-    for the learner's settings. `model`: the known part. `progress`: called as it goes.
+    `learner`: ``"tensor_sindy"``, ``"tbnn_ude"``, or a registered one's name. `model`: the known
+    part.
     """
     options = study.compare
     plain_maxwell = isinstance(model.law, UpperConvectedMaxwell)
@@ -62,14 +57,9 @@ def train(
         from discover.learners.tbnn_ude import TBNNUDE
 
         estimator = TBNNUDE(
-            recipe=options.recipe,
-            n_members=options.members,
-            quick=options.quick,
-            projection_library=library,
-            progress=progress,
-            random_state=seed,
-            **shared,
-        )
+            recipe=options.recipe, n_members=options.members, quick=options.quick,
+            projection_library=library, progress=progress, random_state=seed, **shared,
+        )  # fmt: skip
         estimator.fit(list(runs))
         return estimator.result_, estimator.fluid_
     asked = LearningTask(tuple(runs), model.fluid, library, seed, progress)
@@ -84,10 +74,7 @@ def study_library(study: Study) -> TermLibrary:
 
 @dataclass(frozen=True)
 class Learning:
-    """Where learners are trained, or found again.
-
-    `made`: learners that are fitted already: what they found, by learner.
-    """
+    """Where learners are trained, or found again; `made`: results of those fitted already."""
 
     study: Study  # which learners, and with what options
     seed: int
@@ -97,10 +84,7 @@ class Learning:
     def outcomes(
         self, learners: Sequence[str], frame: Frame, progress: Progress
     ) -> dict[str, LearnerOutcome]:
-        """Return what each learner finds, those of this package side by side.
-
-        Whether another one may share a process with threads is not known, so they come after.
-        """
+        """Return what each learner finds, those of this package side by side, then the others."""
         # before the threads: two that load scikit-learn at once find it half loaded
         from discover.learners import tbnn_ude, tensor_sindy  # noqa: F401
 
@@ -124,9 +108,7 @@ class Learning:
     ) -> LearnerOutcome:
         """Return what a learner finds, in the frame in which it works.
 
-        `frame`: the known part, the runs to learn from and the flows of the page. `progress`:
-        called with what is going on and the fraction done. `part`: of a sweep, the name under which
-        it is kept; its outcomes are looked at in one flow.
+        `part`: name under which a point of a sweep is kept, looked at in one flow.
         """
         store, made, flows = self.store, self.made, frame.flows
         name = part or learner
@@ -170,8 +152,7 @@ def distilled(
     kept = None if store is None else store.load("distillation")
     if kept is not None:
         return kept["rows"]
-    from discover.learners.distillation import distil
-    from discover.learners.students import STUDENTS
+    from discover.learners.distillation import STUDENTS, distil
 
     teacher = study.data.synthetic.law
     students = [name for name in STUDENTS if name != teacher]

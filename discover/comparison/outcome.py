@@ -1,4 +1,4 @@
-"""What one learner found and predicts, in a form that can be kept in a file."""
+"""Outcome of one learner, in a form that can be kept in a file."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,15 +19,11 @@ Limits = Mapping[str, tuple[Float[np.ndarray, " _"], Float[np.ndarray, " _"]]]
 
 @dataclass(frozen=True)
 class LearnerOutcome(TermTables):
-    """A learner's result with its predictions in every flow of the comparison.
+    """Result of a learner with its predictions in every flow of the comparison.
 
-    `loss_history`: iterations and losses, both of shape (m,).
-    `details`: what else the learner says; JSON-able.
-    `predictions`: by the key of the flow; None where the law diverges.
-    `physics`: checks of physical soundness, as from `PhysicsReport.to_json`; None where not made.
-    `bands`: by the key of the flow: lowest and highest prediction of each quantity over the members
-        of an ensemble. None for a flow in which one of them diverges; empty where there is one
-        law.
+    `loss_history`: iterations and losses, shape (m,). `predictions`: by the key of the flow; None
+    where the law diverges. `physics`: from `PhysicsReport.to_json`; None where not made. `bands`:
+    by key, lowest and highest prediction over the members of an ensemble; None where one diverges.
     """
 
     learner: str  # name of the learner
@@ -41,10 +37,7 @@ class LearnerOutcome(TermTables):
     bands: Mapping[str, Limits | None] = field(default_factory=dict)
 
     def half_widths(self, flow: Flow) -> dict[str, float]:
-        """Return the root-mean-square half-width of each band over that of the prediction.
-
-        N2's is relative to N1, as its error is. Empty where there is no band.
-        """
+        """Return the rms half-width of each band over that of the prediction, N2's over N1's."""
         limits, predicted = self.bands.get(flow.key), self.predictions.get(flow.key)
         if limits is None or predicted is None:
             return {}
@@ -60,15 +53,9 @@ class LearnerOutcome(TermTables):
         """Return the outcome of a fit, with the fluid it found simulated in every flow."""
         predictions = {flow.key: predict(fluid, flow) for flow in flows}
         return cls(
-            result.learner,
-            result.terms,
-            result.train_seconds,
-            result.loss_history,
-            result.details,
-            result.message,
-            predictions,
-            bands=_bands(result, fluid, flows),
-        )
+            result.learner, result.terms, result.train_seconds, result.loss_history, result.details,
+            result.message, predictions, bands=_bands(result, fluid, flows),
+        )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
         """Return everything as JSON-able values; `from_state` undoes it exactly."""
@@ -150,11 +137,9 @@ _NUMBERS = {"shear rate": "shear rate (Wi)", "frequency": "frequency (De)"}
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a flow lies against the fitted ones.
+    """Where a flow lies against the fitted ones, as factors over their largest.
 
-    `rate`, `strain`: largest shear rate and strain over the largest fitted ones.
-    `frequency`: angular frequency over the largest fitted one; None where one of the two does not
-        oscillate, for a step of the rate excites every frequency.
+    `frequency`: None where one of the two does not oscillate: a step excites every frequency.
     """
 
     rate: float
@@ -199,11 +184,7 @@ class Placement:
 
 
 def place(flow: Flow, training: Sequence[Flow]) -> Placement:
-    """Return where a flow lies against the fitted ones.
-
-    A slower or smaller flow is inside: there a fluid comes to its linear limit, which the declared
-    modes hold. Ratios of rates and of frequencies are those of Wi and De.
-    """
+    """Return where a flow lies against the fitted ones; slower or smaller flows are inside."""
     frequencies = [f for other in training if (f := other.frequency) is not None]
     kind = flow.protocol.flow
     alike = [other for other in training if other.protocol.flow == kind]

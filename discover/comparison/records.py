@@ -1,8 +1,4 @@
-"""Runs without what a known instrument did: the rate that was felt, the stress that was there.
-
-Both learners, and the classical laws, are then given the same corrected runs, so that none of them
-need know of an instrument.
-"""
+"""Records without what a known instrument did, for learners and classical laws."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -45,12 +41,9 @@ _RATES = (1.0, 2.0)
 
 
 def absorbed(declared: DeclaredModel) -> DeclaredModel:
-    """Return the declared model with the known effects of the fluid in its law, modes and solvent.
+    """Return the declared model with known effects of the fluid in its law, modes and solvent.
 
-    What is left among its effects is of the instrument.
-
-    `declared`: the declared model; its effects of the fluid have values. Raises InputError if a
-    learner cannot be given an effect as something known.
+    Its other effects are of the instrument. Raises InputError if learners cannot take an effect.
     """
     # at zero amplitude an effect is none
     declared = replace(declared, effects=tuple(k for k in declared.effects if k.values[0] != 0.0))
@@ -119,10 +112,7 @@ _FEWEST_ENTRIES = 64
 
 @dataclass(frozen=True)
 class InRecord:
-    """What an instrument makes of the stress of one run: recorded = gain · stress + offset.
-
-    `gain`, `offset`: at the samples; a pure number, and in Pa.
-    """
+    """Instrument in the stress of one run: recorded = gain · stress + offset, at the samples."""
 
     gain: Float[np.ndarray, " n"]
     offset: Float[np.ndarray, " n"]

@@ -1,9 +1,4 @@
-"""What these data cannot decide, in the words and flows of a comparison.
-
-The findings are those of `discover.identify`: exact twins of the law found, rivals that a test on
-the data could not rule out, and the structure of the library at the law found. Here they are put
-beside the flows of the comparison.
-"""
+"""What the data cannot decide, in the flows of a comparison: twins, rivals, structure."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,29 +6,21 @@ from typing import Any
 
 import numpy as np
 
+from discover import identify
 from discover.comparison.bands import flow_run
 from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relative_errors
 from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
 from discover.forward import make_batch
 from discover.forward.grids.flow_batch import lay_out
-from discover.identify import (
-    LawStructure,
-    Structure,
-    Twin,
-    analyse_structure,
-    check_physics,
-    find_twins,
-)
 from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
 from discover.study.declared_model import DeclaredModel
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms, spell
-from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
+from tensor_library.law_terms import spell
 
 EXACT = 1e-5
 """Relative difference of σ12 below which two laws count as one: integration error, generously."""
@@ -55,12 +42,10 @@ _PHYSICS_FLOWS = ("training", "held_out", "test")
 
 @dataclass(frozen=True)
 class Rival:
-    """A law that the data do not tell from the chosen one.
+    """Law that the data do not distinguish from the chosen one.
 
-    `errors_to_chosen`: largest relative difference of each quantity over the training and the test
-        flows.
-    `separated_by`: ``{"protocol", "quantity"}`` where the two differ most among flows not yet
-        measured; None where they differ nowhere that was tried.
+    `errors_to_chosen`: largest relative difference of each quantity over training and test flows.
+    `separated_by`: protocol and quantity in which they differ most among flows not yet measured.
     """
 
     law: LawTerms  # its terms, beyond the known part
@@ -92,10 +77,9 @@ def exact_twins(
     flows: Sequence[Flow],
     library: TermLibrary | None = None,
 ) -> list[Rival]:
-    """Return laws that give the same σ12 in every shear flow, the law found put aside.
+    """Return laws that give the same σ12 in every shear flow as the law found.
 
-    `terms`: of the law found. `model`: the known part. `flows`: training and test flows. `library`:
-    the terms that were searched; a twin may be outside.
+    `library`: the terms that were searched; a twin may be outside.
     """
     chosen = LawTerms.of(terms)
     basis = build_library(degree=1)
@@ -103,7 +87,7 @@ def exact_twins(
     library = basis if library is None else library.extended(basis.terms)
     seen = [flow for flow in flows if flow.kind == "training"]
     unseen = [flow for flow in flows if flow.kind in ("test", "held_out")]
-    twins = find_twins(library, chosen, model.law)
+    twins = identify.find_twins(library, chosen, model.law)
     twins = [twin for twin in twins if _concerns_shear(twin, len(chosen.coefficients))]
     if not twins:
         return []
@@ -123,9 +107,7 @@ def exact_twins(
 def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> list[Rival]:
     """Return the other laws that the posterior holds possible, the likeliest first.
 
-    Those whose effects of the fluid are no sum of library terms have no spelling and are left out.
-
-    `flows`: those in which they are told from the likeliest. `runs`: runs as recorded, by name.
+    Those whose effects are no sum of library terms are left out. `runs`: as recorded, by name.
     """
     fits = [(f, p) for f, p in found.posterior.fits if p >= _POSSIBLE][: 1 + MOST_RIVALS]
     named = [(f, p, t) for f, p in fits[1:] if (t := terms_of(f, found)) is not None]
@@ -157,13 +139,13 @@ def explanations_apart(found: Found, flows: Sequence[Flow], runs: Mapping[str, R
     return rivals
 
 
-def _concerns_shear(twin: Twin, size: int) -> bool:
+def _concerns_shear(twin: identify.Twin, size: int) -> bool:
     """Return whether a twin is no larger than the law, or predicts other normal stresses."""
     no_larger = len(twin.law.coefficients) <= size
     return no_larger or max(twin.difference.N1, twin.difference.N2) > EXACT
 
 
-def _rival_of(twin: Twin, beyond: Sequence[str]) -> Rival:
+def _rival_of(twin: identify.Twin, beyond: Sequence[str]) -> Rival:
     place = None
     if twin.separated_by:
         best = max(twin.separated_by, key=lambda s: s.difference)
@@ -206,7 +188,7 @@ def judge_rival(rival: Rival, reference, predictions, seen, unseen) -> Rival | N
     return replace(rival, errors_to_chosen=worst, separated_by=place)
 
 
-def law_structure(structure: Structure | None) -> LawStructure | None:
+def law_structure(structure: identify.Structure | None) -> identify.LawStructure | None:
     """Return the structure at the law found, or at the known part where that law diverges."""
     if structure is None or not structure.laws:
         return None
@@ -219,26 +201,20 @@ def structure_of(
     library: TermLibrary,
     model: DeclaredModel,
     use_normal_stresses: bool,
-) -> Structure:
+) -> identify.Structure:
     """Return what the flows of these runs determine, at the known part and at the law found."""
     found = LawTerms.of(terms)
-    return analyse_structure(
-        runs,
-        library,
-        base=model.law,
-        nominal={FOUND: found} if found.coefficients else {},
-        modulus=model.modulus,
-        relaxation_time=model.relaxation_time,
-        solvent_viscosity=model.solvent_viscosity,
-        use_normal_stresses=use_normal_stresses,
-    )
+    return identify.analyse_structure(
+        runs, library, base=model.law, nominal={FOUND: found} if found.coefficients else {},
+        modulus=model.modulus, relaxation_time=model.relaxation_time,
+        solvent_viscosity=model.solvent_viscosity, use_normal_stresses=use_normal_stresses,
+    )  # fmt: skip
 
 
 def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     """Return checks of a fluid's physical soundness along the flows, as JSON-able values.
 
-    `flows`: the flows of the comparison; training ones set the box beyond which the law
-    extrapolates.
+    Training flows set the box beyond which the law extrapolates.
     """
     along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
     training = [flow for flow in along if flow.kind == "training"] or along
@@ -247,7 +223,7 @@ def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
     deborah = time * max(_frequency(flow) for flow in training)
     protocols = [flow.protocol for flow in along]
     times = [_thinned(flow.times) for flow in along]
-    return check_physics(
+    return identify.check_physics(
         fluid,
         lay_out(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
         [flow.title for flow in along],

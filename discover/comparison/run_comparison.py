@@ -1,4 +1,4 @@
-"""Both learners on identical data, part by part, so that a run that was stopped can go on."""
+"""Comparison of a study, part by part, so that a run that was stopped can go on."""
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
@@ -31,8 +31,7 @@ from discover.comparison.time_left import ComparisonTime
 from discover.dataset import Dataset
 from discover.dataset.run_table import material_and_temperature
 from discover.errors import InputError
-from discover.laws.multimode import Fluid
-from discover.laws.registry import LAWS, make_law
+from discover.laws import LAWS, Fluid, make_law
 from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.loop import Found
@@ -46,8 +45,7 @@ from discover.study.declared_model import DeclaredModel, declared_model, forward
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import unknown_name
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import TermLibrary
+from tensor_library import LawTerm, TermLibrary
 
 Asked = tuple[str, float, Study]
 """A law, the value of its parameter, and the study of that point."""
@@ -85,10 +83,8 @@ def sweep_points(
 ) -> list[SweepPoint]:
     """Return what each learner of a study finds at each point of its sweep.
 
-    `asked`: the points, as `sweep_studies` returns them. `learning`: where learners are trained, of
-    the study whose sweep it is. `model`: the known part. `seed`: overrides the study's seed of the
-    noise. `step`: returns what is called with what is going on, of the number of learners that are
-    done and a title.
+    `asked`: from `sweep_studies`. `model`: the known part. `seed`: overrides the study's seed of
+    the noise. `step`: returns progress for so many learners done and a title.
     """
     options, points = learning.study.compare, []
     for i, (law, value, other) in enumerate(asked):
@@ -152,28 +148,21 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
 
 @in_one_thread
 def compare(
-    study: Study,
-    seed: int | None = None,
-    progress: Progress = silent,
-    store: RunFolder | None = None,
-    *,
-    data: StudyData | None = None,
+    study: Study, seed: int | None = None, progress: Progress = silent,
+    store: RunFolder | None = None, *, data: StudyData | None = None,
     declared: DeclaredModel | None = None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
     library: TermLibrary | None = None,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """Run a study's learners on identical data, and weigh what each found with a search's findings.
 
-    The posterior over laws, effects and terms comes first. What is declared as fitted has the
-    values of its likeliest hypothesis, and what that holds of the instrument is taken out of the
-    records, so that learners learn the fluid. Then each learner's law is a hypothesis too.
+    The posterior over laws, effects and terms comes first; its likeliest hypothesis fixes what is
+    declared as fitted, and what it holds of the instrument is taken out of the records, so that
+    learners learn the fluid. Then each learner's law is a hypothesis too.
 
-    `study`: the study. `seed`: overrides the study's seeds, of the noise and of the learners.
-    `progress`: called with what is going on and the fraction done. `store`: where finished learners
-    are kept and found again. `data`, `declared`: data and known part that are at hand, in place of
-    the study's. `made`: learners that are fitted already: what they found, by learner. `library`:
-    the terms that they searched, in place of the study's. Raises InputError if the study asks for
-    something that its data cannot give.
+    `seed`: overrides the study's seeds. `store`: where finished learners are kept. `data`,
+    `declared`: in place of the study's. `made`: results of fitted learners; `library`: the terms
+    that they searched. Raises InputError if the study asks for something that its data cannot give.
     """
     options = study.compare
     data = prepared(load_study_data(study, seed) if data is None else data)
@@ -279,18 +268,12 @@ def _of_material(
         bands[flow.key] = Band(middle, middle, middle).claiming(())
     why = f"A {simple.material.title} has no law for it, and it was not measured."
     return Comparison(
-        name=study.name,
-        data_summary=data_in_words(data, study),
+        name=study.name, data_summary=data_in_words(data, study),
         known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
-        flows=flows,
-        before=before,
-        outcomes={},
-        posterior=_titled(simple, study),
-        bands=bands,
-        statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")],
-        seed=seed,
+        flows=flows, before=before, outcomes={}, posterior=_titled(simple, study), bands=bands,
+        statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
         conditions=material_and_temperature(data.dataset, study.data.material),
-    )
+    )  # fmt: skip
 
 
 def _titled(found: LoopResult, study: Study) -> LoopResult:
@@ -307,13 +290,9 @@ def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
 
 
 def _with_what_is_open(
-    comparison: Comparison,
-    found: Found,
-    frame: Frame,
-    data: StudyData,
-    study: Study,
+    comparison: Comparison, found: Found, frame: Frame, data: StudyData, study: Study,
     library: TermLibrary,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
         statements = make_statements("no_signal", frame.shown, {}, None, {})
@@ -336,22 +315,14 @@ def _with_what_is_open(
     others = explanations_apart(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(
-        comparison.verdict,
-        frame.shown,
-        bands,
-        structure,
-        {name: one.inside for name, one in spread.items()},
-        study.compare.use_normal_stresses,
+        comparison.verdict, frame.shown, bands, structure,
+        {name: one.inside for name, one in spread.items()}, study.compare.use_normal_stresses,
         len(terms),
-    )
+    )  # fmt: skip
     return replace(
-        comparison,
-        bands=bands,
-        classical=fit_classical_laws(found, frame, study.compare.laws),
-        rivals=(*twins, *others),
-        statements=statements,
-        structure=structure,
-    )
+        comparison, bands=bands, classical=fit_classical_laws(found, frame, study.compare.laws),
+        rivals=(*twins, *others), statements=statements, structure=structure,
+    )  # fmt: skip
 
 
 def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:

@@ -82,14 +82,9 @@ class Statement:
 
 
 def make_statements(
-    verdict: str,
-    flows: Sequence[Flow],
-    bands: Mapping[str, Band],
-    structure: Structure | None,
-    spread: Mapping[str, float | None],
-    normal_stresses_used: bool = False,
-    terms: int = 0,
-) -> list[Statement]:
+    verdict: str, flows: Sequence[Flow], bands: Mapping[str, Band], structure: Structure | None,
+    spread: Mapping[str, float | None], normal_stresses_used: bool = False, terms: int = 0,
+) -> list[Statement]:  # fmt: skip
     """Return what the training data say of N1 and N2, with the reason.
 
     `verdict`: of the comparison. `bands`: by the key of the flow. `structure`: what σ12 could say

@@ -1,4 +1,4 @@
-"""Time that a comparison still takes: for its search, its learners, and what is weighed after."""
+"""Time that a comparison still takes: search, learners, and what is weighed after."""
 
 import time
 

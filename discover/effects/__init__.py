@@ -25,26 +25,10 @@ from discover.effects.registry import (
 )
 
 __all__ = [
-    "AbstractEffect",
-    "ConstitutiveEffect",
-    "EffectParameter",
-    "KinematicEffect",
-    "KnownEffect",
-    "LibraryTerm",
-    "ModeEffect",
-    "Record",
-    "SeriesElement",
-    "SignalEffect",
-    "StateEffect",
-    "WrittenState",
-    "built_in_effects",
-    "effects_table",
-    "known_effects",
-    "library_effects",
-    "library_term",
-    "make_effect",
-    "named_effects",
-    "simplest_terms",
-]
+    "AbstractEffect", "ConstitutiveEffect", "EffectParameter", "KinematicEffect", "KnownEffect",
+    "LibraryTerm", "ModeEffect", "Record", "SeriesElement", "SignalEffect", "StateEffect",
+    "WrittenState", "built_in_effects", "effects_table", "known_effects", "library_effects",
+    "library_term", "make_effect", "named_effects", "simplest_terms",
+]  # fmt: skip
 
 answer_calls(__name__, effects_table)

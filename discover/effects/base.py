@@ -1,4 +1,4 @@
-"""What an effect is: something that a model may lack, with an amplitude that switches it on."""
+"""Effects: what a model may lack, each with an amplitude that switches it on."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -14,13 +14,11 @@ from tensor_library.law_terms import LawTerm
 
 @dataclass(frozen=True)
 class WrittenState:
-    """A state as SymPy expressions over `tensor_library.isotropic_function.scalars`.
+    """State as SymPy expressions over `tensor_library.isotropic_function.scalars`.
 
-    The scalars are the names of the effect's parameters and of its levels, ``shear_rate`` and
-    ``shear_stress``: the size of the rate √(½ γ̇:γ̇) in 1/s, and the stress in Pa of a shear of that
-    size that does the same work.
-
-    `modulus_factor`, `time_factor`: on the stress and on the relaxation time of every mode.
+    The scalars are named as the effect's parameters and levels, ``shear_rate`` (√(½ γ̇:γ̇), in 1/s)
+    and ``shear_stress`` (in Pa, of a shear of that rate that does the same work). `modulus_factor`,
+    `time_factor`: on stress and relaxation time of every mode.
     """
 
     rates: tuple[Any, ...]  # of change of each level, in 1/s, in their order
@@ -49,24 +47,13 @@ Scale = Literal[
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """A parameter of an effect, with the range that it can have in a laboratory.
+    """Parameter of an effect with its physical range; a fit that ends at the range is no finding.
 
-    A value outside of the range is not fitted, and one that a fit drives to the end of it is no
-    finding: what the data ask for is then another effect.
-
-    `low`, `high`: physical range, in the unit or, where `range_scale` names one, in a property of
-        the data.
-    `range_source`: where the range comes from: literature, or the argument in a sentence.
-    `range_scale`: data property in which `low` and `high` are measured; ``one`` where they are in
-        `unit`.
-    `ends`: those of `low` and `high` that something real can have, such as no recovery at all.
-    `first_trial`: size of the first trial value, in that scale; for an inner parameter its starting
-        value.
-    `endless`: of a time: what the effect cannot be told from where no record lasts as long; empty
-        if its name says nothing of that time.
-    `absent`: of a constant that may be `low`: what the effect is there, where its name says
-        otherwise.
-    `meaning`: in a few words; by default the name in words. Of a share: of what it is one.
+    `low`, `high`: in `unit`, or in the data property `range_scale`. `range_source`: literature or
+    argument. `ends`: those of the range that something real can have. `first_trial`: first trial
+    value in `scale`; of an inner parameter its starting value. `endless`: of a time, what the
+    effect equals where no record lasts as long. `absent`: what the effect is with this constant at
+    `low`. `meaning`: in a few words; of a share, of what it is one. Empty: the name says it.
     """
 
     name: str  # name in JSON and reports
@@ -86,11 +73,10 @@ class EffectParameter:
 
 @dataclass(frozen=True)
 class AbstractEffect(ABC):
-    """An effect. Its first parameter is the amplitude: at zero it changes nothing.
+    """Effect. Its first parameter is the amplitude: at zero it changes nothing.
 
-    `visible`: size from which it shows, in words: the amplitude that changes the stress by about 5
-        % in a flow that it affects.
-    `complexity`: used to prefer the simpler of two explanations that the data cannot separate.
+    `visible`: amplitude that changes the stress by about 5 %, in words. `complexity`: prefers the
+    simpler of two explanations that the data cannot separate.
     """
 
     name: str  # name in studies, JSON and reports
@@ -110,11 +96,11 @@ class AbstractEffect(ABC):
 
 @dataclass(frozen=True)
 class ConstitutiveEffect(AbstractEffect):
-    """Changes the fluid: an extra term in the law of every mode, or a stress beside the modes.
+    """Effect on the fluid: an extra term in the law of every mode, or a stress beside the modes.
 
-    `explicit_rate`: whether the term names the rate of deformation. Such laws can lose their
-        well-posedness in fast deformation, which laws with an upper convected derivative and a term
-        in the stress alone keep [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58, 25].
+    `explicit_rate`: whether the term names the rate of deformation; such laws can lose their
+    well-posedness in fast deformation [Leonov 1992, JNNFM 42, 323; Kwon & Leonov 1995, JNNFM 58,
+    25].
     """
 
     explicit_rate: bool = False
@@ -126,19 +112,16 @@ class ConstitutiveEffect(AbstractEffect):
         return type(self).extra_term is not ConstitutiveEffect.extra_term
 
     def extra_term(self, values: Float[Array, " p"], stress: Symmetric, rate: Symmetric):
-        """Return what the effect adds to h, dimensionless, for one mode.
+        """Return what is added to h of one mode, dimensionless.
 
         `values`: parameters in their order. `stress`, `rate`: σ_k/G_k and λ_k γ̇, both (3, 3) or
-        both (4,).
+        (4,).
         """
         del values, rate
         return jnp.zeros_like(stress)
 
     def as_terms(self, values: Sequence[float]) -> tuple[LawTerm, ...] | None:
-        """Return `extra_term` as a sum of library terms, so that the law can be written out.
-
-        None if it is no such sum, which is also what an effect that does not say is taken to be.
-        """
+        """Return `extra_term` as a sum of library terms; None if it is none, or does not say."""
         del values
         return None if self.adds_term else ()
 
@@ -151,7 +134,7 @@ class ConstitutiveEffect(AbstractEffect):
 
 
 class ModeEffect(ConstitutiveEffect):
-    """A relaxation mode beside the declared ones, which obeys the same law."""
+    """Relaxation mode beside the declared ones, under the same law."""
 
     @abstractmethod
     def mode(self, values: Float[Array, " p"]) -> tuple[Float[Array, ""], Float[Array, ""]]:
@@ -159,11 +142,10 @@ class ModeEffect(ConstitutiveEffect):
 
 
 class StateEffect(ConstitutiveEffect):
-    """A state of the fluid, integrated with the modes, that changes their stress or time.
+    """State of the fluid, integrated with the modes, that scales their stress or times.
 
-    The state starts at `rest` and obeys ds/dt = source − decay · s, both of which may depend on
-    the flow. With all factors one the law is unchanged. An effect may have several such `levels`:
-    state, source and decay then have the shape (levels,).
+    From `rest` it obeys ds/dt = source − decay · s. With several `levels` state, source and decay
+    have the shape (levels,).
     """
 
     rest: ClassVar[float] = 0.0
@@ -178,10 +160,7 @@ class StateEffect(ConstitutiveEffect):
     def source_and_decay(
         self, values: Float[Array, " p"], shear_rate: Float[Array, ""], stress: Float[Array, ""]
     ) -> tuple[Float[Array, "*levels"], Float[Array, "*levels"]]:
-        """Return source and decay in 1/s.
-
-        `values`: parameters in their order. `shear_rate`, `stress` in 1/s and Pa.
-        """
+        """Return source and decay in 1/s, from `shear_rate` in 1/s and `stress` in Pa."""
 
     @property
     def level_names(self) -> tuple[str, ...]:
@@ -211,14 +190,11 @@ class StateEffect(ConstitutiveEffect):
 
 @dataclass(frozen=True)
 class Record:
-    """A signal of one run on a grid of times.
+    """Signal of one run on increasing times in s, from 0 or from a steady flow before it.
 
-    `times` in s, shape (n,), increasing; from 0, or from before where a steady flow came before.
-    `strain_before`: strain, added up without regard to its sign, that the sample had seen in
-        earlier runs.
-    `tool_rate`: of the driven tool, as a nominal shear rate in 1/s, shape (n,); by default that of
-        the fluid. The two differ where the fluid slips, where something between them gives way, and
-        where the gap is not what the nominal rate is computed with.
+    `strain_before`: strain of earlier runs, added up without regard to sign. `tool_rate`: of the
+    driven tool, as a nominal shear rate in 1/s; differs from `rate` by slip, compliance or a wrong
+    gap.
     """
 
     times: Float[Array, " n"]
@@ -239,9 +215,9 @@ class Record:
 
     @property
     def total_strain(self) -> Float[Array, " n"]:
-        """Strain of the sample, added up without regard to its sign, at each time.
+        """Strain of the sample since its first run, without regard to sign, at each time.
 
-        From the start of its first run on; a steady flow before t = 0 does not count.
+        A steady flow before t = 0 does not count.
         """
         size = jnp.abs(self.rate)
         # a flow before t = 0 lasts as long as the simulation needs, not as it did in the experiment
@@ -251,12 +227,11 @@ class Record:
 
 @dataclass(frozen=True)
 class KinematicEffect(AbstractEffect):
-    """Changes the deformation that the fluid really felt.
+    """Effect on the deformation that the fluid felt.
 
-    `shapes_command`: whether it acts on the way from the command to the tool. A rate that was
-        measured at the tool contains it already, so it is then no candidate; what lies between the
-        tool and the fluid, such as slip or a wrong gap, still is. The tool's own rate, which its
-        inertia and friction follow, is the command with these effects and without the others.
+    `shapes_command`: whether it acts between command and tool. A rate measured at the tool contains
+    it already, so it is then no candidate; the tool's own rate, which inertia and friction follow,
+    is the command with these effects alone.
     """
 
     shapes_command: bool = False
@@ -268,21 +243,19 @@ class KinematicEffect(AbstractEffect):
         instrument_times: Float[Array, " n"],
         shear_rate: Float[Array, " n"],
     ) -> Float[Array, " n"]:
-        """Return the shear rate felt, from the one that would be felt without this effect.
+        """Return the shear rate felt in 1/s from the one without this effect, linear between times.
 
-        `values`: parameters in their order. `instrument_times` in s on the instrument's clock,
-        increasing from the start of the flow; the fluid was at rest before. `shear_rate` in 1/s,
-        taken to be linear between times.
+        `instrument_times` in s on the instrument's clock, from the start of the flow; at rest
+        before.
         """
         del values, instrument_times
         return shear_rate
 
 
 class SeriesElement(KinematicEffect):
-    """Something that gives way in series with the fluid and so feels its stress.
+    """Element in series with the fluid, which feels its stress: γ̇_felt = γ̇ − s σ − C dσ/dt.
 
-    Of the commanded deformation it takes C σ (a spring) and ∫ s σ dt (a dashpot):
-    γ̇_felt = γ̇ − s σ − C dσ/dt. The integrator solves this with the stress.
+    The integrator solves this with the stress.
     """
 
     @abstractmethod
@@ -314,10 +287,7 @@ class SignalEffect(AbstractEffect):
     def response(
         self, values: Float[Array, " p"], frequency: Float[Array, ""]
     ) -> Complex[Array, ""] | Float[Array, ""]:
-        """Return by what the stress of an oscillation that has gone on is multiplied.
-
-        `values`: parameters in their order. `frequency` in rad/s.
-        """
+        """Return the factor on the stress of a periodic oscillation at `frequency` in rad/s."""
         del frequency
         return jnp.ones_like(values[0])
 

@@ -1,4 +1,4 @@
-"""Effects that change the deformation that the fluid really felt."""
+"""Effects on the deformation that the fluid felt."""
 
 import jax
 import jax.numpy as jnp
@@ -10,10 +10,9 @@ from discover.effects.base import EffectParameter, KinematicEffect, SeriesElemen
 def first_order_lag(
     times: Float[Array, " n"], values: Float[Array, " n"], time_constant: Float[Array, ""]
 ) -> Float[Array, " n"]:
-    """Return y with τ y' + y = x, y = 0 at the first time; exact for x linear between times.
+    """Return y with τ y' + y = x, from y = 0; exact for x linear between times.
 
-    `times` in s, increasing. `values`: x at those times. `time_constant`: τ in s; at zero, y = x
-    (also at the first time).
+    `times`, `time_constant` (τ) in s. At τ = 0, y = x, also at the first time.
     """
     active = time_constant > 0.0
     safe = jnp.where(active, time_constant, 1.0)
@@ -46,11 +45,7 @@ RATE_GAIN = RateGain(
     name="rate_gain",
     parameters=(
         EffectParameter(
-            "gain_error",
-            "g",
-            low=-0.5,
-            high=1.0,
-            first_trial=0.01,
+            "gain_error", "g", low=-0.5, high=1.0, first_trial=0.01,
             range_source="a gap or an angle wrong by a factor of two; the zero of a gap is off by "
             "10 to 100 µm (Davies & Stokes 2008, J. Non-Newtonian Fluid Mech. 148, 73)",
         ),
@@ -59,7 +54,7 @@ RATE_GAIN = RateGain(
     source="Macosko 1994, Rheology, ch. 8: errors of cone angle and gap",
     check="Measure a Newtonian oil; measure the gap and the cone angle.",
     visible="g of about 0.05.",
-)
+)  # fmt: skip
 
 
 class RateRiseTime(KinematicEffect):
@@ -71,29 +66,19 @@ class RateRiseTime(KinematicEffect):
 
 
 RATE_RISE_TIME = RateRiseTime(
-    name="rate_rise_time",
+    name="rate_rise_time", shapes_command=True,
     parameters=(
         EffectParameter(
-            "tau",
-            r"\tau",
-            "s",
-            low=0.0,
-            high=10.0,
-            scale="sampling_time",
-            first_trial=0.5,
+            "tau", r"\tau", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
             range_source="motors answer in 0.01 to 0.1 s; a badly tuned loop that controls the "
             "rate of a stress-controlled instrument needs seconds",
         ),
     ),
-    equation=(
-        r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} ="
-        r" \dot\gamma"
-    ),
+    equation=r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} = \dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: response time of the drive",
     check="Record the angle of the motor in start-up; repeat at another rate.",
     visible="tau of about 5 % of the time in which the stress grows.",
-    shapes_command=True,
-)
+)  # fmt: skip
 
 
 class ToolCompliance(SeriesElement):
@@ -108,13 +93,7 @@ TOOL_COMPLIANCE = ToolCompliance(
     name="tool_compliance",
     parameters=(
         EffectParameter(
-            "compliance",
-            "C",
-            "1/Pa",
-            low=0.0,
-            high=0.1,
-            scale="inverse_stress",
-            first_trial=0.01,
+            "compliance", "C", "1/Pa", low=0.0, high=0.1, scale="inverse_stress", first_trial=0.01,
             range_source="πR⁴/(2 H K) of a torsion bar as soft as K = 0.1 N m/rad with R = 50 mm, "
             "H = 1 mm; other transducers are 1000 times as stiff (Gottlieb & Macosko 1982)",
         ),
@@ -123,7 +102,7 @@ TOOL_COMPLIANCE = ToolCompliance(
     source="Gottlieb & Macosko 1982, Rheol. Acta 21, 90",
     check="Glue the tools together and twist; repeat with smaller plates, which need less torque.",
     visible="C times the plateau modulus of about 0.05.",
-)
+)  # fmt: skip
 
 
 class WallSlip(SeriesElement):
@@ -140,20 +119,14 @@ WALL_SLIP = WallSlip(
     name="wall_slip",
     parameters=(
         EffectParameter(
-            "slip",
-            "s",
-            "1/(Pa s)",
-            low=0.0,
-            high=10.0,
-            scale="fluidity",
-            first_trial=0.01,
-            range_source="slip cannot exceed the deformation commanded, s σ = γ̇; ten times leaves "
-            "room for runs that differ",
+            "slip", "s", "1/(Pa s)", low=0.0, high=10.0, scale="fluidity", first_trial=0.01,
             range_scale="fluidity",
+            range_source="slip cannot exceed the deformation commanded, s σ = γ̇; ten times "
+            "leaves room for runs that differ",
         ),
     ),
     equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - s\,\sigma,\quad s = 2 b / H",
     source="Yoshimura & Prud'homme 1988, J. Rheol. 32, 53 (slip velocity b sigma, gap H)",
     check="Repeat with another gap H: slip goes as 1/H; roughen the plates.",
     visible="s of about 5 % of the inverse zero-shear viscosity.",
-)
+)  # fmt: skip

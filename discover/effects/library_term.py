@@ -1,11 +1,9 @@
-"""Any term of the tensor library as an effect: what nobody has named yet can still be found."""
+"""Terms of the tensor library as effects."""
 
 from dataclasses import dataclass
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter
-from tensor_library.law_terms import LawTerm
-from tensor_library.library import build_library
-from tensor_library.terms import CandidateTerm
+from tensor_library import CandidateTerm, LawTerm, build_library
 
 # Terms that are an effect with a name already, or the base law's own
 _NAMED = ("sigma.sigma", "sigma.gammadot+gammadot.sigma", "tr(sigma)*sigma")
@@ -72,18 +70,12 @@ def library_term(term: CandidateTerm) -> LibraryTerm:
 
 
 def simplest_terms() -> list[LibraryTerm]:
-    """Return the sixteen simplest terms of the library.
-
-    Together they are a law too flexible to be believed, which tells what a law may still change.
-    """
+    """Return the sixteen simplest terms of the library: a law too flexible to be believed."""
     simple = (term for term in build_library(degree=1).terms if term.closed_form is None)
     return [library_term(term) for term in simple][:_SIMPLEST]
 
 
 def library_effects(degree: int = 1) -> tuple[LibraryTerm, ...]:
-    """Return every term of the tensor library up to a degree that no named effect covers.
-
-    `degree`: highest degree of the invariant multipliers.
-    """
+    """Return the library terms up to a degree of the invariants that no named effect covers."""
     terms = build_library(degree=degree).terms
     return tuple(library_term(term) for term in terms if term.name not in _NAMED)

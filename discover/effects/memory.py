@@ -7,9 +7,9 @@ from tensor_library.isotropic_function import scalars
 
 
 class Thixotropy(StateEffect):
-    """Stress in proportion to a structure s that obeys ds/dt = (1 − s)/t_b − k |γ̇| s.
+    """Stress in proportion to a structure s with ds/dt = (1 − s)/t_b − k |γ̇| s.
 
-    Moore's kinetics   [Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009].
+    [Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009]
     """
 
     rest = 1.0
@@ -33,51 +33,36 @@ class Thixotropy(StateEffect):
 
 
 THIXOTROPY = Thixotropy(
-    name="thixotropy",
+    name="thixotropy", complexity=2,
     parameters=(
         EffectParameter(
-            "breakdown",
-            "k",
-            meaning="breakdown per unit strain",
-            low=0.0,
-            high=1e3,
+            "breakdown", "k", meaning="breakdown per unit strain", low=0.0, high=1e3,
             first_trial=0.02,
             range_source="a strain of 1/k breaks the structure: suspensions of attractive "
             "particles, the most brittle, yield from 0.001 on (Bonn et al. 2017, Rev. Mod. Phys. "
             "89, 035005)",
         ),
         EffectParameter(
-            "build_up_time",
-            r"t_\mathrm{b}",
-            "s",
-            low=1e-3,
-            high=1e6,
-            scale="run_time",
-            first_trial=0.3,
+            "build_up_time", r"t_\mathrm{b}", "s", low=1e-3, high=1e6, scale="run_time",
+            first_trial=0.3, ends=("high",), endless="damping_by_total_strain",
             range_source="from the Brownian time 6πηa³/kT of particles of 0.1 µm in water, some "
             "milliseconds, to structures that build up over weeks or never (Mewis & Wagner 2009)",
-            ends=("high",),
-            endless="damping_by_total_strain",
         ),
     ),
-    equation=(
-        r"G_k \to s\,G_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}}"
-        r" - k\,|\dot\gamma|\,s"
-    ),
+    equation=r"G_k \to s\,G_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}} - "
+    r"k\,|\dot\gamma|\,s",
     source="Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009, Adv. Colloid "
     "Interface Sci. 147-148, 214",
     check="Start the flow again after rests: the overshoot grows with the length of the rest.",
     visible="k times the strain of about 0.05, where that strain is reached within t_b.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class ViscousHeating(StateEffect):
-    """Relaxation times shortened by the heat of the flow   [Winter 1977].
+    """Relaxation times shortened by the heat of the flow by exp(−Θ) [Winter 1977].
 
-    Θ is the logarithm of the shift factor: dΘ/dt = b σγ̇ − Θ/t_h, where b is −d ln a_T/dT over
-    the heat capacity per volume, and t_h the time in which the heat leaves the gap. All
-    relaxation times carry the factor exp(−Θ).
+    dΘ/dt = b σγ̇ − Θ/t_h: b is −d ln a_T/dT over the heat capacity per volume, t_h the time in
+    which heat leaves the gap.
     """
 
     def source_and_decay(self, values, shear_rate, stress):
@@ -100,92 +85,60 @@ class ViscousHeating(StateEffect):
 
 
 VISCOUS_HEATING = ViscousHeating(
-    name="viscous_heating",
+    name="viscous_heating", complexity=2,
     parameters=(
         EffectParameter(
-            "heating",
-            "b",
-            "1/Pa",
-            meaning="fall of ln λ per unit work",
-            low=0.0,
-            high=1e-6,
-            scale="inverse_stress",
-            first_trial=0.01,
+            "heating", "b", "1/Pa", meaning="fall of ln λ per unit work", low=0.0, high=1e-6,
+            scale="inverse_stress", first_trial=0.01,
             range_source="−d ln a_T/dT is 0.01 to 0.1 1/K, and 0.8 at a glass transition (Ferry "
             "1980, ch. 11: 2.303 · 17.44/51.6 K); the heat capacity per volume of liquids is 1 to "
             "4 MJ/(m³ K)",
         ),
         EffectParameter(
-            "heat_loss_time",
-            r"t_\mathrm{h}",
-            "s",
-            low=1e-4,
-            high=1e5,
-            scale="run_time",
-            first_trial=0.3,
+            "heat_loss_time", r"t_\mathrm{h}", "s", low=1e-4, high=1e5, scale="run_time",
+            first_trial=0.3, ends=("high",),
             range_source="H²/(π² a) with the diffusivity of heat of liquids, a = 1e-7 m²/s, and a "
             "gap H from 10 µm on; insulating walls, and times shifted to another temperature, "
             "lengthen it without limit (Winter 1977)",
-            ends=("high",),
         ),
     ),
-    equation=(
-        r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} ="
-        r" b\,\sigma\dot\gamma - \frac{\Theta}{t_\mathrm{h}}"
-    ),
+    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} = b\,\sigma\dot\gamma "
+    r"- \frac{\Theta}{t_\mathrm{h}}",
     source="Winter 1977, Adv. Heat Transfer 13, 205",
     check="Repeat with half the gap, which cools faster; measure the temperature of the sample.",
     visible="b times the work done per volume within t_h of about 0.05.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class SofteningByWork(ViscousHeating):
     """Relaxation times shortened by work, which the fluid forgets in a time t_r.
 
-    The equation is that of viscous heating, and the cause is not: junctions or structure that work
-    breaks, at energies that warm nothing.
+    The equation is that of viscous heating; the cause is junctions or structure that work breaks.
     """
 
 
 SOFTENING_BY_WORK = SofteningByWork(
-    name="softening_by_work",
+    name="softening_by_work", complexity=3,
     parameters=(
         EffectParameter(
-            "softening",
-            "b",
-            "1/Pa",
-            meaning="fall of ln λ per unit work",
-            low=0.0,
-            high=10.0,
-            scale="inverse_stress",
-            first_trial=0.01,
+            "softening", "b", "1/Pa", meaning="fall of ln λ per unit work", low=0.0, high=10.0,
+            scale="inverse_stress", first_trial=0.01, range_scale="inverse_stress",
             range_source="the work 1/b, σ times a strain, takes a deformation of more than 10 %: "
             "networks of chains, which are known to soften by work, are linear up to there "
             "(Treloar 1975, The Physics of Rubber Elasticity, ch. 5)",
-            range_scale="inverse_stress",
         ),
         EffectParameter(
-            "recovery_time",
-            r"t_\mathrm{r}",
-            "s",
-            low=1e-3,
-            high=1e6,
-            scale="run_time",
-            first_trial=0.3,
+            "recovery_time", r"t_\mathrm{r}", "s", low=1e-3, high=1e6, scale="run_time",
+            first_trial=0.3, ends=("high",),
             range_source="like the build-up time of thixotropy, from milliseconds to never: "
             "rubber stays as soft as its first stretch made it (Mullins 1969)",
-            ends=("high",),
         ),
     ),
-    equation=(
-        r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} ="
-        r" b\,\sigma\dot\gamma - \frac{\Theta}{t_\mathrm{r}}"
-    ),
+    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} = b\,\sigma\dot\gamma "
+    r"- \frac{\Theta}{t_\mathrm{r}}",
     source="Mullins 1969, Rubber Chem. Technol. 42, 339, and Ogden & Roxburgh 1999, Proc. R. Soc. "
     "A 455, 2861 for softening by work; that it shortens times, as heat would, is an assumption",
     check="Repeat a weak flow after a strong one, at once and after rests; the temperature does "
     "not change.",
     visible="b times the work done per volume within t_r of about 0.05.",
-    complexity=3,
-)
+)  # fmt: skip

@@ -1,19 +1,17 @@
-"""Effects of the fluid: terms of the law of every mode, and what stands beside the modes."""
+"""Effects of the fluid: terms of the law of every mode, added modes and stresses."""
 
 import jax.numpy as jnp
 
 from discover.effects.base import ConstitutiveEffect, EffectParameter, ModeEffect
 from discover.laws.textbook.classical import fene_p_terms
-from tensor_library.algebra import anticommutator, identity_like, inner, square, trace
-from tensor_library.law_terms import LawTerm
+from tensor_library import LawTerm, anticommutator, identity_like, inner, square, trace
 
 
 class ConvectiveConstraintRelease(ConstitutiveEffect):
-    """Adds c tr(σ·γ̇)[(1 + β)σ + I]   [Likhtman & Graham 2003, JNNFM 114, 1].
+    """Adds c tr(σ·γ̇)[(1 + β)σ + I] [Likhtman & Graham 2003, JNNFM 114, 1].
 
-    With c = 1/3 it is the Rolie–Poly law without stretch. With β = 0 nothing is released, and it
-    is the law of strands that retract partly, of rigid rods where c = 1/3   [Larson 1984, J. Rheol.
-    28, 545].
+    c = 1/3 is Rolie–Poly without stretch; β = 0 are partly retracting strands, with c = 1/3 rigid
+    rods [Larson 1984, J. Rheol. 28, 545].
     """
 
     def extra_term(self, values, stress, rate):
@@ -31,48 +29,33 @@ class ConvectiveConstraintRelease(ConstitutiveEffect):
 
 
 CONVECTIVE_CONSTRAINT_RELEASE = ConvectiveConstraintRelease(
-    name="convective_constraint_release",
+    name="convective_constraint_release", complexity=3, explicit_rate=True,
     parameters=(
         EffectParameter(
-            "c",
-            "c",
-            low=0.0,
-            high=1.0,
-            first_trial=0.01,
+            "c", "c", low=0.0, high=1.0, first_trial=0.01,
             range_source="1/3 is the law of Likhtman & Graham without stretch, in which the flow "
             "does not change the length of the chains; at three times that it would have to",
         ),
         EffectParameter(
-            "beta",
-            r"\beta",
-            low=0.0,
-            high=1.0,
-            first_trial=0.5,
+            "beta", r"\beta", low=0.0, high=1.0, first_trial=0.5, ends=("low", "high"),
+            absent="partly_retracting_strands",
             range_source="Likhtman & Graham 2003: the share of released constraints that counts, "
             "from none to all",
-            ends=("low", "high"),
-            absent="partly_retracting_strands",
         ),
     ),
-    equation=(
-        r"h \mathrel{+}= c\,\mathrm{tr}(\sigma\cdot\dot\gamma)"
-        r"\left[(1+\beta)\,\sigma + I\right]"
-    ),
+    equation=r"h \mathrel{+}= c\,\mathrm{tr}(\sigma\cdot\dot\gamma)\left[(1+\beta)\,\sigma + "
+    r"I\right]",
     source="Likhtman & Graham 2003, J. Non-Newtonian Fluid Mech. 114, 1",
     check="Measure steady shear at high rates: the stress should not fall with the rate.",
     visible="c of about 0.02 at a Weissenberg number of 1.",
-    complexity=3,
-    explicit_rate=True,
-)
+)  # fmt: skip
 
 
 class FiniteExtensibility(ConstitutiveEffect):
-    """Turns the Maxwell law into FENE-P   [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
+    """Turns the Maxwell law into FENE-P [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
 
-    In stress form, with q = 1/L² and the springs' factor f = 1 + q tr σ; see
-    `discover.laws.FenePeterlin`, whose term this is with 1 − q tr A = (1 − 3q)/f put in. Its rate
-    comes from the elimination of the conformation A, whose own equation names none beside the
-    convected derivative, so the law stays well-posed in fast flow.
+    In stress form, with q = 1/L² and f = 1 + q tr σ: the term of `discover.laws.FenePeterlin` with
+    1 − q tr A = (1 − 3q)/f. Its rate comes from eliminating A, so the law stays well-posed.
     """
 
     def extra_term(self, values, stress, rate):
@@ -89,28 +72,21 @@ class FiniteExtensibility(ConstitutiveEffect):
 
 
 FINITE_EXTENSIBILITY = FiniteExtensibility(
-    name="finite_extensibility",
+    name="finite_extensibility", complexity=2,
     parameters=(
         EffectParameter(
-            "q",
-            "q",
-            low=0.0,
-            high=0.3,
-            first_trial=0.005,
-            range_source="Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already, so that "
-            "q is below 1/3",
+            "q", "q", low=0.0, high=0.3, first_trial=0.005,
+            range_source="Bird, Dotson & Johnson 1980: a chain at rest has L² = 3 already, so "
+            "that q is below 1/3",
         ),
     ),
-    equation=(
-        r"h \mathrel{+}= q\,\mathrm{tr}(\sigma)\,\sigma - \frac{q}{1 - 3q}"
-        r"\left[\mathrm{tr}(\sigma\cdot\dot\gamma) - (1 + q\,\mathrm{tr}\,\sigma)\,"
-        r"\mathrm{tr}\,\sigma\right](\sigma + I),\quad q = 1/L^2"
-    ),
+    equation=r"h \mathrel{+}= q\,\mathrm{tr}(\sigma)\,\sigma - \frac{q}{1 - "
+    r"3q}\left[\mathrm{tr}(\sigma\cdot\dot\gamma) - (1 + "
+    r"q\,\mathrm{tr}\,\sigma)\,\mathrm{tr}\,\sigma\right](\sigma + I),\quad q = 1/L^2",
     source="Bird, Dotson & Johnson 1980, J. Non-Newtonian Fluid Mech. 7, 213 (FENE-P)",
     check="Measure uniaxial extension: the viscosity should level off; N2 should be zero.",
     visible="q of about 0.02 at a Weissenberg number of 1, less in faster flow.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class GiesekusMobility(ConstitutiveEffect):
@@ -130,12 +106,7 @@ GIESEKUS_MOBILITY = GiesekusMobility(
     name="giesekus_mobility",
     parameters=(
         EffectParameter(
-            "alpha",
-            r"\alpha",
-            meaning="mobility",
-            low=0.0,
-            high=1.0,
-            first_trial=0.01,
+            "alpha", r"\alpha", meaning="mobility", low=0.0, high=1.0, first_trial=0.01,
             range_source="Giesekus 1982: a mobility that no stress can make negative",
         ),
     ),
@@ -143,7 +114,7 @@ GIESEKUS_MOBILITY = GiesekusMobility(
     source="Giesekus 1982, J. Non-Newtonian Fluid Mech. 11, 69",
     check="Measure N2 at low rates: N2/N1 should be near −α/2.",
     visible="alpha of about 0.05 at a Weissenberg number of 1.",
-)
+)  # fmt: skip
 
 
 class NonAffineMotion(ConstitutiveEffect):
@@ -159,15 +130,10 @@ class NonAffineMotion(ConstitutiveEffect):
 
 
 NON_AFFINE_MOTION = NonAffineMotion(
-    name="non_affine_motion",
+    name="non_affine_motion", explicit_rate=True,
     parameters=(
         EffectParameter(
-            "xi",
-            r"\xi",
-            meaning="slip of the network",
-            low=0.0,
-            high=1.0,
-            first_trial=0.01,
+            "xi", r"\xi", meaning="slip of the network", low=0.0, high=1.0, first_trial=0.01,
             range_source="Johnson & Segalman 1977: from the upper (0) to the lower (2) convected "
             "derivative; shear stress and N1 depend on ξ(2 − ξ) alone and cannot tell ξ from 2 − "
             "ξ; the smaller one is named, since measured −N2/N1 = ξ/2 is small",
@@ -177,8 +143,15 @@ NON_AFFINE_MOTION = NonAffineMotion(
     source="Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255",
     check="Measure a fast start-up: the stress should oscillate; N2/N1 should be near −ξ/2.",
     visible="xi of about 0.05 at a Weissenberg number of 1.",
-    explicit_rate=True,
-)
+)  # fmt: skip
+
+
+_ELONGATION = EffectParameter(
+    "epsilon", r"\varepsilon", meaning="elongational parameter", low=0.0, high=10.0,
+    first_trial=0.01,
+    range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at 2 Gλ/ε, "
+    "which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
+)  # fmt: skip
 
 
 class ExponentialNetworkLoss(ConstitutiveEffect):
@@ -196,25 +169,13 @@ class ExponentialNetworkLoss(ConstitutiveEffect):
 
 
 PTT_EXPONENTIAL = ExponentialNetworkLoss(
-    name="ptt_exponential",
-    parameters=(
-        EffectParameter(
-            "epsilon",
-            r"\varepsilon",
-            meaning="elongational parameter",
-            low=0.0,
-            high=10.0,
-            first_trial=0.01,
-            range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at "
-            "2 Gλ/ε, which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
-        ),
-    ),
+    name="ptt_exponential", complexity=2,
+    parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= (e^{\varepsilon\,\mathrm{tr}\,\sigma} - 1)\,\sigma",
     source="Phan-Thien 1978, J. Rheol. 22, 259",
     check="Measure uniaxial extension: the viscosity should pass a maximum; N2 should be zero.",
     visible="epsilon of about 0.03 at a Weissenberg number of 1.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class LinearNetworkLoss(ConstitutiveEffect):
@@ -232,23 +193,12 @@ class LinearNetworkLoss(ConstitutiveEffect):
 
 PTT_LINEAR = LinearNetworkLoss(
     name="ptt_linear",
-    parameters=(
-        EffectParameter(
-            "epsilon",
-            r"\varepsilon",
-            meaning="elongational parameter",
-            low=0.0,
-            high=10.0,
-            first_trial=0.01,
-            range_source="Phan-Thien & Tanner 1977: fast extension of linear PTT ends at "
-            "2 Gλ/ε, which ten puts to a fifteenth of Trouton's 3 Gλ; fluids have 0.01 to 1",
-        ),
-    ),
+    parameters=(_ELONGATION,),
     equation=r"h \mathrel{+}= \varepsilon\,\mathrm{tr}(\sigma)\,\sigma",
     source="Phan-Thien & Tanner 1977, J. Non-Newtonian Fluid Mech. 2, 353",
     check="Measure uniaxial extension: the viscosity should level off; N2 should be zero.",
     visible="epsilon of about 0.03 at a Weissenberg number of 1.",
-)
+)  # fmt: skip
 
 
 _AT_REST = 1e-300
@@ -258,11 +208,10 @@ _AT_REST = 1e-300
 class StrainDamping(ConstitutiveEffect):
     """Adds n λ|γ̇| (σ + I), with |γ̇|² = ½ γ̇:γ̇.
 
-    Of the strands that carry stress, e^{−nγ} are left after a strain γ. Where the flow does not
-    turn that is the K-BKZ law with Wagner's damping function exactly   [Wagner 1976, Rheol. Acta
-    15, 136]. Where it does, strain is added up without regard to its sign: a strand that was lost
-    does not come back   [after Wagner & Stephenson 1979, J. Rheol. 23, 489, who take the smallest
-    damping since].
+    After a strain γ the share e^{−nγ} of the strands carries stress: where the flow does not turn,
+    K-BKZ with Wagner's damping function [Wagner 1976, Rheol. Acta 15, 136]. Strain adds up without
+    regard to sign: lost strands do not come back [after Wagner & Stephenson 1979, J. Rheol. 23,
+    489].
     """
 
     def extra_term(self, values, stress, rate):
@@ -272,14 +221,10 @@ class StrainDamping(ConstitutiveEffect):
 
 
 STRAIN_DAMPING = StrainDamping(
-    name="strain_damping",
+    name="strain_damping", explicit_rate=True,
     parameters=(
         EffectParameter(
-            "n",
-            "n",
-            low=0.0,
-            high=10.0,
-            first_trial=0.02,
+            "n", "n", low=0.0, high=10.0, first_trial=0.02,
             range_source="a strain of 1/n takes the strands, and networks of chains are linear up "
             "to 10 % (Treloar 1975, The Physics of Rubber Elasticity, ch. 5); melts have 0.1 to "
             "0.4 (Wagner 1976)",
@@ -289,18 +234,16 @@ STRAIN_DAMPING = StrainDamping(
     source="Wagner 1976, Rheol. Acta 15, 136; Wagner & Stephenson 1979, J. Rheol. 23, 489",
     check="Step the strain: the relaxation curves should differ by a factor e^{−nγ} alone.",
     visible="n times the strain within a relaxation time of about 0.05.",
-    explicit_rate=True,
-)
+)  # fmt: skip
 
 
 _TINY = 1e-12
 
 
 class YieldStress(ConstitutiveEffect):
-    """Lets only the stress beyond yield relax   [Saramito 2007, JNNFM 145, 1].
+    """Lets only the stress beyond yield relax [Saramito 2007, JNNFM 145, 1].
 
-    Relaxation carries the factor max(0, 1 − Y/|σ_d|), where |σ_d| is the size of the deviator,
-    √(σ_d:σ_d/2): below yield a mode is an elastic solid.
+    Relaxation carries the factor max(0, 1 − Y/|σ_d|), with |σ_d| = √(σ_d:σ_d/2) of the deviator.
     """
 
     def extra_term(self, values, stress, rate):
@@ -312,27 +255,20 @@ class YieldStress(ConstitutiveEffect):
 
 
 YIELD_STRESS = YieldStress(
-    name="yield_stress",
+    name="yield_stress", complexity=2,
     parameters=(
         EffectParameter(
-            "yield_strain",
-            "Y",
-            low=0.0,
-            high=10.0,
-            first_trial=0.01,
+            "yield_strain", "Y", low=0.0, high=10.0, first_trial=0.01,
             range_source="Bonn et al. 2017, Rev. Mod. Phys. 89, 035005: soft solids yield at "
             "strains of 0.001 to 1, elastic gels at a few",
         ),
     ),
-    equation=(
-        r"h \mathrel{-}= \min\left(1, \frac{Y}{|\sigma_d|}\right)\sigma,"
-        r"\quad \sigma_\mathrm{y} = Y\,G"
-    ),
+    equation=r"h \mathrel{-}= \min\left(1, \frac{Y}{|\sigma_d|}\right)\sigma,\quad "
+    r"\sigma_\mathrm{y} = Y\,G",
     source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
     check="Creep below and above Y times the modulus: only above it should flow go on.",
     visible="Y of about 5 % of the dimensionless stress.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class RelaxationMode(ModeEffect):
@@ -344,44 +280,28 @@ class RelaxationMode(ModeEffect):
 
 
 RELAXATION_MODE = RelaxationMode(
-    name="relaxation_mode",
+    name="relaxation_mode", complexity=2,
     parameters=(
         EffectParameter(
-            "G",
-            "G_+",
-            "Pa",
-            meaning="modulus of the added mode",
-            low=0.0,
-            high=1e10,
-            scale="stress",
-            first_trial=0.05,
+            "G", "G_+", "Pa", meaning="modulus of the added mode", low=0.0, high=1e10,
+            scale="stress", first_trial=0.05,
             range_source="Ferry 1980, ch. 2: glasses have 1e9 Pa, and nothing that flows has more",
         ),
         EffectParameter(
-            "lambda",
-            r"\lambda_+",
-            "s",
-            meaning="time of the added mode",
-            low=1e-6,
-            high=30.0,
-            scale="run_time",
-            first_trial=0.1,
+            "lambda", r"\lambda_+", "s", meaning="time of the added mode", low=1e-6, high=30.0,
+            scale="run_time", first_trial=0.1, range_scale="run_time",
             range_source="a mode that is a millionth of a run long cannot be told from a solvent, "
             "nor one that is 30 runs long from a spring (Davies & Anderssen 1997, J. "
             "Non-Newtonian Fluid Mech. 73, 163: records determine times little beyond their own "
             "window)",
-            range_scale="run_time",
         ),
     ),
-    equation=(
-        r"\sigma \mathrel{+}= G_+\,\sigma_+,\quad \lambda_+\overset{\nabla}{\sigma}_+ + \sigma_+"
-        r" + h(\sigma_+) = \lambda_+\dot\gamma"
-    ),
+    equation=r"\sigma \mathrel{+}= G_+\,\sigma_+,\quad \lambda_+\overset{\nabla}{\sigma}_+ + "
+    r"\sigma_+ + h(\sigma_+) = \lambda_+\dot\gamma",
     source="Ferry 1980, Viscoelastic Properties of Polymers, ch. 1",
     check="Measure small-amplitude oscillation around the angular frequency 1/λ.",
     visible="G lambda of about 5 % of the zero-shear viscosity.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 class SolventViscosity(ConstitutiveEffect):
@@ -396,20 +316,14 @@ SOLVENT_VISCOSITY = SolventViscosity(
     name="solvent_viscosity",
     parameters=(
         EffectParameter(
-            "eta_s",
-            r"\eta_s",
-            "Pa s",
-            low=0.0,
-            high=10.0,
-            scale="viscosity",
-            first_trial=0.01,
+            "eta_s", r"\eta_s", "Pa s", low=0.0, high=10.0, scale="viscosity", first_trial=0.01,
+            range_scale="viscosity",
             range_source="a part of the stress cannot exceed the whole in the fastest flow; ten "
             "times leaves room for runs that differ",
-            range_scale="viscosity",
         ),
     ),
     equation=r"\sigma \mathrel{+}= \eta_s\,\dot\gamma",
     source="Oldroyd 1950, Proc. R. Soc. A 200, 523",
     check="Step the rate: the stress should jump at once; G'' should end linear in frequency.",
     visible="eta_s of about 5 % of the zero-shear viscosity; less where the rate changes fast.",
-)
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""The dictionary as a page to read: docs/effects.md is what this writes."""
+"""The dictionary of effects as a page: writes docs/effects.md."""
 
 from collections.abc import Iterator
 

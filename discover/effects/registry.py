@@ -1,22 +1,11 @@
-"""All effects by name.
-
-An effect that a module of the dictionary holds is built in. Effects of a user's own are registered,
-by a program or by an installed package (see docs/adding-an-effect.md).
-"""
+"""Effects by name: the built-in ones, and a user's own (docs/adding-an-effect.md)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from discover.effects import kinematic, memory, network, signal, structure
-from discover.effects.base import (
-    AbstractEffect,
-    ConstitutiveEffect,
-    EffectParameter,
-    KinematicEffect,
-    SignalEffect,
-)
+from discover.effects import base, kinematic, memory, network, signal, structure
 from discover.effects.library_term import library_effects, library_term
 from discover.errors import InputError, Problems
 from discover.validation import require_new_name
@@ -28,33 +17,33 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def _built_in() -> dict[str, AbstractEffect]:
+def _built_in() -> dict[str, base.AbstractEffect]:
     modules = (network, memory, structure, kinematic, signal)
-    found = [e for m in modules for e in vars(m).values() if isinstance(e, AbstractEffect)]
+    found = [e for m in modules for e in vars(m).values() if isinstance(e, base.AbstractEffect)]
     return {effect.name: effect for effect in sorted(found, key=lambda e: (e.kind, e.name))}
 
 
-EFFECTS: Registry[AbstractEffect] = Registry("effect", "discover.effects", _built_in)
+EFFECTS: Registry[base.AbstractEffect] = Registry("effect", "discover.effects", _built_in)
 """Effects that have a name; a package's own by entry points of this group."""
 
 
-def named_effects() -> Mapping[str, AbstractEffect]:
+def named_effects() -> Mapping[str, base.AbstractEffect]:
     """Return the effects that have a name: constitutive, kinematic, signal, then registered."""
     return EFFECTS
 
 
 @cache
-def built_in_effects() -> Mapping[str, AbstractEffect]:
+def built_in_effects() -> Mapping[str, base.AbstractEffect]:
     """Return the effects that a model may have without a user's own, those of the library last."""
     nameless = library_effects()
     return EFFECTS.built_in | {effect.name: effect for effect in nameless}
 
 
 def effects_table() -> "pd.DataFrame":
-    """Return the effects that are known by name, one line for each parameter, the amplitude first.
+    """Return the effects known by name, one line a parameter, the amplitude first.
 
-    An amplitude of zero is no effect. `low` and `high` are in `unit` where `range_scale` is
-    ``one``, and else multiples of that property of the data.
+    `low` and `high` are in `unit` where `range_scale` is ``one``, else in that property of the
+    data.
 
     Examples
     --------
@@ -74,19 +63,10 @@ def effects_table() -> "pd.DataFrame":
     return pd.DataFrame(lines).set_index("effect")
 
 
-def register_effect(effect: AbstractEffect) -> AbstractEffect:
-    """Make an effect of one's own known by name, to studies and loops in this process.
+def register_effect(effect: base.AbstractEffect) -> base.AbstractEffect:
+    """Make an effect of one's own known by name to studies and loops in this process.
 
     An installed package does so in every process: see docs/adding-an-effect.md.
-
-    Parameters
-    ----------
-    effect
-        Made as docs/adding-an-effect.md shows.
-
-    Returns
-    -------
-    The effect.
 
     Raises
     ------
@@ -98,7 +78,7 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
     >>> import discover as dc
     >>> dc.register_effect(effect)  # doctest: +SKIP
     """
-    if not isinstance(effect, ConstitutiveEffect | KinematicEffect | SignalEffect):
+    if not isinstance(effect, base.ConstitutiveEffect | base.KinematicEffect | base.SignalEffect):
         raise InputError(
             "An effect must be a ConstitutiveEffect, a KinematicEffect or a SignalEffect; got "
             f"{effect!r}. See docs/adding-an-effect.md."
@@ -110,7 +90,7 @@ def register_effect(effect: AbstractEffect) -> AbstractEffect:
     return effect
 
 
-def make_effect(name: str) -> AbstractEffect:
+def make_effect(name: str) -> base.AbstractEffect:
     """Return the effect of this name, or the effect that adds the library term so spelled."""
     effects = named_effects()
     if name in effects:
@@ -124,7 +104,7 @@ def make_effect(name: str) -> AbstractEffect:
         ) from error
 
 
-def parameters_of(name: str) -> dict[str, EffectParameter]:
+def parameters_of(name: str) -> dict[str, base.EffectParameter]:
     """Return the parameters of an effect by name; none of one that was given as an object."""
     try:
         return {one.name: one for one in make_effect(name).parameters}
@@ -138,12 +118,12 @@ Written = Any
 
 @dataclass(frozen=True)
 class KnownEffect:
-    """An effect that is part of the declared model.
+    """Effect that is part of the declared model.
 
     `values`: of its parameters, in their units and order; None where one is to be fitted.
     """
 
-    effect: AbstractEffect
+    effect: base.AbstractEffect
     values: tuple[float | None, ...]
 
     @property
@@ -173,9 +153,8 @@ class KnownEffect:
 def known_effects(written: Written, where: str = "effects") -> tuple[KnownEffect, ...]:
     """Return the effects that a study or a program names.
 
-    `written`: by name of the effect: values of its parameters, ``"fit"`` for those to be fitted
-    along. `where`: the place, for messages. Raises InputError if an effect or a parameter is
-    unknown, one is missing, or a value is outside its range.
+    `written`: effect → parameter → value or ``"fit"``. `where`: the place, for messages. Raises
+    InputError if a name is unknown, a parameter missing, or a value outside its range.
     """
     if not isinstance(written, Mapping):
         raise InputError(
@@ -221,7 +200,7 @@ def _known_effect(name: str, asked: object, where: str) -> KnownEffect:
     return KnownEffect(effect, tuple(values))
 
 
-def _value(asked: object, parameter: EffectParameter, where: str) -> float | None:
+def _value(asked: object, parameter: base.EffectParameter, where: str) -> float | None:
     if asked == "fit":
         return None
     if isinstance(asked, bool) or not isinstance(asked, int | float):

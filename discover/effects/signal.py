@@ -20,35 +20,26 @@ BEARING_FRICTION = BearingFriction(
     name="bearing_friction",
     parameters=(
         EffectParameter(
-            "friction",
-            r"\sigma_\mathrm{f}",
-            "Pa",
-            low=0.0,
-            high=1.0,
-            scale="stress",
-            first_trial=0.01,
+            "friction", r"\sigma_\mathrm{f}", "Pa", low=0.0, high=1.0, scale="stress",
+            first_trial=0.01, range_scale="stress",
             range_source="with more friction than stress, most records would be records of the "
             "bearing",
-            range_scale="stress",
         ),
     ),
-    equation=(
-        r"\sigma_\mathrm{rec} = \sigma"
-        r" + \sigma_\mathrm{f}\,\mathrm{sign}(\dot\gamma_\mathrm{tool})"
-    ),
+    equation=r"\sigma_\mathrm{rec} = \sigma + "
+    r"\sigma_\mathrm{f}\,\mathrm{sign}(\dot\gamma_\mathrm{tool})",
     source="Macosko 1994, Rheology, ch. 8: friction and residual torque of bearings",
     check="Turn the tool in air, slowly, both ways.",
     visible="sigma_f of about 5 % of the root-mean-square stress.",
-)
+)  # fmt: skip
 
 
 class EdgeFracture(SignalEffect):
-    """Beyond a strain the sheared area, and with it the torque, shrinks exponentially in strain.
+    """Beyond a strain the sheared area, and with it the torque, shrinks exponentially.
 
-    The strain counted is the total one, in both directions, since what has left does not come back.
-    An empirical form: theory says when an edge breaks   [Tanner & Keentok 1983, J. Rheol. 27, 47],
-    experiment that the torque then falls cycle by cycle   [Mattes, Vogt & Friedrich 2008, Rheol.
-    Acta 47, 929].
+    The strain is the total one, in both directions. Empirical: theory says when an edge breaks
+    [Tanner & Keentok 1983, J. Rheol. 27, 47], experiment that the torque then falls cycle by cycle
+    [Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929].
     """
 
     def recorded_stress(self, values, record):
@@ -58,42 +49,29 @@ class EdgeFracture(SignalEffect):
 
 
 EDGE_FRACTURE = EdgeFracture(
-    name="edge_fracture",
+    name="edge_fracture", complexity=2,
     parameters=(
         EffectParameter(
-            "loss",
-            "k",
-            meaning="of the stress per unit strain",
-            low=0.0,
-            high=10.0,
+            "loss", "k", meaning="of the stress per unit strain", low=0.0, high=10.0,
             first_trial=0.005,
             range_source="a strain of 1/k empties the gap: a crack grows inwards with the flow, "
             "and melts lose their torque over strains of ten and more (Mattes et al. 2008)",
         ),
         EffectParameter(
-            "critical_strain",
-            r"\gamma_\mathrm{c}",
-            low=0.0,
-            high=10.0,
-            scale="strain",
-            first_trial=0.3,
+            "critical_strain", r"\gamma_\mathrm{c}", low=0.0, high=10.0, scale="strain",
+            first_trial=0.3, range_scale="strain", ends=("low",),
             range_source="an edge that is still whole at the largest strain has no effect; it may "
             "also be broken from the start",
-            range_scale="strain",
-            ends=("low",),
         ),
     ),
-    equation=(
-        r"\sigma_\mathrm{rec} = \sigma\,e^{-k\,\max(0,\ \gamma_\mathrm{total} -"
-        r" \gamma_\mathrm{c})}"
-    ),
+    equation=r"\sigma_\mathrm{rec} = \sigma\,e^{-k\,\max(0,\ \gamma_\mathrm{total} - "
+    r"\gamma_\mathrm{c})}",
     source="Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929: the torque of melts falls from "
     "cycle to cycle. Tanner & Keentok 1983, J. Rheol. 27, 47, say when an edge breaks (by N2), "
     "not how the torque falls: the exponential in strain is an empirical form",
     check="Watch the edge; repeat with a smaller cone angle or a partitioned plate.",
     visible="k times the strain beyond the critical one of about 0.1.",
-    complexity=2,
-)
+)  # fmt: skip
 
 
 # Below this fraction of the record a step only marks a jump of the rate, whose torque is over
@@ -102,10 +80,7 @@ _JUMP = 1e-9
 
 
 class InstrumentInertia(SignalEffect):
-    """The stress recorded contains the inertia of the moving tool.
-
-    A correction for it that was too large leaves a negative one in the record.
-    """
+    """The stress recorded contains the inertia of the tool; negative if over-corrected."""
 
     def recorded_stress(self, values, record):
         """Return σ + I dγ̇/dt, with the rate of the tool, whatever the fluid feels of it."""
@@ -127,13 +102,7 @@ INSTRUMENT_INERTIA = InstrumentInertia(
     name="instrument_inertia",
     parameters=(
         EffectParameter(
-            "inertia",
-            "I",
-            "Pa s^2",
-            low=-1e3,
-            high=1e3,
-            scale="inertia",
-            first_trial=0.01,
+            "inertia", "I", "Pa s^2", low=-1e3, high=1e3, scale="inertia", first_trial=0.01,
             range_source="2 J H/(πR⁴) of motor and tool with J = 1e-4 N m s², plates of R = 4 mm "
             "and H = 1 mm give 120; a correction for it can be wrong by its whole size, either "
             "way: J is determined empirically, and its precision is rarely stated (Klemuk & Titze "
@@ -144,7 +113,7 @@ INSTRUMENT_INERTIA = InstrumentInertia(
     source="Krieger 1990, J. Rheol. 34, 471; Klemuk & Titze 2009, J. Rheol. 53, 765 for its error",
     check="Oscillate a Newtonian oil over the same frequencies; compare the raw phase.",
     visible="I omega of about 5 % of the dynamic viscosity at the highest frequency omega.",
-)
+)  # fmt: skip
 
 
 class StressDrift(SignalEffect):
@@ -159,23 +128,17 @@ STRESS_DRIFT = StressDrift(
     name="stress_drift",
     parameters=(
         EffectParameter(
-            "drift",
-            "d",
-            "Pa/s",
-            low=-2.0,
-            high=2.0,
-            scale="stress_rate",
-            first_trial=0.01,
+            "drift", "d", "Pa/s", low=-2.0, high=2.0, scale="stress_rate", first_trial=0.01,
+            range_scale="stress_rate",
             range_source="at twice the stress over the length of a run, half of the record is the "
             "drift of an instrument that measures nothing",
-            range_scale="stress_rate",
         ),
     ),
     equation=r"\sigma_\mathrm{rec} = \sigma + d\,t",
     source="Macosko 1994, Rheology, ch. 8: transducer drift",
     check="Record the stress of a sample at rest for as long as the longest run.",
     visible="d times the length of a run of about 10 % of its root-mean-square stress.",
-)
+)  # fmt: skip
 
 
 class StressGain(SignalEffect):
@@ -192,11 +155,7 @@ STRESS_GAIN = StressGain(
     name="stress_gain",
     parameters=(
         EffectParameter(
-            "gain_error",
-            "g",
-            low=-0.8,
-            high=4.0,
-            first_trial=0.01,
+            "gain_error", "g", low=-0.8, high=4.0, first_trial=0.01,
             range_source="a factor of five either way: the stress goes as 1/R³, and 25 mm entered "
             "for plates of 40 mm gives a factor of four (Macosko 1994, ch. 5)",
         ),
@@ -205,7 +164,7 @@ STRESS_GAIN = StressGain(
     source="Macosko 1994, Rheology, ch. 8: calibration and sample radius",
     check="Calibrate the transducer with a dead weight; look at the filling of the gap.",
     visible="g of about 0.05.",
-)
+)  # fmt: skip
 
 
 class StressOffset(SignalEffect):
@@ -222,23 +181,17 @@ STRESS_OFFSET = StressOffset(
     name="stress_offset",
     parameters=(
         EffectParameter(
-            "offset",
-            r"\sigma_0",
-            "Pa",
-            low=-1.0,
-            high=1.0,
-            scale="stress",
-            first_trial=0.01,
+            "offset", r"\sigma_0", "Pa", low=-1.0, high=1.0, scale="stress", first_trial=0.01,
+            range_scale="stress",
             range_source="with more offset than stress, most records would show only the zero of "
             "the transducer",
-            range_scale="stress",
         ),
     ),
     equation=r"\sigma_\mathrm{rec} = \sigma + \sigma_0",
     source="Macosko 1994, Rheology, ch. 8: transducer zero",
     check="Record the stress before the flow starts.",
     visible="sigma_0 of about 5 % of the root-mean-square stress.",
-)
+)  # fmt: skip
 
 
 class TimeDelay(SignalEffect):
@@ -258,13 +211,7 @@ TIME_DELAY = TimeDelay(
     name="time_delay",
     parameters=(
         EffectParameter(
-            "delay",
-            r"\delta",
-            "s",
-            low=0.0,
-            high=10.0,
-            scale="sampling_time",
-            first_trial=0.5,
+            "delay", r"\delta", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
             range_source="channels read one after another differ by a millisecond, and programs "
             "that average each point over seconds delay it by as much",
         ),
@@ -272,10 +219,9 @@ TIME_DELAY = TimeDelay(
     equation=r"\sigma_\mathrm{rec}(t) = \sigma(t - \delta)",
     source="Macosko 1994, Rheology, ch. 8: data acquisition",
     check="Record the angle and the torque of an elastic spring together.",
-    visible=(
-        "delta of about 5 % of the time in which the stress changes, 0.05/omega in oscillation."
-    ),
-)
+    visible="delta of about 5 % of the time in which the stress changes, 0.05/omega in "
+    "oscillation.",
+)  # fmt: skip
 
 
 class TransducerLag(SignalEffect):
@@ -294,13 +240,7 @@ TRANSDUCER_LAG = TransducerLag(
     name="transducer_lag",
     parameters=(
         EffectParameter(
-            "tau",
-            r"\tau",
-            "s",
-            low=0.0,
-            high=10.0,
-            scale="sampling_time",
-            first_trial=0.5,
+            "tau", r"\tau", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
             range_source="transducers answer in 0.001 to 0.1 s, and filters behind them average "
             "over seconds at most",
         ),
@@ -310,4 +250,4 @@ TRANSDUCER_LAG = TransducerLag(
     "rheometers: Macosko 1994, Rheology, ch. 8",
     check="Look up the filter of the transducer; strike it and record the response.",
     visible="tau of about 5 % of the time in which the stress changes, 0.05/omega in oscillation.",
-)
+)  # fmt: skip

@@ -15,21 +15,7 @@ from discover.equations.parts import (
 )
 
 __all__ = [
-    "FORMATS",
-    "AugmentedLaw",
-    "Box",
-    "Equation",
-    "HasEquation",
-    "NamedPart",
-    "StatePart",
-    "Tested",
-    "combined",
-    "effect_terms",
-    "equation_from_json",
-    "equation_to_json",
-    "law_parts",
-    "law_terms",
-    "read_result_laws",
-    "read_rheotool",
-    "write_equation",
-]
+    "FORMATS", "AugmentedLaw", "Box", "Equation", "HasEquation", "NamedPart", "StatePart", "Tested",
+    "combined", "effect_terms", "equation_from_json", "equation_to_json", "law_parts", "law_terms",
+    "read_result_laws", "read_rheotool", "write_equation",
+]  # fmt: skip

@@ -1,4 +1,4 @@
-"""A law as it leaves this package: terms, modes, and where it was tested."""
+"""Laws as they leave this package: terms, modes, and where they were tested."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,11 +10,15 @@ from jaxtyping import Real
 from numpy.typing import ArrayLike
 
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
-from discover.equations.spelling.markup import SEPARATOR, law_element, law_latex
+from discover.equations.spelling.markup import (
+    SEPARATOR,
+    extra_term_expression,
+    law_element,
+    law_latex,
+)
 from discover.errors import InputError
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.expansion import law_of_terms
-from discover.laws.multimode import Fluid
 from discover.summary_view import NotebookView
 from discover.words import percent_of
 from tensor_library.law_terms import Interval, LawTerm, LawTerms
@@ -25,14 +29,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Box:
-    """A range of flows.
+    """Range of flows.
 
-    Attributes
-    ----------
-    weissenberg
-        Least and largest Wi = λ̄ max|γ̇| of the flows.
-    deborah
-        Least and largest De of the flows: λ̄ω in oscillation, λ̄ over the length of the run else.
+    `weissenberg`: least and largest Wi = λ̄ max|γ̇|. `deborah`: of De, λ̄ω in oscillation and λ̄
+    over the length of the run else.
     """
 
     weissenberg: Interval
@@ -40,7 +40,7 @@ class Box:
 
     @property
     def text(self) -> str:
-        """The box in words."""
+        """Box in words."""
         return f"Wi {_span(self.weissenberg)}, De {_span(self.deborah)}"
 
 
@@ -48,14 +48,8 @@ class Box:
 class Tested:
     """Where a law was learned and where it was tested.
 
-    Attributes
-    ----------
-    learned_in
-        The flows that the fit saw.
-    judged_in
-        Flows that no fit saw and in which something is known; None where there were none.
-    worst_errors
-        Largest relative error of each quantity in the latter.
+    `learned_in`: flows that the fit saw. `judged_in`: others in which something is known; None
+    without. `worst_errors`: largest relative error of each quantity in the latter.
     """
 
     learned_in: Box
@@ -64,7 +58,7 @@ class Tested:
 
     @property
     def lines(self) -> list[str]:
-        """The same in words."""
+        """Sentences on where the law was learned and tested."""
         lines = [f"Learned in {self.learned_in.text}."]
         if self.judged_in is None:
             return [*lines, "Tested in no other flow."]
@@ -92,10 +86,9 @@ class Equation(NotebookView):
     tested
         Where it was learned and tested; None where unknown.
     named
-        A law that is no sum of terms, to whose h the terms are added; its constants may differ from
-        mode to mode. None for UCM.
+        Law that is no sum of terms, to whose h the terms are added; None for UCM.
     states
-        Of the whole fluid, which multiply the stress or the relaxation times of all modes.
+        Of the whole fluid, which scale the stress or the relaxation times of all modes.
 
     Examples
     --------
@@ -133,21 +126,15 @@ class Equation(NotebookView):
 
     @classmethod
     def of_fluid(cls, fluid: Fluid, parts: LawParts | None = None, **stated: Any) -> "Equation":
-        """Return the equation of a fluid.
+        """Return the equation of a fluid, of which `parts` of the law may be known.
 
-        `parts`: those of its law, where they are known. `stated`: what else an equation states.
         Raises InputError if the law has no name and is no sum of terms.
         """
         named, terms = parts or law_parts(fluid.law)
         return cls(
-            terms,
-            tuple(map(float, fluid.modulus)),
-            tuple(map(float, fluid.relaxation_time)),
-            fluid.law.linear_relaxation,
-            float(fluid.solvent_viscosity),
-            named=named,
-            **stated,
-        )
+            terms, tuple(map(float, fluid.modulus)), tuple(map(float, fluid.relaxation_time)),
+            fluid.law.linear_relaxation, float(fluid.solvent_viscosity), named=named, **stated,
+        )  # fmt: skip
 
     @property
     def mean_relaxation_time(self) -> float:
@@ -166,12 +153,10 @@ class Equation(NotebookView):
         )
 
     def law(self) -> AbstractConstitutiveLaw:
-        """Return h as a law that can be simulated, dimensionless.
+        """Return h as a dimensionless law that can be simulated.
 
-        Raises
-        ------
-        InputError
-            If constants differ from mode to mode, or the fluid has a state of its own.
+        Raises InputError if constants differ from mode to mode, or the fluid has a state of its
+        own.
         """
         if self.states:
             raise InputError(
@@ -198,19 +183,11 @@ class Equation(NotebookView):
         return law
 
     def fluid(self) -> Fluid:
-        """Return the fluid, with units, ready to simulate.
-
-        Raises
-        ------
-        InputError
-            If constants differ from mode to mode.
-        """
+        """Return the fluid, with units; raises InputError if constants differ from mode to mode."""
         return Fluid(self.law(), self.modulus, self.relaxation_time, self.solvent_viscosity)
 
     def sympy(self) -> "sympy.Expr":
         """Return h of a mode as a SymPy expression over non-commuting tensors."""
-        from discover.equations.spelling.symbolic import extra_term_expression
-
         return extra_term_expression(self.terms, self.named)
 
     def latex(self) -> str:
@@ -261,12 +238,10 @@ def flow_numbers(
     relaxation_time: float,
     frequency: float | None = None,
 ) -> tuple[float, float]:
-    """Return Wi and De of one flow.
-
-    Wi = λ̄ max|γ̇|. De = λ̄ω in oscillation and λ̄/T in a flow of length T that does not oscillate.
+    """Return Wi = λ̄ max|γ̇| and De of one flow: λ̄ω in oscillation, else λ̄/T with its length T.
 
     `times`, `shear_rate` in s and 1/s. `relaxation_time`: λ̄ in s. `frequency`: ω in rad/s where
-    known; otherwise from the time between changes of sign of the rate.
+    known; otherwise from the changes of sign of the rate.
     """
     length = float(times[-1]) if times[-1] > 0 else 1.0
     if frequency is None:
@@ -298,21 +273,9 @@ class HasEquation:
         raise NotImplementedError
 
     def sympy(self) -> "sympy.Expr":
-        """Return the extra term h as a SymPy expression over non-commuting tensors.
-
-        Raises
-        ------
-        InputError
-            If the law is no sum of library terms.
-        """
+        """Return h as a SymPy expression; raises InputError if it is no sum of library terms."""
         return self.equation().sympy()
 
     def latex(self) -> str:
-        """Return the dimensionless law as one LaTeX equation.
-
-        Raises
-        ------
-        InputError
-            If the law is no sum of library terms.
-        """
+        """Return the law as LaTeX; raises InputError if it is no sum of library terms."""
         return self.equation().latex()

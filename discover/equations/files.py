@@ -1,4 +1,4 @@
-"""Laws to and from files: every format, and what a folder of results holds."""
+"""Laws in files: every format, and what a folder of results holds."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -26,8 +26,8 @@ AUGMENTED, NEAREST, ANSWER = "augmented", "nearest_law", "answer"
 def read_result_laws(folder: str | Path) -> dict[str, Equation]:
     """Return the laws in a folder of results by name: those of the learners, or the augmented one.
 
-    `folder`: what ``discover compare`` or ``discover close-loop`` wrote, or the JSON file in it.
-    Raises InputError if there is no result, it is damaged, or its law cannot be written out.
+    `folder`: of ``discover compare`` or ``close-loop``, or its JSON file. Raises InputError if
+    there is no result, it is damaged, or its law cannot be written out.
     """
     return _laws(*read_result(folder))
 
@@ -35,7 +35,7 @@ def read_result_laws(folder: str | Path) -> dict[str, Equation]:
 def read_result(folder: str | Path) -> tuple[Any, str]:
     """Return what the JSON file in a folder of results holds, and the name of the file.
 
-    `folder`: as for `read_result_laws`. Raises InputError if there is none, or it is no JSON.
+    Raises InputError if there is none, or it is no JSON.
     """
     path = Path(folder)
     if path.suffix == ".json":
@@ -119,8 +119,8 @@ def write_equation(
 ) -> str:
     """Return an equation as text.
 
-    Raises InputError if there is no such format, an option does not belong to it, or it has not
-    this law.
+    Raises InputError if there is no such format, an option does not belong to it, or it lacks this
+    law.
     """
     if form not in FORMATS:
         raise InputError(unknown_name("format", form, FORMATS))

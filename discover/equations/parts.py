@@ -12,29 +12,20 @@ from jaxtyping import Array, Float
 
 from discover.effects import ConstitutiveEffect, StateEffect, WrittenState, known_effects
 from discover.errors import InputError
-from discover.laws.base import (
-    AbstractConstitutiveLaw,
-    AbstractExtendedLaw,
-    State,
-    as_state,
-    stress_in,
-)
+from discover.laws import LAWS, AbstractConstitutiveLaw, make_law
+from discover.laws.base import AbstractExtendedLaw, State, as_state, stress_in
 from discover.laws.each_mode import LawOfEachMode, law_of_mode
-from discover.laws.registry import LAWS, make_law, name_of
+from discover.laws.registry import name_of
+from tensor_library import CLOSED_FORMS, LawTerm
 from tensor_library.algebra import Symmetric
-from tensor_library.closed_forms import CLOSED_FORMS
 from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.law_terms import LawTerm
 
 
 @dataclass(frozen=True)
 class NamedPart:
-    """A law by its name.
+    """Law by its name, with dimensionless constants once for all modes, or once for each.
 
-    `constants`: its parameters, dimensionless: once for all modes, or once for each.
-
-    Raises InputError if there is no such law, or a parameter is missing, unknown or outside its
-    range.
+    Raises InputError if there is no such law, or a parameter is missing, unknown or out of range.
 
     Examples
     --------
@@ -56,10 +47,7 @@ class NamedPart:
         return self.constants[mode if len(self.constants) > 1 else 0]
 
     def built(self) -> AbstractConstitutiveLaw:
-        """Return the law, ready to simulate.
-
-        Raises InputError if the constants differ from mode to mode.
-        """
+        """Return the law; raises InputError if the constants differ from mode to mode."""
         if self.differing:
             raise InputError(
                 f"{', '.join(self.differing)} differs from one relaxation mode to the next, so "
@@ -80,10 +68,7 @@ class NamedPart:
 
     @property
     def function(self) -> IsotropicFunction:
-        """The law written out.
-
-        Raises InputError if nobody said how it is written.
-        """
+        """Law written out; raises InputError if nobody said how it is written."""
         written = LAWS[self.law].written
         if written is None:
             raise InputError(
@@ -95,13 +80,10 @@ class NamedPart:
 
 @dataclass(frozen=True)
 class StatePart:
-    """An effect with a state by its name.
+    """Effect with a state by its name, one state for all modes.
 
-    The state is one for all modes. It multiplies their stress, or their relaxation times wherever
-    these occur in their equations.
-
-    Raises InputError if there is no such effect, it has no state or nobody said how it is written,
-    or a parameter is missing, unknown or outside its range.
+    Raises InputError if there is no such effect, it has no written state, or a parameter is
+    missing, unknown or out of range.
 
     Examples
     --------
@@ -149,8 +131,8 @@ class StatePart:
     ) -> tuple[list[str], str, str]:
         """Return the rates of change, and the factors on stress and times, as text.
 
-        `spelled`: writes an expression with given texts for its scalars. `letters`: the texts of
-        the parameters, the levels, ``shear_rate`` and ``shear_stress``.
+        `spelled`: writes an expression with texts for its scalars: `letters` of the parameters, the
+        levels, ``shear_rate`` and ``shear_stress``.
         """
         import sympy
 
@@ -176,10 +158,7 @@ def law_terms(law: AbstractConstitutiveLaw) -> tuple[LawTerm, ...]:
 
 
 def effect_terms(effect: ConstitutiveEffect, values: np.ndarray) -> tuple[LawTerm, ...]:
-    """Return what a constitutive effect adds to h as a sum of terms.
-
-    `values`: its parameters in their order, shape (p,).
-    """
+    """Return what an effect of these values, shape (p,), adds to h as a sum of terms."""
     terms = effect.as_terms([float(value) for value in values])
     if terms is None:
         raise InputError(
@@ -222,9 +201,7 @@ class AugmentedLaw(AbstractExtendedLaw):
         return extra
 
     def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return the terms of the declared law, then those of the effects.
-
-        None if the declared law is no sum of library terms.
+        """Return the terms of the declared law, then those of the effects; None if it is no sum.
 
         Raises InputError if what an effect adds is none.
         """
@@ -256,8 +233,8 @@ class AugmentedLaw(AbstractExtendedLaw):
     def with_named(self, name: str) -> "tuple[AugmentedLaw, str] | None":
         """Return the law with an effect made part of the declared one, and that one's constant.
 
-        None where no law with a name has the term of the effect alone, with its amplitude for the
-        only constant, as Giesekus's law has its mobility; or where the declared law has terms.
+        None unless a named law is the effect alone, with its amplitude for the only constant, as
+        Giesekus's mobility, and the declared law has no terms.
         """
         effects = [effect.name for effect in self.effects]
         if name not in effects or self.base.as_terms() != ():
@@ -294,11 +271,9 @@ LawParts = tuple[NamedPart | None, tuple[LawTerm, ...]]
 
 
 def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
-    """Return h of a law as a law with a name, where it is no sum of terms, and a sum of terms.
+    """Return h of a law as a named law, where one is needed, and a sum of terms.
 
-    A law with constants of its own in each mode needs a name.
-
-    Raises InputError if it is neither.
+    Raises InputError if it is neither; a law with constants of each mode needs a name.
     """
     if law.as_terms() is not None:
         return None, law_terms(law)

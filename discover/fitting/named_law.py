@@ -15,9 +15,8 @@ from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel, data_scales, make_batch
 from discover.inference.fit_uncertainty import uncertainty, what_is_left
 from discover.inference.least_squares import Fit, best_of, fit_batch
-from discover.laws import LAWS
-from discover.laws.multimode import Fluid
-from discover.laws.registry import make_law, starting_values
+from discover.laws import LAWS, Fluid, make_law
+from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
 from discover.loop.run_record import record_runs
@@ -41,19 +40,11 @@ Bounds = Mapping[str, tuple[float, float]]
 
 @in_one_thread
 def fit(
-    law: str,
-    data: Dataset,
-    *,
-    base: Fluid | None = None,
-    bounds: Bounds | None = None,
-    start: Mapping[str, float] | None = None,
-    fixed: Mapping[str, float] | None = None,
-    effects: Mapping[str, Any] | None = None,
-    held_out: HeldOut = (),
-    noise: float | None = None,
-    most_samples: int = MOST_SAMPLES,
-    tolerance: float = TOLERANCE,
-) -> NamedLawFit:
+    law: str, data: Dataset, *, base: Fluid | None = None, bounds: Bounds | None = None,
+    start: Mapping[str, float] | None = None, fixed: Mapping[str, float] | None = None,
+    effects: Mapping[str, Any] | None = None, held_out: HeldOut = (), noise: float | None = None,
+    most_samples: int = MOST_SAMPLES, tolerance: float = TOLERANCE,
+) -> NamedLawFit:  # fmt: skip
     """Fit one named law to runs.
 
     Modes come from `base`, else from the linear sweep of the data, else one mode is fitted.
@@ -65,24 +56,22 @@ def fit(
     data
         The runs to fit: transients, creep, flow curves, sweeps, in shear or extension.
     base
-        A fluid whose modes and solvent are taken; its own law is not.
+        Fluid whose modes and solvent are taken, without its law.
     bounds
-        Range (low, high) of constants, by name, inside the law's own: parameters of the law,
-        ``modulus_Pa``, ``relaxation_time_s``. Naming one of the last two fits it, for several modes
-        as one factor on all of them.
+        Range (low, high) of constants by name: parameters of the law, ``modulus_Pa``,
+        ``relaxation_time_s``. Naming one of the last two fits it, for several modes as one factor.
     start
-        Values from which the fit starts, by name, besides the automatic ones.
+        Further starting values, by name.
     fixed
         Constants that are not fitted, by name.
     effects
-        Known effects, as ``[model] effects`` in a study, such as
-        ``{"solvent_viscosity": "fit"}``.
+        Known effects, as ``[model] effects``, such as ``{"solvent_viscosity": "fit"}``.
     held_out
         Names of runs of `data` that only test the fit, or a data set of such runs.
     noise
         Relative noise of the runs, where known.
     most_samples
-        Samples of a run that are used, at most.
+        Most samples used of a run.
     tolerance
         Relative discrepancy that is good enough.
 
@@ -143,20 +132,12 @@ def fit(
         records += record_runs(held, ahead, held_out=True)
     active = [known.name for known in forward.effects]
     return NamedLawFit(
-        law,
-        _constants(model, best, names, covariance, declared),
-        covariance,
-        degrees,
+        law, _constants(model, best, names, covariance, declared), covariance, degrees,
         augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
-        what_is_left(best, batch, fitted, expectation),
-        tuple(records),
-        model,
-        best.theta,
-        declared_law(forward, best.theta, {}),
-        data.name,
-        tolerance,
-    )
+        what_is_left(best, batch, fitted, expectation), tuple(records), model, best.theta,
+        declared_law(forward, best.theta, {}), data.name, tolerance,
+    )  # fmt: skip
 
 
 def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
@@ -180,13 +161,9 @@ def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
 
 
 def _declared(
-    law: str,
-    data: Dataset,
-    base: Fluid | None,
-    runs: Sequence[Run],
-    given: tuple[dict, dict, dict],
-    effects: Mapping[str, Any] | None,
-) -> DeclaredModel:
+    law: str, data: Dataset, base: Fluid | None, runs: Sequence[Run],
+    given: tuple[dict, dict, dict], effects: Mapping[str, Any] | None,
+) -> DeclaredModel:  # fmt: skip
     """Return the law with its modes, and what of them is free."""
     bounds, start, fixed = given
     own = LAWS[law].parameters

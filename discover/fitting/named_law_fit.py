@@ -16,8 +16,7 @@ from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
 from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
-from discover.laws import LAWS
-from discover.laws.multimode import Fluid
+from discover.laws import LAWS, Fluid
 from discover.loop.answering import range_of
 from discover.loop.by_quantity import beyond_noise, measured
 from discover.loop.run_record import RunRecord
@@ -28,13 +27,10 @@ from discover.words import percent_of
 
 @dataclass(frozen=True)
 class Constant:
-    """A fitted constant.
+    """Fitted constant, in `unit` as a study spells it; ``"1"`` if dimensionless.
 
-    `name`, `unit`: as a study spells it; ``"1"`` for a dimensionless one.
-    `value`, `standard_error` in that unit. The error of a modulus or a relaxation time is that of
-        its logarithm, times the value.
-    `low`, `high`: range in which it was fitted.
-    `logarithmic`: whether its logarithm was fitted, so that its interval is one of a factor.
+    The standard error of a modulus or time is that of its logarithm, times the value. `low`,
+    `high`: range of the fit. `logarithmic`: whether the logarithm was fitted.
     """
 
     name: str
@@ -47,7 +43,7 @@ class Constant:
 
     @property
     def at_bound(self) -> bool:
-        """Whether it lies at an end of its range, so that the range and not the data set it."""
+        """Whether it lies at an end of its range, which then determines it."""
         margin = 1e-6 * (self.high - self.low if np.isfinite(self.high - self.low) else 1.0)
         return self.value - self.low <= margin or self.high - self.value <= margin
 
@@ -70,18 +66,16 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
     ----------
     law
         Name of the law, as in `discover.laws`.
-    constants
-        What was fitted, in the order of `correlation`.
-    covariance
-        Of the constants as they were fitted (moduli and times as logarithms), shape (p, p).
+    constants, covariance
+        What was fitted, and its covariance as fitted (moduli and times as logarithms), (p, p).
     degrees_of_freedom
         Independent samples of the residual less fitted constants.
     fluid
         The fitted fluid.
     effects
-        Effects that were fitted or declared, with their values, by name.
+        Values of fitted and declared effects, by name.
     misfit
-        What the fit leaves of the runs, and whether that is noise.
+        Lack of fit to the runs.
     records
         The runs, measured and predicted, those held out among them.
     model, theta
@@ -168,13 +162,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         return pd.DataFrame(lines)
 
     def equation(self) -> Equation:
-        """Return the fitted law with its modes and solvent, for exports.
-
-        Raises
-        ------
-        InputError
-            If the law cannot be written out.
-        """
+        """Return the fitted law with its modes; raises InputError if it has no written form."""
         if self.written is None:
             raise InputError(f"{LAWS[self.law].title} cannot be written out as an equation.")
         return replace(self.written, solvent_viscosity=float(self.fluid.solvent_viscosity))

@@ -6,12 +6,6 @@ from discover.identify.structure import LawStructure, Structure, analyse_structu
 from discover.identify.twins import HiddenStresses, Twin, find_twins
 
 __all__ = [
-    "Difference",
-    "HiddenStresses",
-    "LawStructure",
-    "Structure",
-    "Twin",
-    "analyse_structure",
-    "check_physics",
-    "find_twins",
-]
+    "Difference", "HiddenStresses", "LawStructure", "Structure", "Twin", "analyse_structure",
+    "check_physics", "find_twins",
+]  # fmt: skip

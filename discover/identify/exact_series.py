@@ -1,15 +1,12 @@
-"""Taylor series of the stress after rest, in exact arithmetic: when two laws are the same in shear.
+"""Taylor series of the stress after rest, in exact arithmetic: when two laws agree in shear.
 
-Histories γ̇(t) that are polynomials in time come as close as one likes to every history, and for
-each of them the stress of a polynomial law is a power series in time whose coefficients are
-polynomials in those of γ̇(t) and of the law. Two laws with the same σ12(t) in every shear history
-therefore have the same coefficients for random histories, order by order, without any rounding;
-and two that differ show it at a low order   [Fliess 1981, Bull. SMF 109, 3: the same for the
-generating series of a control system].
+For polynomial histories γ̇(t), which come close to every history, the stress of a polynomial law is
+a power series whose coefficients are polynomials. Laws with the same σ12(t) in every history have
+the same coefficients for random ones, order by order, without rounding [Fliess 1981, Bull. SMF 109,
+3].
 
-Coefficients are fractions where their values matter, and residues modulo a large prime where only
-agreement does: whole numbers of one machine word, many times faster, and a false agreement has a
-chance of about 1e-17.
+Coefficients are fractions where values matter, and residues modulo a large prime where only
+agreement does, with a chance of a false one of about 1e-17.
 """
 
 import random
@@ -21,8 +18,7 @@ from typing import Any, no_type_check
 
 import numpy as np
 
-from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
-from tensor_library.terms import CandidateTerm, parse_term
+from tensor_library import INVARIANT_NAMES, TENSOR_NAMES, CandidateTerm, parse_term
 
 PRIME = 2**61 - 1
 """Modulus of exact arithmetic in residues: a Mersenne prime of one machine word."""
@@ -62,19 +58,14 @@ def _word(word: str, tensors: Mapping[str, Sequence[Any]]) -> tuple[Any, ...]:
 
 
 def exact_terms(
-    terms: Sequence[CandidateTerm],
-    stress: Components,
-    rate: Any,
-    one: Any = 1,
-    zero: Any = 0,
+    terms: Sequence[CandidateTerm], stress: Components, rate: Any, one: Any = 1, zero: Any = 0,
     form_values: Mapping[str, Any] | None = None,
-) -> list[Components]:
+) -> list[Components]:  # fmt: skip
     """Return the components of every term at one state.
 
-    `stress`: σ11, σ22, σ33, σ12: integers, fractions, or anything else that adds and multiplies.
-    `rate`: γ̇ of the same kind. `one`, `zero`: unit and zero of the ring. `form_values`: value of
-    each closed form, by key. A transcendental function of tr σ is algebraically independent of the
-    polynomials, so any number stands for it in a search for relations.
+    `stress`: σ11, σ22, σ33, σ12, `rate`: γ̇, over any ring with unit `one` and `zero`.
+    `form_values`: of each closed form, by key; algebraically independent of polynomials, so any
+    number will do.
     """
     s11, s22, s33, s12 = stress
     tensors = {
@@ -158,10 +149,9 @@ def stress_series(
 ) -> list[tuple[Any, Any, Any, Any]]:
     """Return the Taylor coefficients of σ11, σ22, σ33, σ12 after rest, up to an order.
 
-    `coefficients`: the law dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term, dimensionless: term → c. Closed
-    forms are not polynomials and raise `ValueError`. `rate`: coefficients of γ̇(t) = Σ rate[k] tᵏ.
-    `order`: last order. `linear_relaxation`: whether −σ is part of the law. `modular`: whether to
-    return residues modulo `PRIME` and not fractions.
+    `coefficients`: term → c of dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − Σ c term; closed forms raise
+    ValueError. `rate`: of γ̇(t) = Σ rate[k] tᵏ. `modular`: whether to return residues modulo
+    `PRIME`.
     """
     return list(islice(_growing(coefficients, rate, linear_relaxation, modular), order + 1))
 
@@ -200,10 +190,9 @@ def _growing(
 
 @dataclass(frozen=True)
 class Agreement:
-    """To which order two laws agree in every shear history.
+    """Order to which two laws agree in every shear history.
 
-    `sigma12`, `N1`, `N2`: first order at which the quantity differs, or None where it agrees to
-        `order`.
+    `sigma12`, `N1`, `N2`: first order at which they differ, or None up to `order`.
     """
 
     order: int  # order to which the series were computed
@@ -218,10 +207,7 @@ def compare_series(
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
 ) -> Agreement:
-    """Return where the Taylor series of two laws part, over random histories.
-
-    `first`, `second`: the laws, as in `stress_series`.
-    """
+    """Return where the Taylor series of two laws part, over random histories."""
     generator = random.Random(2)
     parts: dict[str, int | None] = {"sigma12": None, "N1": None, "N2": None}
     for _ in range(_HISTORIES):
@@ -247,14 +233,11 @@ def solve_for_coefficient(
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
 ) -> list[tuple[float, bool]]:
-    """Return every c for which a law with c·term has the σ12 of another in every history.
+    """Return every c for which a law with c·term has the σ12 of `target` in every history.
 
-    At the first order at which c enters the series of σ12 it does so as a polynomial of low degree,
-    whose real roots are the candidates. A rational root is exact, and then all later orders have to
-    agree exactly; of the others only a simulation can tell.
-
-    `target`: the law to reproduce. `term`: the term sought. `kept`: other terms of the law sought,
-    with their coefficients. Returns candidates with whether they are proved.
+    At the first order at which c enters σ12 it does so as a polynomial of low degree, whose real
+    roots are the candidates; a rational root is exact, and then later orders have to agree. `kept`:
+    other terms of the law sought. Returns candidates, and whether they are proved.
     """
     generator = random.Random(3)
     rate = [Fraction(generator.randint(1, 9), generator.randint(1, 9)) for _ in range(order)]
@@ -331,11 +314,10 @@ def hidden_change(
     order: int = DEFAULT_ORDER,
     linear_relaxation: bool = True,
 ) -> dict[str, str]:
-    """Return the second law's normal stresses as linear functions of the first law's, in words.
+    """Return the second law's normal stresses as linear functions of the first's, in words.
 
-    Solved exactly from the Taylor series over two random histories; empty where no linear change
-    relates the two. Where the first law confines its stresses (in Johnson–Segalman σ33 = 0 and σ22
-    is a multiple of σ11), the change with the fewest terms is one of several.
+    Solved exactly over two random histories; empty if there is none. Where the first law confines
+    its stresses, the change with the fewest terms is one of several.
     """
     generator = random.Random(4)
     states: list[tuple[Fraction, ...]] = []

@@ -1,8 +1,4 @@
-"""Is a law physically sound? Checks that hold for any law, with where it fails.
-
-None of them uses data. A law that fails one may still fit; it should not be carried into a
-simulation of other flows without a second thought.
-"""
+"""Physical soundness of a law: checks that need no data, with where it fails."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -15,21 +11,10 @@ import pandas as pd
 
 from discover.forward.fluids import in_enough_steps
 from discover.forward.grids.flow_batch import FlowBatch
-from discover.identify.physics_flows import (
-    Cycles,
-    Trajectories,
-    cycles,
-    is_stable,
-    is_steady,
-    steady_shear,
-    steady_uniaxial_extension,
-    time_scale,
-    trajectories,
-)
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.identify import physics_flows
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
-from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly
@@ -101,98 +86,81 @@ def check_physics(
 ) -> PhysicsReport:
     """Return the checks of a fluid.
 
-    `flows`: flows along which stresses are looked at. `weissenberg`, `deborah`: largest shear rate
-    and frequency of training, times the mean relaxation time: the corner of the box beyond which
-    the law extrapolates.
+    `flows`: those along which stresses are looked at. `weissenberg`, `deborah`: largest rate and
+    frequency of training, times the mean relaxation time: the box beyond which the law
+    extrapolates.
     """
     fluid = replace(fluid, law=in_shared_form(fluid.law))
-    along = trajectories(fluid, in_enough_steps(fluid, flows))
-    beyond = cycles(
+    along = physics_flows.trajectories(fluid, in_enough_steps(fluid, flows))
+    beyond = physics_flows.cycles(
         fluid,
         [weissenberg * factor for factor in _BOX_FACTORS],
         [deborah * factor for factor in _DEBORAH_FACTORS],
     )
-    return PhysicsReport(
-        (
-            _conformation(along, names),
-            _free_energy(along, names),
-            _work(beyond),
-            _flow_curve(fluid, weissenberg),
-            _extension(fluid),
-            _small_strain(fluid),
-            _reach(beyond, weissenberg, deborah),
-        )
-    )
+    found = {
+        "conformation tensor positive definite": _conformation(along, names),
+        "dissipation non-negative": _free_energy(along, names),
+        "work over a cycle non-negative": _work(beyond),
+        "flow curve monotonic": _flow_curve(fluid, weissenberg),
+        "steady extension bounded": _extension(fluid),
+        SMALL_STRAIN: _small_strain(fluid),
+        "integrates beyond training": _reach(beyond, weissenberg, deborah),
+    }
+    return PhysicsReport(tuple(PhysicsCheck(name, *one) for name, one in found.items()))
 
 
-def _conformation(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
-    name = "conformation tensor positive definite"
+_Found = tuple[bool | None, float | None, str, str]
+"""The fields of a `PhysicsCheck` behind its name."""
+
+
+def _conformation(along: physics_flows.Trajectories, names: Sequence[str]) -> _Found:
     run, value = along.lowest(along.smallest_conformation)
     if run is None:
-        return PhysicsCheck(name, None, None, "", "The law diverges in every flow looked at.")
-    passed = value > -_ROUNDING
-    where = names[run]
+        return None, None, "", "The law diverges in every flow looked at."
+    passed, where = value > -_ROUNDING, names[run]
     verb = "stays positive definite" if passed else "loses positive definiteness"
-    return PhysicsCheck(
-        name,
-        passed,
-        value,
-        where,
-        f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {plainly(value)}, in "
-        f"{where}.",
-    )
+    text = f"The conformation tensor I + σ/G {verb}: its smallest eigenvalue is {plainly(value)}"
+    return passed, value, where, f"{text}, in {where}."
 
 
-def _free_energy(along: Trajectories, names: Sequence[str]) -> PhysicsCheck:
-    name = "dissipation non-negative"
+def _free_energy(along: physics_flows.Trajectories, names: Sequence[str]) -> _Found:
     run, value = along.lowest(along.dissipation)
     if run is None:
-        return PhysicsCheck(
-            name, None, None, "", "No flow in which the stored energy is defined throughout."
-        )
-    passed = value > -_ROUNDING
-    where = names[run]
+        return None, None, "", "No flow in which the stored energy is defined throughout."
+    passed, where = value > -_ROUNDING, names[run]
     verb = "is nowhere negative" if passed else "becomes negative"
-    return PhysicsCheck(
-        name,
-        passed,
-        value,
-        where,
-        f"With the stored energy of Hookean dumbbells, (G/2)(tr A − ln det A − 3) with A = I + "
-        f"σ/G, the dissipation {verb}: at least {plainly(value)} G/λ, in {where}.",
+    text = (
+        "With the stored energy of Hookean dumbbells, (G/2)(tr A − ln det A − 3) with A = I + "
+        f"σ/G, the dissipation {verb}: at least {plainly(value)} G/λ, in {where}."
     )
+    return passed, value, where, text
 
 
-def _work(beyond: Cycles) -> PhysicsCheck:
-    name = "work over a cycle non-negative"
+def _work(beyond: physics_flows.Cycles) -> _Found:
     # at the Weissenberg number of training, which is the first
     usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
     if not usable:
-        return PhysicsCheck(name, None, None, "", "The law diverges in the oscillations tried.")
+        return None, None, "", "The law diverges in the oscillations tried."
     run, value = min(usable, key=lambda pair: pair[1])
     where = beyond.names[run]
-    return PhysicsCheck(
-        name,
-        bool(value >= -_ROUNDING),
-        float(value),
-        where,
+    text = (
         f"The work σ:d over the last cycle is at least {plainly(value)} of the product of the "
-        f"largest stress and strain rate, in {where}.",
+        f"largest stress and strain rate, in {where}."
     )
+    return bool(value >= -_ROUNDING), float(value), where, text
 
 
-def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
-    name = "flow curve monotonic"
-    slowest = time_scale(fluid)
+def _flow_curve(fluid: Fluid, weissenberg: float) -> _Found:
+    slowest = physics_flows.time_scale(fluid)
     rates = SHEAR_RATES / slowest
     stress = np.asarray(fluid.solvent_viscosity) * rates
     steady = np.ones(rates.size, dtype=bool)
     modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
     for number, (modulus, time) in enumerate(modes):
         law = law_of_mode(fluid.law, number)
-        found, _, residual = steady_shear(law, jnp.asarray(time * rates))
+        found, _, residual = physics_flows.steady_shear(law, jnp.asarray(time * rates))
         stress = stress + modulus * np.asarray(found)[:, 3]
-        steady &= is_steady(np.asarray(residual))
+        steady &= physics_flows.is_steady(np.asarray(residual))
     last = rates.size if steady.all() else int(np.argmin(steady))
     falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
     if falling.size:
@@ -200,38 +168,27 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> PhysicsCheck:
         beyond = low * slowest > weissenberg
         where = f"shear rates from {plainly(low)} to {plainly(high)} 1/s"
         note = "beyond the rates of training" if beyond else "within the rates of training"
-        return PhysicsCheck(
-            name,
-            False,
-            low,
-            where,
+        text = (
             f"The steady shear stress falls with the rate at {where}: homogeneous flow is unstable "
-            f"there and would band (it starts {note}).",
+            f"there and would band (it starts {note})."
         )
+        return False, low, where, text
     if last < 2:
-        return PhysicsCheck(name, None, None, "", "No steady shear flow was found.")
+        return None, None, "", "No steady shear flow was found."
     where = f"shear rates from {plainly(rates[0])} to {plainly(rates[last - 1])} 1/s"
     text = f"The steady shear stress rises with the rate throughout {where}."
     if last < rates.size:
         text += " Beyond, no steady state follows on."
-    return PhysicsCheck(
-        name, True if last == rates.size else None, float(rates[last - 1]), where, text
-    )
+    return True if last == rates.size else None, float(rates[last - 1]), where, text
 
 
-def _extension(fluid: Fluid) -> PhysicsCheck:
-    name = "steady extension bounded"
+def _extension(fluid: Fluid) -> _Found:
     longest = float(np.max(np.asarray(fluid.relaxation_time)))
     reached = _last_stable(fluid, EXTENSION_RATES)
     if reached == EXTENSION_RATES.size:
         where = f"extension rates up to {plainly(EXTENSION_RATES[-1] / longest)} 1/s"
-        return PhysicsCheck(
-            name,
-            True,
-            float(EXTENSION_RATES[-1] / longest),
-            where,
-            f"The stress in uniaxial extension settles at all {where}.",
-        )
+        text = f"The stress in uniaxial extension settles at all {where}."
+        return True, float(EXTENSION_RATES[-1] / longest), where, text
     low = EXTENSION_RATES[max(reached - 1, 0)]
     high = EXTENSION_RATES[reached]
     # from rest again, but finely across the last step
@@ -240,14 +197,11 @@ def _extension(fluid: Fluid) -> PhysicsCheck:
     )
     fine = np.concatenate([fine, np.full(EXTENSION_RATES.size + _REFINED - fine.size, high)])
     limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
-    return PhysicsCheck(
-        name,
-        False,
-        limit,
-        f"extension rates beyond {limit:.4g} 1/s",
+    text = (
         f"In uniaxial extension at rates beyond {limit:.4g} 1/s ({limit * longest:.3g} over the "
-        "longest relaxation time) no steady state is stable: the stress grows without bound.",
+        "longest relaxation time) no steady state is stable: the stress grows without bound."
     )
+    return False, limit, f"extension rates beyond {limit:.4g} 1/s", text
 
 
 def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
@@ -261,8 +215,10 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     for number in numbers:
         law = law_of_mode(fluid.law, number)
         scaled = jnp.asarray(same * (times[number] / times[slowest]))
-        _, jacobian, residual = steady_uniaxial_extension(law, scaled)
-        found = is_steady(np.asarray(residual)) & is_stable(np.asarray(jacobian))
+        _, jacobian, residual = physics_flows.steady_uniaxial_extension(law, scaled)
+        found = physics_flows.is_steady(np.asarray(residual)) & physics_flows.is_stable(
+            np.asarray(jacobian)
+        )
         good &= found[: rates.size]
     return rates.size if good.all() else int(np.argmin(good))
 
@@ -290,8 +246,7 @@ def _off_at_rest(law: AbstractConstitutiveLaw) -> tuple[float, float]:
     return float(np.max(np.abs(drift))), off
 
 
-def _small_strain(fluid: Fluid) -> PhysicsCheck:
-    name = SMALL_STRAIN
+def _small_strain(fluid: Fluid) -> _Found:
     numbers = range(fluid.n_modes) if differs_by_mode(fluid.law) else [0]
     of_modes = [_off_at_rest(law_of_mode(fluid.law, number)) for number in numbers]
     offset, value = (max(column) for column in zip(*of_modes, strict=True))
@@ -303,11 +258,10 @@ def _small_strain(fluid: Fluid) -> PhysicsCheck:
     if offset > _LINEAR_TOLERANCE:
         text += f", and the law does not rest: dσ/dt = {offset:.2g} G/λ without flow or stress"
     worst = max(value, offset)
-    return PhysicsCheck(name, worst <= _LINEAR_TOLERANCE, worst, "at rest", text + ".")
+    return worst <= _LINEAR_TOLERANCE, worst, "at rest", text + "."
 
 
-def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
-    name = "integrates beyond training"
+def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> _Found:
     finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)
     reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
@@ -317,7 +271,7 @@ def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
         limit = weissenberg * _BOX_FACTORS[-1]
         where = f"Wi up to {plainly(limit)}, {box}"
         text = f"Oscillations stay finite in the whole grid tried, {where}."
-        return PhysicsCheck(name, True, limit, where, text)
+        return True, limit, where, text
     failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
@@ -325,4 +279,4 @@ def _reach(beyond: Cycles, weissenberg: float, deborah: float) -> PhysicsCheck:
         f"first in {failed[0]} (training reached Wi = {plainly(weissenberg)}, "
         f"De = {plainly(deborah)})."
     )
-    return PhysicsCheck(name, False, limit, failed[0], text)
+    return False, limit, failed[0], text

@@ -1,4 +1,4 @@
-"""The flows in which laws are checked, many at once."""
+"""Flows in which laws are checked, many at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,14 +11,12 @@ from jaxtyping import Array, Float
 from discover.equations.equation import mean_relaxation_time
 from discover.forward.fluids import at_samples, in_enough_steps, solve_batch
 from discover.forward.grids.flow_batch import FlowBatch, lay_out
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
-from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.protocol import oscillatory_shear
 from discover.words import plainly
-from tensor_library.algebra import to_shear
-from tensor_library.kinematics import uniaxial_extension
+from tensor_library import to_shear, uniaxial_extension
 
 _CYCLES = 3
 _SAMPLES_A_CYCLE = 48
@@ -26,12 +24,10 @@ _SAMPLES_A_CYCLE = 48
 
 @dataclass(frozen=True)
 class Trajectories:
-    """What happens to each mode along a set of flows.
+    """Conformation and dissipation of each mode along flows, least over modes and samples.
 
-    `smallest_conformation`: smallest eigenvalue of I + σ/G over modes and samples, shape (runs,);
-        nan where the law diverges.
-    `dissipation`: least σ:d − dF/dt over modes and samples, in units of G/λ of the mode, with F the
-        energy that Hookean dumbbells store; nan where undefined.
+    `smallest_conformation`: eigenvalue of I + σ/G, shape (runs,); nan where the law diverges.
+    `dissipation`: σ:d − dF/dt over G/λ, with the energy F of Hookean dumbbells; nan if undefined.
     """
 
     smallest_conformation: Float[np.ndarray, " runs"]
@@ -93,7 +89,7 @@ class Cycles:
     """Oscillations over a grid of Weissenberg and Deborah numbers.
 
     `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
-        where the law diverges.
+    where the law diverges.
     """
 
     names: tuple[str, ...]  # of the flows, Weissenberg number first
@@ -101,16 +97,12 @@ class Cycles:
 
 
 def time_scale(fluid: Fluid) -> float:
-    """Return Σ G λ² / Σ G λ in s, which the zero-shear normal stress over the viscosity shows."""
+    """Return Σ G λ² / Σ G λ in s."""
     return mean_relaxation_time(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
 
 
 def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
-    """Return three cycles of every pair of numbers, simulated together.
-
-    `weissenberg`, `deborah`: amplitudes of the shear rate and frequencies, times the mean
-    relaxation time.
-    """
+    """Return three cycles of every pair of Wi and De (with the mean relaxation time)."""
     scale = time_scale(fluid)
     pairs = [(wi, de) for wi in weissenberg for de in deborah]
     flows = [oscillatory_shear(wi / scale, de / scale) for wi, de in pairs]
@@ -146,13 +138,9 @@ def steady_shear(
 ) -> tuple[Float[Array, "n s"], Float[Array, "n s s"], Float[Array, " n"]]:
     """Return the steady dimensionless stresses in shear, their Jacobians and residuals.
 
-    Newton's method at each rate from the solution at the one before, starting at rest: the branch
-    that a slow rise of the rate follows.
-
-    `rates`: dimensionless shear rates, increasing, close enough for Newton's method to follow.
-
-    Returns stress (11, 22, 33, 12) with the law's structure variables behind it, ∂(dσ/dt)/∂σ, and
-    the size of dσ/dt over that of the stress.
+    Newton's method at each of the increasing rates from the one before, starting at rest: the
+    branch that a slow rise of the rate follows. Stresses (11, 22, 33, 12) with the structure
+    variables behind, ∂(dσ/dt)/∂σ, and the size of dσ/dt over that of the stress.
     """
     return _follow(law.stress_rate, law.rest(), rates)
 
@@ -163,7 +151,7 @@ def steady_uniaxial_extension(
 ) -> tuple[Float[Array, "n d"], Float[Array, "n d d"], Float[Array, " n"]]:
     """Return the steady (σ11, σ22 = σ33) in uniaxial extension, Jacobians and residuals.
 
-    Behind these two stand the structure variables of the law.
+    Structure variables stand behind these two.
     """
 
     def slope(state, rate):

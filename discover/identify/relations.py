@@ -1,4 +1,4 @@
-"""Combinations of library terms that a shear experiment cannot see, found in exact arithmetic."""
+"""Combinations of library terms that a shear experiment cannot see, in exact arithmetic."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -26,11 +26,10 @@ Reach = Literal["nothing", "33"]
 
 @dataclass(frozen=True)
 class TermRelation:
-    """A combination of terms that vanishes in simple shear, or lives on σ33 only.
+    """Combination of terms that vanishes in simple shear, or lives on σ33 only.
 
-    `touches`: ``"nothing"``: the combination is zero in every simple shear, so terms can be
-        exchanged freely. ``"33"``: it changes σ33 only; σ12 and N1 never see it unless the law lets
-        σ33 act back, N2 does.
+    `touches`: ``"nothing"``: zero in every simple shear. ``"33"``: changes σ33 only: N2 sees it,
+    σ12 and N1 do not unless the law lets σ33 act back.
     """
 
     coefficients: Mapping[str, int]  # term → whole number
@@ -57,7 +56,7 @@ MOST_SPELLED = 4
 
 
 def spell_briefly(coefficients: Mapping[str, float | int]) -> str:
-    """Return a sum of terms as `spell` does, of many terms only how many and the two largest."""
+    """Return a sum of terms as `spell` does; of many terms their number and the two largest."""
     if len(coefficients) <= MOST_SPELLED:
         return spell(coefficients)
     largest = sorted(coefficients, key=lambda name: -abs(coefficients[name]))[:2]
@@ -69,12 +68,9 @@ def spell_briefly(coefficients: Mapping[str, float | int]) -> str:
 def term_relations(library: TermLibrary) -> tuple[TermRelation, ...]:
     """Return every linear relation among the terms of a library in simple shear.
 
-    The terms are evaluated at random integer states; the null space is found modulo a large
-    prime, lifted to whole numbers, and verified without rounding at fresh states. Closed forms
-    count as independent of every polynomial.
-
-    Returns relations that touch nothing first, then those that touch σ33 only and are not of the
-    first kind. Each is a basis vector of its null space, with as few terms as elimination gives.
+    Null space at random integer states modulo a large prime, lifted to whole numbers and verified
+    without rounding at fresh states. Closed forms are independent of every polynomial. Relations
+    that touch nothing come first; each is a basis vector with as few terms as elimination gives.
     """
     generator = random.Random(0)
     n = len(library)
@@ -184,8 +180,8 @@ def _is_new(vector: Sequence[int], known: Sequence[Sequence[int]]) -> bool:
 def feels_33(library: TermLibrary) -> bool:
     """Return whether σ33 acts on σ11, σ22 or σ12 through some term of a library.
 
-    If none does, what happens to σ33 is invisible to σ12 and to N1 in every simple shear. Exact,
-    as in `term_relations`; of several terms whose actions cancel, each still counts.
+    If none does, σ33 is invisible to σ12 and N1 in every simple shear. Exact; actions that cancel
+    count.
     """
     generator = random.Random(1)
     for _ in range(_FRESH_STATES):
@@ -214,14 +210,12 @@ _WEAKEST = 5
 
 @dataclass(frozen=True)
 class Direction:
-    """A change of the law's coefficients, its largest entry one.
+    """Change of the law's coefficients, its largest entry one.
 
-    `noise_for_tenth`: relative noise of the data at which the standard error along the direction is
-        0.1, zero for an exact one: with less noise the data determine it better.
-    `changes`: relative change of σ12, N1 and N2 per unit of the direction; N2's relative to N1.
-    `at_any_size`: whether a finite step along the direction leaves σ12 as it is too; None where not
-        decided. Where it does not, the invisible changes of the law lie on a curve (as the twins of
-        Johnson–Segalman do) that has this direction as its tangent.
+    `noise_for_tenth`: relative noise at which the standard error along it is 0.1; zero for an exact
+    one. `changes`: relative change of σ12, N1, N2 (over N1) per unit. `at_any_size`: whether a
+    finite step leaves σ12 as it is too, or only follows the tangent of a curve; None where not
+    decided.
     """
 
     coefficients: Mapping[str, float]  # term → entry
@@ -260,10 +254,9 @@ def weak_directions(
 ) -> tuple[list[Direction], list[Direction]]:
     """Return the exact null directions and the weakest of the others.
 
-    `names`: of the coefficients. `observed`: sensitivities of what is observed, weighted so that
-    the norm of a column is the relative root-mean-square change per unit of the coefficient.
-    `quantities`: sensitivities of each quantity, weighted alike. `n_observations`: number of values
-    observed, each with independent noise.
+    `observed`: sensitivities, a column's norm being the relative rms change per unit of a
+    coefficient; `quantities`: of each quantity, likewise. `n_observations`: values with independent
+    noise.
     """
     norms = np.linalg.norm(observed, axis=0)
     scale = np.where(norms > EXACT * np.max(norms, initial=1.0), norms, 1.0)
@@ -298,10 +291,7 @@ def _direction(names, vector, observed, quantities, n_observations, exact) -> Di
 
 
 def _sparse_basis(rows: Float[np.ndarray, "k n"]) -> Float[np.ndarray, "k n"]:
-    """Return a basis of the same space by elimination, later terms first, with many zeros.
-
-    A library lists simple terms first, so each vector expresses one complex term by simpler ones.
-    """
+    """Return a basis of the same space by elimination, later, more complex terms first."""
     rows = rows / np.max(np.abs(rows), axis=1, keepdims=True, initial=1e-300)
     done: list[int] = []
     for column in range(rows.shape[1] - 1, -1, -1):

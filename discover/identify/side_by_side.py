@@ -1,4 +1,4 @@
-"""Laws simulated side by side: stresses, and the histories that tell them apart."""
+"""Laws simulated side by side, and the histories that distinguish them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,10 +12,7 @@ from jaxtyping import Float
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import (
     FlowProtocol,
@@ -26,9 +23,7 @@ from discover.protocols.protocol import (
 )
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerms
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerms, TermLibrary, parse_term
 
 LAWS_AT_ONCE = 8
 """Laws simulated side by side; fewer are padded, so that any number shares one program."""
@@ -60,11 +55,10 @@ def stresses_of_laws(
     grids: IntegrationGrid,
     base: AbstractConstitutiveLaw | None = None,
 ) -> Float[np.ndarray, "laws runs n 4"]:
-    """Return the dimensionless stresses of several laws in a batch of flows.
+    """Return the dimensionless σ11, σ22, σ33, σ12 of several laws in a batch of flows.
 
-    `library`: holds every term of the laws. `protocols`, `grids`: from `stack_protocols` and
-    `make_grids`. `base`: the known part; by default UCM. Returns σ11, σ22, σ33,
-    σ12, not finite where a law diverges.
+    `library`: holds every term of the laws. `base`: the known part; by default UCM. Not finite
+    where a law diverges.
     """
     base = UpperConvectedMaxwell() if base is None else base
     parts = [
@@ -105,10 +99,8 @@ _START_UPS = (1.0, 3.0)
 class Histories:
     """Shear flows with the times at which they are looked at.
 
-    `protocols`, `grids`: batched, ready to simulate.
-    `amplitude`: root-mean-square shear rate of each random history, shape (r,); these come first.
-    `names`: of the ordinary flows that follow, for telling laws apart; the same batch serves both,
-        so that one compiled program does.
+    `amplitude`: rms shear rate of each random history, shape (r,); these come first. `names`: of
+    the ordinary flows that follow in the same batch.
     """
 
     protocols: FlowProtocol
@@ -123,10 +115,7 @@ class Histories:
 
 
 def longest_step(law: AbstractConstitutiveLaw) -> float:
-    """Return the longest step, over λ, in which chains that retract are followed.
-
-    Other laws relax in λ, in which any step of the flow's length is short enough.
-    """
+    """Return the longest step, over λ, in which retracting chains are followed; else infinite."""
     if not law.retracts:
         return np.inf
     return 1.0 / (1.0 + float(jnp.max(jnp.sum(law.relaxations(), axis=1))))
@@ -134,13 +123,10 @@ def longest_step(law: AbstractConstitutiveLaw) -> float:
 
 @lru_cache(maxsize=4)
 def random_histories(max_step: float = np.inf) -> Histories:
-    """Return band-limited random shear rates at several amplitudes.
+    """Return band-limited random shear rates at several amplitudes, then ordinary flows.
 
-    γ̇(t) is a sum of six cosines with frequencies from 0.1 to 3 and random phases, for eight
-    relaxation times, at root-mean-square rates of 0.3, 1, 2 and 3: nearly linear to strongly
-    nonlinear. Rates that start with a jump are among them, as cosines do not vanish at zero.
-
-    `max_step`: longest step, in relaxation times, as from `longest_step`.
+    Sums of six cosines with frequencies from 0.1 to 3 over eight relaxation times, at rms rates of
+    0.3, 1, 2 and 3. `max_step`: in relaxation times, from `longest_step`.
     """
     generator = np.random.default_rng(0)
     protocols, amplitudes = [], []
@@ -177,11 +163,9 @@ def histories_for(law: AbstractConstitutiveLaw | None) -> Histories:
 
 @dataclass(frozen=True)
 class Difference:
-    """How far a law is from another over a set of histories.
+    """Difference of a law from another over histories: largest relative rms of each quantity.
 
-    `sigma12`, `N1`, `N2`: largest over the histories of the root-mean-square difference over the
-        root-mean-square of the reference; N2's is relative to the reference's N1. Infinite where
-        the law diverges.
+    N2's is relative to the reference's N1. Infinite where the law diverges.
     """
 
     sigma12: float
@@ -192,21 +176,13 @@ class Difference:
 def stresses_in_histories(
     library: TermLibrary, laws: Sequence[LawTerms], base: AbstractConstitutiveLaw | None = None
 ) -> Float[np.ndarray, "laws runs n 4"]:
-    """Return the stresses of laws in `histories_for` a known part; by default UCM.
-
-    `library`: holds every term of the laws.
-    """
+    """Return the stresses of laws in `histories_for` a known part, by default UCM."""
     flows = histories_for(base)
     return stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
 
 
 def differences(stresses: Float[np.ndarray, "laws runs n 4"]) -> list[Difference]:
-    """Return how far each law is from the first in random shear histories.
-
-    Histories in which the first itself runs away are left out.
-
-    `stresses`: from `stresses_in_histories`.
-    """
+    """Return how far each law is from the first in the random histories that the first survives."""
     observed = observe_differences(stresses[:, : _EACH * len(_AMPLITUDES)])
     return [difference(observed[0], other) for other in observed[1:]]
 
@@ -241,11 +217,11 @@ _EXTENSION_QUANTITY = {"uniaxial": "σ11 − σ22", "planar": "σ22 − σ33"}
 
 @dataclass(frozen=True)
 class Separation:
-    """An experiment in which two laws part.
+    """Experiment in which two laws part.
 
-    `difference`: root-mean-square difference, relative to the reference's N1 for N2 in shear, to
-        its σ11 − σ22 in extension, and to the quantity itself otherwise; infinite where the stress
-        of one law grows without bound and that of the other does not.
+    `difference`: rms, relative to the reference's N1 for N2 in shear, to its σ11 − σ22 in
+    extension, else to the quantity itself; infinite where the stress of one law alone grows without
+    bound.
     """
 
     flow: str  # the flow in words, rates scaled by the relaxation time
@@ -269,12 +245,10 @@ def separations(
     stresses: Float[np.ndarray, "laws runs n 4"],
     base: AbstractConstitutiveLaw | None = None,
 ) -> list[tuple[Separation, ...]]:
-    """Return for each law the flows that tell it from the first, best in each quantity.
+    """Return for each law the flows that distinguish it from the first, best in each quantity.
 
-    Oscillations and start-ups of shear, and the start of uniaxial and planar extension. A shear
-    quantity comes first where one differs, as it needs the fewest new instruments.
-
-    `stresses`: of the laws, from `stresses_in_histories`.
+    Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
+    uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
     flows = histories_for(base)
     names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])

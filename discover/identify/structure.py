@@ -1,10 +1,7 @@
-"""What an experiment can determine of a library, before any fit: no data are used, only protocols.
+"""What an experiment can determine of a library, from its protocols alone, before any fit.
 
-At a nominal law the sensitivities of σ12 to every coefficient of the library are computed exactly.
-Their null space holds the changes of the law that the
-experiment cannot see; its image in N1 and N2 says whether those follow from σ12. Everything is to
-first order around the law; whether a direction stays invisible at finite size is decided in exact
-arithmetic where the law is a polynomial.
+Null space of the exact sensitivities of σ12 to the coefficients at a nominal law, and its image in
+N1 and N2. First order; where the law is a polynomial, exact arithmetic decides on finite sizes.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -32,29 +29,20 @@ from discover.identify.relations import (
 )
 from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.learners.runs import as_runs
 from discover.programs import compiled
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
 
 
 @compiled
 def with_sensitivities(
     law: LibraryExpansion, known: Fluid, flows: FlowBatch
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
-    """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients.
-
-    `law`: what it makes is not finite where it diverges. `known`: a fluid with its modes and
-    solvent. `flows`: the runs and their grids.
-    """
+    """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients."""
 
     def observed(coefficients):
         moved = replace(law, coefficients=coefficients)
@@ -93,9 +81,8 @@ class QuantityVerdict:
     """Whether the observed stresses determine a normal stress difference.
 
     `verdict`: ``"measured"``; ``"undetermined"``: the library holds a change of the law that the
-        experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one
-        of the two normal stresses leaves no trace in σ12, so that the quantity follows from the
-        form of the law; ``"determined"`` otherwise, within the library.
+    experiment cannot see and that changes the quantity; ``"assumed"``: it holds none, but one of
+    the two normal stresses leaves no trace in σ12; ``"determined"`` within the library otherwise.
     """
 
     quantity: str  # ``"N1"`` or ``"N2"``
@@ -116,9 +103,8 @@ class QuantityVerdict:
 class LawStructure(NotebookView):
     """What the experiment can determine around one nominal law.
 
-    `exact`, `weak`: directions of which the experiment sees nothing, and the weakest of the others.
-    `n_exact_with_N1`: number of exact directions that would be left if N1 were measured as well.
-    `one_more`: by quantity, the term beyond the law that leaves it most open.
+    `exact`, `weak`: unseen directions, and the weakest of the others. `n_exact_with_N1`: exact ones
+    left if N1 were measured. `one_more`: by quantity, the further term that leaves it most open.
     """
 
     name: str
@@ -168,7 +154,7 @@ class LawStructure(NotebookView):
 
 @dataclass(frozen=True)
 class Structure(SentenceAndTable):
-    """What an experiment can determine of a library."""
+    """What an experiment can determine of a library, at the known part and at nominal laws."""
 
     laws: tuple[LawStructure, ...]  # by nominal law; the first is the known part alone
     relations: tuple[TermRelation, ...]  # exact relations among terms in shear, at any law
@@ -198,24 +184,16 @@ class Structure(SentenceAndTable):
 
 
 def analyse_structure(
-    runs: Sequence[Run],
-    library: TermLibrary,
-    base: AbstractConstitutiveLaw | None = None,
-    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None,
-    modulus: Any = 1.0,
-    relaxation_time: Any = 1.0,
-    solvent_viscosity: float = 0.0,
-    use_normal_stresses: bool = False,
-) -> Structure:
+    runs: Sequence[Run], library: TermLibrary, base: AbstractConstitutiveLaw | None = None,
+    nominal: Mapping[str, LawTerms | Sequence[LawTerm]] | None = None, modulus: Any = 1.0,
+    relaxation_time: Any = 1.0, solvent_viscosity: float = 0.0, use_normal_stresses: bool = False,
+) -> Structure:  # fmt: skip
     """Return what shear flows can determine of a library's coefficients.
 
-    `runs`: their protocols and sampling times; the stresses are not looked at, except that with
-    `use_normal_stresses` a run must hold N1 or N2 for it to count as measured. `library`: candidate
-    terms. `base`: known part; by default UCM. `nominal`: laws around which to look besides the
-    known part; by default those of `NOMINAL` whose terms the library holds. `modulus`,
-    `relaxation_time`, `solvent_viscosity`: known linear viscoelasticity, in Pa, s and Pa s; the
-    first two numbers, or one for each mode. `use_normal_stresses`: whether N1 and N2, where runs
-    hold them, are observed too.
+    `runs`: their protocols and times; with `use_normal_stresses`, N1 and N2 that they hold count as
+    measured. `base`: known part; by default UCM. `nominal`: laws around which to look besides it;
+    by default those of `NOMINAL` in the library. `modulus`, `relaxation_time`, `solvent_viscosity`:
+    in Pa, s and Pa s, the first two with one value for each mode.
     """
     base = UpperConvectedMaxwell() if base is None else base
     if nominal is None:
@@ -251,14 +229,9 @@ def analyse_structure(
 
 
 def _at(
-    known: Fluid,
-    flows: FlowBatch,
-    samples: Bool[np.ndarray, "runs n"],
-    library: TermLibrary,
-    name: str,
-    law: LawTerms,
-    observed: Sequence[str],
-) -> LawStructure | None:
+    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], library: TermLibrary,
+    name: str, law: LawTerms, observed: Sequence[str],
+) -> LawStructure | None:  # fmt: skip
     """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
     coefficients, inner = law.over(library)

@@ -1,16 +1,8 @@
 """Twins: laws with the same σ12, or σ12 and N1, in every simple-shear history.
 
-Two sources, both exact:
-
-relations
-    Combinations of terms that vanish in shear or live on σ33 (`term_relations`).
-changes of the hidden stresses
-    The normal stresses are never measured, so a law may be rewritten in other hidden variables as
-    long as σ12 stays. Whether the outcome is again a law of the library is decided in exact
-    arithmetic on the Taylor series (`solve_for_coefficient`), and the change itself is read off
-    the two series afterwards.
-
-Every twin is also simulated in random histories before it is reported.
+By relations among terms that vanish in shear or live on σ33 (`term_relations`), and by changes of
+the unmeasured normal stresses, decided in exact arithmetic on the Taylor series
+(`solve_for_coefficient`). Every twin is also simulated in random histories.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -25,28 +17,16 @@ from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
 from discover.forward.integrators.stepping import follow
+from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
-from discover.identify.side_by_side import (
-    SAME,
-    Difference,
-    Separation,
-    differences,
-    histories_for,
-    joint_library,
-    separations,
-    stresses_in_histories,
-)
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
 from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView
 from discover.words import percent_of
-from tensor_library.law_terms import LawTerm, LawTerms, spell
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
+from tensor_library.law_terms import spell
 
 Proof = Literal["relation", "series", "histories"]
 _Candidate = tuple[LawTerms, Proof, dict[str, str]]
@@ -59,20 +39,20 @@ INVISIBLE_SIZE = 0.05
 
 @dataclass(frozen=True)
 class Twin(NotebookView):
-    """A law that no shear stress tells from another.
+    """Law that no shear stress distinguishes from another.
 
-    `proof`: ``"relation"`` or ``"series"``: exact. ``"histories"``: to integration error in random
-        histories.
-    `order`: order to which the Taylor series agree exactly, where that was the proof. It is given
-        at coefficients rounded to short fractions: that the family of twins exists is exact.
-    `change`: the twin's σ11, σ22, σ33 in terms of the other law's, in words, where linear.
+    `proof`: ``"relation"`` or ``"series"`` are exact, ``"histories"`` to integration error.
+    `order`: of a proof by series, at coefficients rounded to short fractions. `change`: the twin's
+    σ11, σ22, σ33 in terms of the other law's, where linear.
     """
 
     law: LawTerms  # the twin, beyond the known part
     proof: Proof
     keeps_N1: bool  # whether N1 is the same too
-    difference: Difference  # largest difference of σ12, N1 and N2 in random histories
-    separated_by: tuple[Separation, ...] = ()  # experiments that would tell the two apart
+    difference: side_by_side.Difference  # largest difference of σ12, N1 and N2 in random histories
+    separated_by: tuple[
+        side_by_side.Separation, ...
+    ] = ()  # experiments that would tell the two apart
     order: int | None = None
     change: Mapping[str, str] = field(default_factory=dict)
 
@@ -91,7 +71,7 @@ class Twin(NotebookView):
         apart = []
         if not self.keeps_N1:
             apart.append(f"N1 by {percent_of(self.difference.N1)}")
-        if self.difference.N2 > SAME:
+        if self.difference.N2 > side_by_side.SAME:
             apart.append(f"N2 by {percent_of(self.difference.N2)} of N1")
         text += f"; {' and '.join(apart)} apart" if apart else "; N2 is the same too"
         if self.separated_by:
@@ -120,17 +100,13 @@ def find_twins(
 ) -> list[Twin]:
     """Return the twins of a law, simplest first, checked by simulation.
 
-    Searched are: every other term of the library in place of each term of the law (exact; for a
-    polynomial law on UCM), every exchange along a relation that vanishes in shear, and
-    every combination that lives on σ33 only (where nothing in the law feels σ33).
-
-    `library`: candidate terms. `law`: the law, beyond the known part, such
-    as ``TensorSINDy.terms_``. `base`: the known part; by
-    default UCM.
+    Every other library term in place of each term (of a polynomial law on UCM), every exchange
+    along a relation that vanishes in shear, every combination on σ33 that the law does not feel.
+    `law`: beyond the known part, such as ``TensorSINDy.terms_``. `base`: by default UCM.
     """
     base = UpperConvectedMaxwell() if base is None else base
     law = law if isinstance(law, LawTerms) else LawTerms.of(law)
-    library = joint_library(library, [law])
+    library = side_by_side.joint_library(library, [law])
     found: list[_Candidate] = []
     if isinstance(base, UpperConvectedMaxwell):
         found += _by_series(library, law, base.linear_relaxation)
@@ -144,19 +120,19 @@ def find_twins(
     if not unique:
         return []
     laws = [law, *(one[0] for one in unique)]
-    stresses = stresses_in_histories(library, laws, base)
-    apart = differences(stresses)
-    same = [i for i, d in enumerate(apart) if d.sigma12 <= SAME]
+    stresses = side_by_side.stresses_in_histories(library, laws, base)
+    apart = side_by_side.differences(stresses)
+    same = [i for i, d in enumerate(apart) if d.sigma12 <= side_by_side.SAME]
     if not same:
         return []
     kept = [(unique[i], apart[i]) for i in same]
     places = [0, *(1 + i for i in same)]
-    told = separations(library, [laws[i] for i in places], stresses[places], base)
+    told = side_by_side.separations(library, [laws[i] for i in places], stresses[places], base)
     return [
         Twin(
             law=twin,
             proof=proof,
-            keeps_N1=d.N1 <= 10.0 * SAME,
+            keeps_N1=d.N1 <= 10.0 * side_by_side.SAME,
             difference=d,
             separated_by=by,
             order=DEFAULT_ORDER if proof == "series" else None,
@@ -175,8 +151,8 @@ def _by_series(
 ) -> Iterator[_Candidate]:
     """Return twins with one term of the law exchanged for another.
 
-    The search runs at a neighbouring law with short fractions, where the arithmetic is fast and a
-    rational twin is recognised; what it finds is solved for again at the law itself.
+    Searched at a neighbouring law with short fractions, where a rational twin is recognised, and
+    solved for again at the law itself.
     """
     present = {name: value for name, value in law.coefficients.items() if value}
     if not present or any(parse_term(name).closed_form for name in present):
@@ -253,7 +229,7 @@ class HiddenStresses:
     """What σ12 feels of the normal stresses in one law.
 
     `unfelt`: orthonormal combinations of (σ11, σ22, σ33) that never reach σ12, shape (k, 3).
-    `felt`: for N1 and N2, whether the difference is free of every unfelt combination.
+    `felt`: for N1 and N2, whether the difference is free of them.
     """
 
     unfelt: Float[np.ndarray, "k 3"]
@@ -289,11 +265,8 @@ class HiddenStresses:
 
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
-    """Return which normal stresses σ12 feels in a law, over random shear histories.
-
-    `law`: any dimensionless law. Histories in which it diverges are left out.
-    """
-    flows = histories_for(law)
+    """Return which normal stresses σ12 feels in a law, over random histories that it survives."""
+    flows = side_by_side.histories_for(law)
     arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)
@@ -350,10 +323,9 @@ themselves, in exact arithmetic."""
 
 @dataclass(frozen=True)
 class OneTermMore:
-    """The term that leaves a quantity most open if it is fitted jointly.
+    """Term that leaves a quantity most open if it is fitted jointly.
 
-    `per_noise`: half of the 95 % interval of the quantity, root-mean-square over N1's, over the
-        relative noise of the records, white and of one size.
+    `per_noise`: half of the quantity's 95 % interval, rms over N1's, over the relative noise.
     """
 
     term: str  # its name
@@ -373,10 +345,8 @@ def one_term_more(
 ) -> OneTermMore | None:
     """Return the term that leaves a quantity most open; None where none can be seen.
 
-    `names`: of all terms of the library. `support`: positions of those that the law has.
-    `observed`, `quantity`: changes of what is observed and of the quantity per unit of each
-    coefficient, so scaled that the norm of a column is a root-mean-square over that of the records.
-    `samples`: how many samples of what is observed there are.
+    `support`: positions of the law's terms. `observed`, `quantity`: changes per unit of each
+    coefficient, columns scaled to rms over that of the records. `samples`: of what is observed.
     """
     worst = None
     for extra, name in enumerate(names):
@@ -402,10 +372,7 @@ def each_moved(
     observed: Sequence[str],
     samples: int,
 ) -> dict[str, OneTermMore]:
-    """Return the same of every quantity that is not observed, by its name.
-
-    `blocks`: changes of each quantity, observed or not. `observed`: which are.
-    """
+    """Return `one_term_more` of every quantity that is not observed, by its name."""
     stacked = np.concatenate([blocks[q] for q in observed])
     found = {
         q: one_term_more(names, support, stacked, block, samples)

@@ -17,20 +17,9 @@ from discover.laws.textbook.classical import (
 )
 
 __all__ = [
-    "LAWS",
-    "AbstractConstitutiveLaw",
-    "ExponentialPhanThienTanner",
-    "FenePeterlin",
-    "Fluid",
-    "Giesekus",
-    "JohnsonSegalman",
-    "LibraryExpansion",
-    "LinearPhanThienTanner",
-    "NamedLaw",
-    "TensorBasisNetwork",
-    "UpperConvectedMaxwell",
-    "laws_table",
-    "make_law",
-]
+    "LAWS", "AbstractConstitutiveLaw", "ExponentialPhanThienTanner", "FenePeterlin", "Fluid",
+    "Giesekus", "JohnsonSegalman", "LibraryExpansion", "LinearPhanThienTanner", "NamedLaw",
+    "TensorBasisNetwork", "UpperConvectedMaxwell", "laws_table", "make_law",
+]  # fmt: skip
 
 answer_calls(__name__, laws_table)

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -25,15 +26,14 @@ State = Symmetric | Float[Array, " s"]
 
 
 class AbstractConstitutiveLaw(eqx.Module):
-    """A Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), dimensionless.
+    """Maxwell-type law, dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h(σ, γ̇), dimensionless.
 
-    Time is scaled by the relaxation time and stress by the modulus. A law says only its extra
-    term h; truth, learned laws and augmented laws all come in this form.
+    Time is scaled by the relaxation time and stress by the modulus. A law states its extra term h.
 
     Attributes
     ----------
     linear_relaxation
-        Whether the −σ is part of the known law. False where it too is left to a learner.
+        Whether the −σ is known; False where it too is left to a learner.
 
     Examples
     --------
@@ -48,45 +48,30 @@ class AbstractConstitutiveLaw(eqx.Module):
 
     linear_relaxation: eqx.AbstractVar[bool]
 
-    @property
-    def variables(self) -> int:
-        """How many structure variables the law needs beside σ, each zero at rest.
+    variables: ClassVar[int] = 0
+    """Number of structure variables behind the four components of σ in the state, zero at rest.
 
-        They stand behind the four components of σ in its state, relax by −1 as σ does, and `h` says
-        what they do beside. A law with some is no function of (3, 3) tensors.
-        """
-        return 0
-
-    @property
-    def tensors(self) -> int:
-        """How many tensors stand first among the variables, four components each.
-
-        Each is the conformation of a part of the fluid without I, and is carried along as σ is.
-        """
-        return 0
+    They relax by −1 as σ does, and `extra_term` says what they do beside. A law with some is no
+    function of (3, 3) tensors."""
+    tensors: ClassVar[int] = 0
+    """Number of tensors that stand first among the variables, four components each: conformations
+    without I, which the flow carries along as it does σ."""
 
     def rest(self) -> Float[Array, " s"]:
         """Return the state at rest: the four components of σ, and the variables."""
         return jnp.zeros(4 + self.variables)
 
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract faster than they turn, so that h relaxes the trace of σ first."""
-        return False
+    retracts: ClassVar[bool] = False
+    """Whether chains retract faster than they turn, so that h relaxes the trace of σ first."""
 
     @abstractmethod
     def extra_term(self, stress: State, rate: Symmetric) -> State:
         """Return h(σ, γ̇), in the storage of `stress`, with the variables where there are some."""
 
     def as_terms(self) -> tuple[LawTerm, ...] | None:
-        """Return h as a sum of library terms, so that the law can be written out.
+        """Return h as a sum of library terms; None if it is none, or the law does not say.
 
-        None if it is no such sum, which is also what a law that does not say is taken to be.
-
-        Raises
-        ------
-        InputError
-            If it is none, and there is more to say of that.
+        Raises InputError if it is none, and there is more to say of that.
         """
         return None
 
@@ -95,11 +80,10 @@ class AbstractConstitutiveLaw(eqx.Module):
         return self, ()
 
     def trace_relaxation(self, stress: State) -> Float[Array, ""]:
-        """Return the rate, over 1/λ, at which h lets the trace of this stress relax beside −σ.
+        """Return the rate, over 1/λ, at which h relaxes the trace of this stress beside −σ.
 
-        The derivative of tr h along I, over 3, without flow. Where `retracts`, integrators treat
-        that at rest as they do −σ, so that fast modes need no small steps. It decides how they
-        step, and not what law they solve.
+        (1/3) ∂ tr h/∂I without flow. Where `retracts`, integrators treat it implicitly at rest, so
+        that fast modes need no small steps; the solution does not depend on it.
         """
         still = jnp.zeros_like(stress_in(stress))
         unit = as_state(identity_like(still), stress)
@@ -109,18 +93,14 @@ class AbstractConstitutiveLaw(eqx.Module):
     def relaxations(self) -> Float[Array, "t 2"]:
         """Return the rates, over 1/λ and beside −1, at which σ and each tensor relax at rest.
 
-        The first of the tensor as a whole, the second by how much its trace is faster still. As
-        `trace_relaxation` they decide how integrators step, and not what law they solve.
+        First of the whole tensor, then by how much its trace is faster. For integrators, as
+        `trace_relaxation`.
         """
         trace_alone = self.trace_relaxation(self.rest())[None]
         return jnp.stack([jnp.zeros_like(trace_alone), trace_alone], axis=1)
 
     def shares(self) -> Float[Array, " tensors"]:
-        """Return the share of each further tensor in σ, which is their sum.
-
-        Integrators follow the tensors, and of σ only what is not this sum: nothing, but for terms
-        that are added to h.
-        """
+        """Return the share of each further tensor in σ, which is their sum but for added terms."""
         return jnp.zeros(self.tensors)
 
     def conformation(self, stress: Symmetric) -> Symmetric:
@@ -130,14 +110,9 @@ class AbstractConstitutiveLaw(eqx.Module):
     def stress_rate(self, stress: State, velocity_gradient: VelocityGradient) -> State:
         """Return dσ/dt, and that of the variables.
 
-        Parameters
-        ----------
-        stress
-            Dimensionless extra stress, (3, 3), or its components 11, 22, 33, 12, and behind them
-            the variables.
-        velocity_gradient
-            Dimensionless L: (3, 3) for a full stress; for four components those of L, or the scalar
-            shear rate in simple shear. See `tensor_library.kinematics`.
+        `stress`: dimensionless, (3, 3), or 11, 22, 33, 12 with the variables behind.
+        `velocity_gradient`: dimensionless L, (3, 3) for a full stress; four components or the
+        scalar shear rate for four.
         """
         rate = rate_of_deformation(velocity_gradient)
         own = stress_in(stress)
@@ -208,19 +183,14 @@ def as_parameter(value: ArrayLike) -> Float[Array, ""]:
 
 @dataclass(frozen=True, eq=False)
 class NamedLaw:
-    """A law that can be asked for by name.
+    """Law that can be asked for by name.
 
-    `build`: makes the law from its parameters, in the order of `parameters`.
-    `parameters`: name and physical range of each parameter; laws are dimensionless, and so are
-        these.
-    `range_sources`: where each range comes from: literature, or the argument in a sentence.
-    `written`: returns h with its constants as letters, by the names of `parameters`, so that the
-        law can be written out; None where nobody said.
-    `is_one_mode`: whether at small strain the law is one Maxwell mode. One that is not brings a
-        spectrum of its own, so that modes found in a sweep are not its modes; ``"any"`` leaves it
-        out.
-    `contains`: laws that this one is, exactly or in the limit, with some of its constants at these
-        values and the others as those of the law of that name.
+    `build`: makes the law from its parameters in the order of `parameters`: names and physical
+    ranges, dimensionless. `range_sources`: literature or argument for each range. `written`:
+    returns h with its constants as letters, to be written out; None if nobody said. `is_one_mode`:
+    whether at small strain the law is one Maxwell mode; otherwise ``"any"`` leaves it out, as the
+    modes of a sweep are not its own. `contains`: laws that this one is, exactly or in the limit,
+    with some constants at these values.
     """
 
     title: str  # name as a rheologist writes it

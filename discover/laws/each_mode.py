@@ -1,4 +1,4 @@
-"""A law whose constants differ from one relaxation mode to the next."""
+"""Laws whose constants differ from mode to mode."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
@@ -21,9 +21,8 @@ Tree = TypeVar("Tree")
 class LawOfEachMode(AbstractConstitutiveLaw):
     """One law for each mode of a fluid: the same equation with constants of its own.
 
-    It stands for a law where a fluid takes one, alone or below the terms that a learner adds. What
-    follows the modes of a fluid takes it apart by `over_modes` or `law_of_mode`; in there it is the
-    law of that one mode.
+    It stands for a law where a fluid takes one, alone or below added terms. What follows the modes
+    takes it apart by `over_modes` or `law_of_mode`, and there it is the law of that mode.
     """
 
     law: AbstractConstitutiveLaw  # the law, with a leading axis of modes on every array
@@ -74,11 +73,9 @@ class LawOfEachMode(AbstractConstitutiveLaw):
 
 
 def law_of_each_mode(laws: Sequence[AbstractConstitutiveLaw]) -> LawOfEachMode:
-    """Return the law of a fluid with one law for each of its modes.
+    """Return the law of a fluid with one law for each of its modes, in their order.
 
-    `laws` in the order of the modes, of one kind: they may differ in numbers alone. Raises
-    InputError if they are of several kinds, or a further tensor of a mode has its own share of the
-    stress.
+    Raises InputError if the laws differ in more than numbers, or carry further tensors.
     """
     parts = [eqx.partition(law, eqx.is_array) for law in laws]
     kinds = {jax.tree.structure(arrays) for arrays, _ in parts}
@@ -100,11 +97,9 @@ def differs_by_mode(law: AbstractConstitutiveLaw) -> bool:
 
 
 def over_modes(function: Callable[..., Any], tree: Any, axis: int = 0) -> Callable[..., Any]:
-    """Return a function of one mode, with its law, as one of all modes.
+    """Return a function of one mode's law and numbers as one of all modes.
 
-    `function`: of a tree that holds the law, and of numbers of one mode. `tree`: a law, or what
-    holds one; what of it differs from mode to mode is taken apart. `axis`: along which the modes
-    lie, in the numbers and in what is returned.
+    `tree`: a law, or what holds one. `axis`: of the modes, in the numbers and in what is returned.
     """
     own, shared = apart(tree)
 
@@ -141,12 +136,9 @@ def with_modes(
     before: Float[Array, " k"] | np.ndarray,
     after: Float[Array, " m"] | np.ndarray,
 ) -> AbstractConstitutiveLaw:
-    """Return a law of modes with these times as one of modes with other times.
+    """Return a law of modes with times `before` (s) as one of modes with times `after`.
 
-    A mode has constants between those of its neighbours, evenly in log λ, and beyond the ends those
-    of the end.
-
-    `law`: the law. `before`, `after`: relaxation times in s.
+    Constants are interpolated evenly in log λ; beyond the ends they are those of the end.
     """
 
     def of_times(part):
@@ -169,10 +161,7 @@ def with_modes(
 
 
 def require_modes(law: AbstractConstitutiveLaw, count: int) -> None:
-    """Refuse a law with constants of other than so many modes.
-
-    Raises InputError if it has them.
-    """
+    """Raise InputError if a law has constants of another number of modes."""
     for part in _parts(law):
         if isinstance(part, LawOfEachMode):
             leaves = [leaf for leaf in jax.tree.leaves(part) if eqx.is_array(leaf)]

@@ -1,4 +1,4 @@
-"""A law as a sum of library terms: what sparse regression finds."""
+"""Laws as sums of library terms, as sparse regression finds them."""
 
 import equinox as eqx
 import jax
@@ -16,16 +16,14 @@ from discover.laws.base import (
 )
 from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.programs import on_device
+from tensor_library import LawTerm, LawTerms, TermLibrary, build_library, parse_term
 from tensor_library.algebra import Symmetric
-from tensor_library.law_terms import LawTerm, LawTerms
-from tensor_library.library import TermLibrary, build_library
-from tensor_library.terms import parse_term
 
 
 class LibraryExpansion(AbstractExtendedLaw):
     """h = Σ cₙ termₙ(σ, γ̇; inner), over a library of candidate terms.
 
-    `coefficients`: cₙ, one for each term; a zero leaves the term out without recompiling anything.
+    `coefficients`: cₙ; a zero leaves a term out without recompiling.
     """
 
     coefficients: Float[Array, " n"]
@@ -64,10 +62,9 @@ class LibraryExpansion(AbstractExtendedLaw):
 def law_of_terms(
     terms: LawTerms, linear_relaxation: bool, base: AbstractConstitutiveLaw | None = None
 ) -> LibraryExpansion:
-    """Return the law h = Σ c term.
+    """Return the law h = Σ c term, added to the extra term of `base`.
 
-    `linear_relaxation`: whether −σ is part of the known law. `base`: a known law whose extra term
-    is added. Raises ValueError if a spelling is not canonical.
+    Raises ValueError if a spelling is not canonical.
     """
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
     coefficients, inner = terms.over(library)
@@ -87,9 +84,8 @@ _TENSORS = build_library(degree=0, extra=["tr(gammadot.gammadot)*I"])
 def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
     """Return a law of constant coefficients on the basis tensors as an expansion on all of them.
 
-    Laws that are such sums, named or learned, then share every program: which tensors act is told
-    by numbers alone. Any other law is returned as it is. So is a user's own, which may write out
-    another h than it computes.
+    Such laws then share every program. Any other law is returned as it is, and so is a user's own,
+    which may write out another h than it computes.
     """
     if not _is_plain(law) or any(isinstance(leaf, Tracer) for leaf in jax.tree.leaves(law)):
         return law

@@ -1,8 +1,8 @@
-"""A fluid: one law in each of several relaxation modes, with units."""
+"""Fluids: one law in each of several relaxation modes, with units."""
 
 import warnings
 from collections.abc import Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -18,15 +18,6 @@ from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
 from tensor_library.kinematics import VelocityGradient, rate_of_deformation
-
-
-@runtime_checkable
-class HasSpectrum(Protocol):
-    """Linear data that know their relaxation modes, such as a `LinearSweep`."""
-
-    def relaxation_spectrum(self, **options: Any) -> Any:
-        """Return modes with `modulus` in Pa and `relaxation_time` in s, both of shape (k,)."""
-        ...
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
@@ -53,24 +44,21 @@ def _as_covariance(value: ArrayLike | None) -> Float[Array, "c c"] | None:
 class Fluid(eqx.Module):
     """Sum of modes that share one dimensionless law, plus a Newtonian solvent.
 
-    Mode k obeys the law in its own scaled stress and rate: with s = σ_k/G_k,
-    λ_k ds/dt = γ̇λ_k + ... − s − h(s, γ̇λ_k), and σ = Σ G_k s_k + η_s γ̇.
+    With s = σ_k/G_k mode k obeys λ_k ds/dt = γ̇λ_k + ... − s − h(s, γ̇λ_k); σ = Σ G_k s_k + η_s γ̇.
 
     Attributes
     ----------
     law
-        The dimensionless law, by default upper convected Maxwell; a `LawOfEachMode` where its
-        constants differ from mode to mode.
-    modulus
-        G_k, shape (k,), in Pa.
-    relaxation_time
-        λ_k, shape (k,), in s.
+            Dimensionless law, by default upper convected Maxwell; `LawOfEachMode` where constants
+        differ.
+    modulus, relaxation_time
+        G_k in Pa and λ_k in s, shape (k,).
     solvent_viscosity
         η_s, in Pa s.
     modulus_covariance
-        Of the moduli where they come from a sweep with noise, shape (k, k), in Pa²; of one with a
-        solvent its row and column come last, shape (k + 1, k + 1). None where they are exact.
-        Learners widen their intervals by it; no flow depends on it.
+            Of moduli from a noisy sweep in Pa², shape (k, k), or (k + 1, k + 1) with the solvent
+        last; None
+        where they are exact. Learners widen their intervals by it; no flow depends on it.
 
     Examples
     --------
@@ -153,22 +141,23 @@ class Fluid(eqx.Module):
 
     @classmethod
     def from_sweep(
-        cls, sweep: HasSpectrum | None, law: AbstractConstitutiveLaw | None = None, **options: Any
+        cls, sweep: Any, law: AbstractConstitutiveLaw | None = None, **options: Any
     ) -> "Fluid":
         """Return the fluid with the modes and solvent of a sweep, as ``modes = "lve"`` in a study.
 
-        An elastic constant is its last and slowest mode, of the shortest time that the sweep
-        cannot tell from a constant.
+        An elastic constant is its slowest mode, of the shortest time indistinguishable from a
+        constant.
 
         Parameters
         ----------
         sweep
             Small-amplitude data, such as `Dataset.linear_sweep`.
         law
-            The law of every mode; by default upper convected Maxwell.
+            Of every mode; by default upper convected Maxwell.
         **options
-            As of `discover.dataset.relaxation_spectrum`: `modes`, `most_modes`, `tolerance`, and
-            `solvent_viscosity` and `elastic_modulus` where they are known.
+                `modes`, `most_modes`, `tolerance`, known `solvent_viscosity` and `elastic_modulus`,
+            as of
+            `discover.dataset.relaxation_spectrum`.
 
         Raises
         ------
@@ -180,7 +169,7 @@ class Fluid(eqx.Module):
                 "There is no linear sweep to take the modes from: the data set has no lve.csv. "
                 "Give the modes: Fluid(law, modulus, relaxation_time), in Pa and s."
             )
-        if not isinstance(sweep, HasSpectrum):
+        if not hasattr(sweep, "relaxation_spectrum"):
             raise InputError(
                 "The modes come from a linear sweep, such as data.linear_sweep; got a "
                 f"{type(sweep).__name__}."
@@ -213,10 +202,10 @@ class Fluid(eqx.Module):
         return jnp.tile(self.law.rest(), (self.n_modes, 1))
 
     def decay_rate(self) -> Float[Array, "k _"]:
-        """Return the rate of linear relaxation of each mode in 1/s, (k, 1).
+        """Return the rate of linear relaxation of each mode in 1/s, shape (k, 1).
 
-        Where chains retract that of each component, (k, s), in the place of the first normal stress
-        of each tensor that of its trace, as `ExponentialRungeKutta4` takes it.
+        Where chains retract that of each component, (k, s), with the trace's in the place of the
+        first normal stress of each tensor, as `ExponentialRungeKutta4` takes it.
         """
         rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
         if not self.law.retracts:
@@ -233,15 +222,10 @@ class Fluid(eqx.Module):
     def state_rate(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient
     ) -> Float[Array, "k s"]:
-        """Return d(state)/dt, in 1/s.
+        """Return d(state)/dt in 1/s.
 
-        Parameters
-        ----------
-        state
-            σ_k/G_k, dimensionless, in the four components, and behind them the law's structure
-            variables, shape (k, s); s is 4 for most laws.
-        velocity_gradient
-            The shear rate γ̇ in 1/s, shape (), or the four components of L in 1/s, shape (4,).
+        `state`: σ_k/G_k, dimensionless, four components with the variables behind, (k, s).
+        `velocity_gradient`: γ̇, (), or four components of L, (4,), in 1/s.
         """
         scaled = jnp.multiply.outer(self.relaxation_time, velocity_gradient)
         of_modes = over_modes(lambda law, *flow: law.stress_rate(*flow), self.law)

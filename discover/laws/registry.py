@@ -1,7 +1,6 @@
 """Named laws, as study files and the command line spell them.
 
-A file in the folder `textbook` that says ``NAMED = {...}`` is a law that is built in. A user's own
-are registered, by a program or by an installed package: see docs/adding-a-law.md.
+A file in `textbook` with ``NAMED = {...}`` is built in; for a user's own see docs/adding-a-law.md.
 """
 
 import importlib
@@ -31,10 +30,7 @@ from tensor_library.isotropic_function import IsotropicFunction
 
 
 class LawOfFunction(AbstractConstitutiveLaw):
-    """A law with h(σ, γ̇) as a function.
-
-    `function`: h of stress, rate and the parameters by name.
-    """
+    """Law with h(σ, γ̇) as a function of stress, rate and the parameters by name."""
 
     values: tuple[Float[Array, ""], ...]  # of the parameters, in the order of `names`
     function: Callable[..., Symmetric] = eqx.field(static=True)
@@ -96,10 +92,7 @@ RESERVED = ("learned", ANY)
 
 
 def laws_table() -> "pd.DataFrame":
-    """Return the laws that are known by name, one line for each parameter.
-
-    Laws are dimensionless, stress over modulus and time over relaxation time, and so are their
-    parameters.
+    """Return the laws known by name, one line a parameter; all are dimensionless.
 
     Examples
     --------
@@ -122,10 +115,7 @@ def laws_table() -> "pd.DataFrame":
 
 
 def name_of(law: AbstractConstitutiveLaw) -> tuple[str, dict[str, float]] | None:
-    """Return name and parameters of a law; None if no named law makes it.
-
-    Whether −σ is part of it does not matter.
-    """
+    """Return name and parameters of a law, with or without −σ; None if no named law makes it."""
     values = [float(leaf) for leaf in jax.tree.leaves(law) if jnp.ndim(leaf) == 0]
     for name, entry in LAWS.items():
         if isinstance(entry.build, type) and entry.build is not type(law):
@@ -147,44 +137,39 @@ def _same_law(made: AbstractConstitutiveLaw, law: AbstractConstitutiveLaw) -> bo
 
 
 def register_law(
-    name: str,
-    build: Callable[..., AbstractConstitutiveLaw] | None = None,
-    parameters: Mapping[str, tuple[float, float]] | None = None,
-    title: str = "",
-    source: str = "",
-    written: Callable[[], IsotropicFunction] | None = None,
-    *,
+    name: str, build: Callable[..., AbstractConstitutiveLaw] | None = None,
+    parameters: Mapping[str, tuple[float, float]] | None = None, title: str = "", source: str = "",
+    written: Callable[[], IsotropicFunction] | None = None, *,
     extra_term: Callable[..., Symmetric] | None = None,
-) -> NamedLaw:
-    """Make a law of one's own known by name, to studies, loops and exports in this process.
+) -> NamedLaw:  # fmt: skip
+    """Make a law of one's own known by name to studies, loops and exports in this process.
 
     An installed package does so in every process: see docs/adding-a-law.md.
 
     Parameters
     ----------
     name
-        As studies are to spell it: lower-case letters, digits and underscores.
+        As studies spell it: lower-case letters, digits and underscores.
     build
-        The class of the law, or a function that makes the law from its parameters, in their order.
-        Not needed where `extra_term` is given.
+        Class of the law, or a function of its parameters in their order; or give `extra_term`.
     parameters
-        Name and admissible range (low, high) of each parameter; they are dimensionless.
+        Name and admissible range (low, high) of each parameter, dimensionless.
     title, source
         Name for readers, by default `name` in words, and literature.
     written
-        Returns h written out, for exports of a law that is no sum of terms; see
+        Returns h written out, for a law that is no sum of terms; see
         `tensor_library.isotropic_function`.
     extra_term
-        h as a plain function of stress and rate, dimensionless tensors of shape (3, 3), and of the
-        parameters by name; the law is then λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h. Written with
-        `tensor_library.algebra` (``trace``, ``square``, ``inner``, ``anticommutator``,
-        ``identity_like``) and numbers.
+            h as a function of stress and rate, dimensionless (3, 3), and of the parameters by name,
+        written
+        with `tensor_library.algebra`: λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h.
 
     Raises
     ------
     InputError
-        If the name is taken or is none, a range is none, `build` makes no law, `extra_term` does
-        not take these parameters or returns no tensor, or both or neither are given.
+            If the name is taken or is none, a range is none, `build` makes no law, `extra_term`
+        does not
+        take these parameters or returns no tensor, or both or neither are given.
 
     Examples
     --------
@@ -249,10 +234,7 @@ def _require_law(name: str, build, ranges: Mapping[str, tuple[float, float]]) ->
 
 
 def starting_value(law: str, parameter: str) -> float:
-    """Return a value from which a fit of a law's parameter may start.
-
-    Of a law or a parameter that is none any: `make_law` says what is wrong.
-    """
+    """Return a value from which a fit of a law's parameter may start, also of an unknown law."""
     if law not in LAWS or parameter not in LAWS[law].parameters:
         return 0.1
     low, high = LAWS[law].parameters[parameter]
@@ -263,19 +245,12 @@ def starting_value(law: str, parameter: str) -> float:
 
 
 def starting_values(law: str) -> dict[str, float]:
-    """Return such a value of each parameter of a law."""
+    """Return a starting value of each parameter of a law."""
     return {parameter: starting_value(law, parameter) for parameter in LAWS[law].parameters}
 
 
 def make_law(name: str, parameters: Mapping[str, float] | None = None) -> AbstractConstitutiveLaw:
     """Return the named law with these parameters.
-
-    Parameters
-    ----------
-    name
-        Key of `LAWS`.
-    parameters
-        Every parameter of the law, by the contract's name.
 
     Raises
     ------
@@ -325,10 +300,7 @@ def make_law(name: str, parameters: Mapping[str, float] | None = None) -> Abstra
 
 
 def check_law(law: AbstractConstitutiveLaw) -> None:
-    """Check that a law gives a rate of stress with as many components as the stress.
-
-    A term of another shape would be spread over all components without a word.
-    """
+    """Raise InputError unless a law's rate has as many components as its stress."""
     law = law_of_mode(law, 0)
     name = type(law).__name__
     stress, rate = law.rest(), jnp.zeros(())

@@ -1,4 +1,4 @@
-"""A law whose coefficients in the tensor basis are a neural network."""
+"""Laws whose coefficients in the tensor basis are a neural network."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -31,15 +31,12 @@ def _unchanged(value: Float[Array, ""]) -> Float[Array, ""]:
 
 
 class TensorBasisNetwork(AbstractExtendedLaw):
-    """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron   [Ling et al. 2016, JFM 807, 155].
+    """h = Σ gₙ(invariants) Tₙ, gₙ from a multilayer perceptron [Ling et al. 2016, JFM 807, 155].
 
-    The coefficients are gₙ = cₙ + mₙ MLPₙ(invariants): a constant, and a network for what varies.
-    The network of the paper has cₙ = 0 and takes the invariants as they are.
-
-    `network`: eight invariants in, eight numbers out; None where all coefficients are constant.
-    `invariant_scale`: typical size of each invariant, shape (8,); the network sees
-        asinh(invariant/scale), which is linear for small ones and tame for large ones. None for the
-        bare invariants.
+    gₙ = cₙ + mₙ MLPₙ(invariants); the paper's network has cₙ = 0 and bare invariants. `network`:
+    eight invariants in, eight numbers out; None where all coefficients are constant.
+    `invariant_scale`: typical size of each invariant, which the network sees as
+    asinh(invariant/scale); None for bare ones.
     """
 
     network: eqx.nn.MLP | None

@@ -1,7 +1,7 @@
 """Distillation: the parameters of one law that best imitate another   [Rodrigues et al., §6]."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache, partial
 from typing import Any
 
@@ -11,13 +11,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.optimize import least_squares
+from scipy.stats import qmc
 
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
 from discover.forward.grids.grid import IntegrationGrid, make_grids
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.learners.students import STUDENTS, MaxwellSurrogate, Student, student_of
+from discover.laws import AbstractConstitutiveLaw, Fluid
+from discover.laws.base import as_parameter
+from discover.laws.registry import LAWS, starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.programs import compiled
 from discover.protocols.protocol import (
@@ -31,10 +32,113 @@ from discover.protocols.protocol import (
     start_up,
 )
 from discover.simulate.solve import SimulationError, simulate
+from discover.words import unknown_name
+from tensor_library.algebra import Symmetric
 
 _TOLERANCE, _MOST_STEPS = 1e-10, 200
 _RUNAWAY = 1e3  # misfit of a trial that has no finite trajectory: it is always rejected
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
+
+_POINTS = 5
+"""Starts of a law with a name beside its own, spread evenly over its ranges."""
+
+
+class MaxwellSurrogate(AbstractConstitutiveLaw):
+    """Maxwell law with a relaxation rate and a modulus of its own: h = g₂ σ − (g₃ − 1) γ̇.
+
+    In the teacher's units modulus g₃, relaxation time 1/g₂, viscosity g₃/g₂.
+    """
+
+    relaxation: Float[Array, ""] = eqx.field(converter=as_parameter)  # g₂
+    production: Float[Array, ""] = eqx.field(converter=as_parameter)  # g₃
+    linear_relaxation: bool = eqx.field(static=True, default=False)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h = g₂ σ − (g₃ − 1) γ̇."""
+        return self.relaxation * stress - (self.production - 1.0) * rate
+
+
+@dataclass(frozen=True)
+class Student:
+    """Law with parameters to teach.
+
+    `build`: from the parameters in the order of `bounds`. `more_starts`: against several minima.
+    """
+
+    name: str  # for tables
+    build: Callable[..., AbstractConstitutiveLaw]
+    bounds: Mapping[str, tuple[float, float]]  # name and admissible range of each parameter
+    start: tuple[float, ...]
+    latex: str  # the law with ``%s`` where each parameter's value goes
+    more_starts: tuple[tuple[float, ...], ...] = ()
+
+
+_CONVECTED = r"\overset{\nabla}{\boldsymbol{\sigma}}"
+_STRESS = r"\boldsymbol{\sigma}"
+_RATE = r"\dot{\boldsymbol{\gamma}}"
+
+
+def _of_paper(law: str, latex: str) -> Student:
+    """Return a law of one constant as the paper teaches it; its LaTeX behind γ̇."""
+    named = LAWS[law]
+    return Student(law, named.build, named.parameters, (0.2,), rf"{_CONVECTED} = {_RATE}{latex}")
+
+
+STUDENTS: Mapping[str, Student] = {
+    "ucm": Student(
+        "ucm",
+        MaxwellSurrogate,
+        {"g2": (0.0, 20.0), "g3": (0.0, 20.0)},
+        (1.0, 1.0),
+        rf"{_CONVECTED} = -%s\,{_STRESS} + %s\,{_RATE}",
+    ),
+    "johnson_segalman": _of_paper(
+        "johnson_segalman",
+        rf" - {_STRESS} - \frac{{%s}}{{2}}({_STRESS}\cdot{_RATE} + {_RATE}\cdot{_STRESS})",
+    ),
+    "giesekus": _of_paper("giesekus", rf" - {_STRESS} - %s\,{_STRESS}\cdot{_STRESS}"),
+    "ptt_linear": _of_paper("ptt_linear", rf" - (1 + %s\,\operatorname{{tr}}{_STRESS})\,{_STRESS}"),
+    "ptt_exponential": _of_paper(
+        "ptt_exponential", rf" - \exp(%s\,\operatorname{{tr}}{_STRESS})\,{_STRESS}"
+    ),
+    # The law depends smoothly on 1/L², which is zero for UCM; L² itself may run to infinity
+    "fene_p": Student(
+        "fene_p",
+        lambda inverse: LAWS["fene_p"].build(1.0 / inverse),
+        {"inverse_L2": (1e-6, 1.0 / 3.0)},
+        (0.05,),
+        rf"{_STRESS} = \boldsymbol{{A}}\,(1 - 3/L^2)/(1 - \operatorname{{tr}}\boldsymbol{{A}}/L^2)"
+        r" - \boldsymbol{I},\quad 1/L^2 = %s",
+    ),
+}
+"""Students of the paper by the name of their law; any other law with a name can be one too."""
+
+
+def student_of(law: str) -> Student:
+    """Return a law by its key in `STUDENTS` or `LAWS` as a student, all its constants free."""
+    if law in STUDENTS:
+        return STUDENTS[law]
+    if law not in LAWS or not LAWS[law].parameters:
+        known = dict.fromkeys([*STUDENTS, *(name for name in LAWS if LAWS[name].parameters)])
+        raise InputError(unknown_name("student", law, known))
+    entry = LAWS[law]
+    ranges = entry.parameters.values()
+    shares = qmc.Halton(len(ranges), scramble=False).random(_POINTS + 1)[1:]
+    others = tuple(
+        tuple(_within(ends, float(at)) for ends, at in zip(ranges, row, strict=True))
+        for row in shares
+    )
+    start = tuple(starting_values(law).values())
+    constants = r",\quad ".join(rf"\texttt{{{name}}} = %s" for name in entry.parameters)
+    latex = rf"\text{{{entry.title}}}:\quad {constants}".replace("_", r"\_")
+    return Student(law, entry.build, entry.parameters, start, latex, others)
+
+
+def _within(ends: tuple[float, float], share: float) -> float:
+    """Return a value within a range; one that leaves out zero spans orders of magnitude."""
+    low, high = ends
+    return low * (high / low) ** share if low > 0.0 else low + (high - low) * share
+
 
 # slower than any Maxwell mode with the teacher's times can bear for ever
 _EXTENSION = {"extension": in_flow(start_up(0.3), "uniaxial")}
@@ -44,14 +148,11 @@ _EXTENSION = {"extension": in_flow(start_up(0.3), "uniaxial")}
 class Distillation:
     """What a student learned.
 
-    `penalised`, `debiased`: parameters by name, with the penalty and without.
-    `misfit`: root-mean-square of the difference in σ12 over that of the teacher's σ12, debiased,
-        over all training flows.
-    `viscosity_ratio`, `relaxation_time_ratio`: of the debiased surrogate to the teacher's linear
-        limit, where the student is a Maxwell law.
-    `errors`: for each test flow, relative L2 errors ``sigma12``, ``N1`` and ``N2`` of the debiased
-        student (N2's relative to N1's norm), in extension ``tensile_stress``; None where a law runs
-        away.
+    `penalised`, `debiased`: parameters by name, with the penalty and without. `misfit`: rms
+    difference of σ12 over the teacher's, debiased, over all training flows. `viscosity_ratio`,
+    `relaxation_time_ratio`: of a debiased Maxwell student to the teacher's linear limit. `errors`:
+    by test flow, relative L2 errors ``sigma12``, ``N1``, ``N2`` (relative to N1), in extension
+    ``tensile_stress``; None where a law diverges.
     """
 
     student: str
@@ -67,21 +168,11 @@ class Distillation:
 
     def as_dict(self) -> dict[str, Any]:
         """Return everything but the law, JSON-able."""
-        return {
-            "student": self.student,
-            "penalised": dict(self.penalised),
-            "debiased": dict(self.debiased),
-            "penalty": self.penalty,
-            "misfit": self.misfit,
-            "viscosity_ratio": self.viscosity_ratio,
-            "relaxation_time_ratio": self.relaxation_time_ratio,
-            "errors": {k: None if v is None else dict(v) for k, v in self.errors.items()},
-            "latex": self.latex,
-        }
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name != "law"}
 
 
 class _Lesson(eqx.Module):
-    """What is taught: target σ12 over the modulus, shape (flows, n), and how to predict it."""
+    """Training problem: target σ12 over the modulus, shape (flows, n), and how to predict it."""
 
     build: Callable[..., AbstractConstitutiveLaw] = eqx.field(static=True)
     low: Float[Array, " p"]
@@ -169,17 +260,15 @@ def distil(
 ) -> Distillation:
     """Teach one law to another by the shear stress alone.
 
-    Minimises Σ over flows of the mean squared difference of σ12 (in units of the modulus), plus
-    κ Σ |parameter|. The sum over flows, not their mean, is what reproduces the paper's numbers; the
-    penalty biases them by some 2 %, so the minimum without it is found too.
+    Minimises Σ over flows of the mean squared difference of σ12 (over the modulus) plus κ Σ
+    |parameter|, and the same without the penalty, which biases by some 2 %. The sum over flows, not
+    their mean, reproduces the paper's numbers.
 
-    `teacher`: a dimensionless law or a fluid. `student`: key of `STUDENTS` or of `LAWS`, or a
-    `Student`. It has the teacher's moduli and relaxation times. A law of `LAWS` beyond the paper's
-    is taught from several starts. `protocols`: training flows, by default the paper's eight.
-    `penalty`: κ. `n_samples`, `duration`: equally spaced samples of each training flow, and its
-    length in the teacher's units. `tests`: flows on which errors are reported, by default the
-    paper's three and uniaxial extension. Raises InputError if the student is unknown or an argument
-    is out of range.
+    `teacher`: dimensionless law or fluid. `student`: key of `STUDENTS` or `LAWS`, or a `Student`,
+    with the teacher's modes; a law beyond the paper's is taught from several starts. `protocols`:
+    training flows, by default the paper's eight. `penalty`: κ. `n_samples`, `duration`: of each
+    training flow, in the teacher's units. `tests`: flows of `errors`, by default the paper's three
+    and uniaxial extension. Raises InputError if the student is unknown or an argument out of range.
     """
     fluid = teacher if isinstance(teacher, Fluid) else Fluid.dimensionless(teacher)
     pupil = student if isinstance(student, Student) else student_of(student)
@@ -241,12 +330,9 @@ def distil(
 def compare_fluids(
     truth: Fluid, other: Fluid, protocol: FlowProtocol, duration: float = TEST_DURATION
 ) -> dict[str, float] | None:
-    """Return relative L2 errors of σ12, N1 and N2 of one fluid against another in a flow.
+    """Return relative L2 errors ``sigma12``, ``N1``, ``N2`` of one fluid against another in a flow.
 
-    N2's error is relative to N1's norm, since N2 may vanish.
-
-    `truth`, `other`: the reference, and the fluid to compare. The keys are ``sigma12``, ``N1`` and
-    ``N2``, in extension ``tensile_stress``. None where a fluid diverges in this flow.
+    N2's is relative to N1's norm; in extension ``tensile_stress``. None where a fluid diverges.
     """
     times = np.linspace(0.0, duration, 401)
     try:

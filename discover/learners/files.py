@@ -1,4 +1,4 @@
-"""Estimators kept in files: plain text and arrays, with what made them."""
+"""Estimators in files: plain text and arrays, with what made them."""
 
 import hashlib
 import io
@@ -66,12 +66,10 @@ def write_estimator(
 
 
 class EstimatorFile:
-    """What a file written by `write_estimator` holds.
+    """Content of a file written by `write_estimator`.
 
-    `learner`: name of the learner.
-
-    Raises InputError if there is no such file, it is something else, it is damaged, or it is of a
-    later version.
+    Raises InputError if there is no such file, or it is something else, damaged, or of a later
+    version.
     """
 
     def __init__(self, path: str | Path):
@@ -130,7 +128,7 @@ class EstimatorFile:
         )
 
     def damaged(self, error: Exception) -> InputError:
-        """Return what to raise where something in the file is not as it was written."""
+        """Return the error of a file whose content is not as it was written."""
         first = (str(error).splitlines() or [""])[0][:200]
         return InputError(
             f"{self._path} is damaged ({type(error).__name__}: {first}). Copy it again, or fit "
@@ -146,10 +144,7 @@ _UNREADABLE = (
 
 
 def _require_small(file: zipfile.ZipFile) -> None:
-    """Refuse what would fill the memory, by what the file says of itself, before it is unpacked.
-
-    The reader of a member stops at the size that is said there.
-    """
+    """Refuse, by the sizes that the file states, what would fill the memory."""
     members = file.infolist()
     size = sum(info.file_size for info in members)
     if len(members) > _MOST_MEMBERS or size > _LARGEST:
@@ -183,7 +178,7 @@ def _read_array(file: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Provenance:
-    """What an estimator was fitted to; it stays with a saved one, which holds no data."""
+    """Data an estimator was fitted to; a saved one holds this in their place."""
 
     data: str  # name of the data set; empty for a list of runs
     runs: tuple[str, ...]  # names of the runs
@@ -193,10 +188,7 @@ class Provenance:
 
 
 def provenance_of(data: Any, runs: Sequence[Run]) -> Provenance:
-    """Return the provenance of a fit to some runs.
-
-    `data`: what the user gave: a data set, whose name is kept, or anything else.
-    """
+    """Return the provenance of a fit to runs; of a data set with its name."""
     return Provenance(
         str(getattr(data, "name", "")),
         tuple(run.name for run in runs),

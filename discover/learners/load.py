@@ -8,16 +8,11 @@ from discover.learners.files import EstimatorFile
 from discover.learners.tbnn_ude import TBNNUDE
 from discover.learners.tensor_sindy import TensorSINDy
 
-_LEARNERS = {"tensor_sindy": TensorSINDy, "tbnn_ude": TBNNUDE}
+_LEARNERS = {one.learner: one for one in (TensorSINDy, TBNNUDE)}
 
 
 def load(path: str | Path) -> TensorSINDy | TBNNUDE:
     """Return the fitted estimator in a file that its `save` wrote; it predicts the same numbers.
-
-    Parameters
-    ----------
-    path
-        The file.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Values as plain JSON with arrays beside it, and back: no pickle, and nothing that runs."""
+"""Values as plain JSON with arrays beside it, and back, without pickle."""
 
 import dataclasses
 import math
@@ -18,8 +18,7 @@ from discover.laws.expansion import LibraryExpansion
 from discover.laws.multimode import Fluid
 from discover.laws.registry import LAWS, make_law, name_of
 from discover.laws.tensor_basis_network import TensorBasisNetwork
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import TermLibrary, parse_term
 
 KIND = "kind"
 
@@ -27,12 +26,10 @@ Arrays = dict[str, np.ndarray]
 
 
 class PlainWriter:
-    """Turns values into JSON-able ones.
+    """Writer of values as JSON, with arrays beside it in `arrays`, by name.
 
-    `types`: dataclasses that may be written beside numbers, text, arrays, laws, fluids, libraries,
+    `types`: dataclasses that may be written besides numbers, text, arrays, laws, fluids, libraries,
     and lists and dictionaries of them.
-
-    `arrays`: what was set beside the JSON, by name.
     """
 
     def __init__(self, types: Sequence[type]):
@@ -40,10 +37,7 @@ class PlainWriter:
         self.arrays: Arrays = {}
 
     def plain(self, value: Any, where: str) -> Any:
-        """Return a value as JSON-able ones.
-
-        Raises InputError if it, or something in it, cannot be written; `where` says what it is.
-        """
+        """Return a value as JSON-able ones; raises InputError if it cannot be written."""
         if value is None or isinstance(value, bool | str | int):
             return value
         if isinstance(value, np.generic):
@@ -121,10 +115,7 @@ _NETWORK_FIELDS = ("constants", "network_mask", "invariant_scale", "linear_relax
 
 
 class PlainReader:
-    """Undoes `PlainWriter`.
-
-    `types`: the dataclasses that may occur.
-    """
+    """Reader of what `PlainWriter` wrote; `types`: the dataclasses that may occur."""
 
     def __init__(self, types: Sequence[type], arrays: Mapping[str, np.ndarray]):
         self._types = {one.__name__: one for one in types}

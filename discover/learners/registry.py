@@ -1,4 +1,4 @@
-"""Learners by name: those that are built in, and a user's own."""
+"""Learners by name: the built-in ones, and a user's own."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -19,10 +19,7 @@ BUILT_IN: Mapping[str, str] = {"tensor_sindy": "sparse regression", "tbnn_ude": 
 
 @dataclass(frozen=True)
 class LearningTask:
-    """What a learner of a user's own is given.
-
-    `progress`: to be called with what is going on and the fraction done, 0 to 1.
-    """
+    """What a learner of a user's own is given; `progress` takes a text and the fraction done."""
 
     runs: tuple[Run, ...]  # runs to learn from; stresses in Pa, times in s
     base: Fluid  # the known fluid, whose law the learner adds to: its modes and its solvent stay
@@ -33,9 +30,9 @@ class LearningTask:
 
 @dataclass(frozen=True)
 class NamedLearner:
-    """A learner of a user's own.
+    """Learner of a user's own.
 
-    `learn`: takes a `LearningTask` and returns a `LearnerResult` whose law holds the known one.
+    `learn`: from a `LearningTask` to a `LearnerResult` whose law holds the known one.
     """
 
     learn: Callable[[LearningTask], LearnerResult]
@@ -56,7 +53,7 @@ def register_learner(
     Parameters
     ----------
     name
-        As ``[compare] learners`` is to spell it: lower-case letters, digits and underscores.
+        As ``[compare] learners`` spells it: lower-case letters, digits and underscores.
     learn
         Takes a `LearningTask` and returns a `LearnerResult`.
     title
@@ -89,7 +86,7 @@ def learner_names() -> list[str]:
 
 
 def learner_title(name: str) -> str:
-    """Return what a learner is called; its name if it is not known here."""
+    """Return the title of a learner; its name if it is unknown here."""
     own = LEARNERS.get(name)
     return BUILT_IN.get(name, name) if own is None else own.title
 
@@ -97,7 +94,7 @@ def learner_title(name: str) -> str:
 def learn_with(name: str, task: LearningTask) -> tuple[LearnerResult, Fluid]:
     """Return what a learner of a user's own finds, and the fluid that it makes.
 
-    Raises InputError if there is no such learner, or it returns something else than a result.
+    Raises InputError if there is no such learner, or it returns no `LearnerResult`.
     """
     if name not in LEARNERS:
         raise InputError(unknown_name("learner", name, learner_names()))

@@ -1,4 +1,4 @@
-"""What a learner returns: the law term by term, tables, and draws with names."""
+"""Results of learners: the law term by term, tables, and draws with names."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -21,29 +21,22 @@ from tensor_library.law_terms import Interval, LawTerm, spell
 
 @dataclass(frozen=True)
 class RecoveredTerm(LawTerm):
-    """One term of a recovered law: a `LawTerm`, and what the learner knows beyond it.
+    """Term of a recovered law: a `LawTerm`, and what the learner knows beyond it.
 
     Attributes
     ----------
-    term, inner, ci95
-        As in `LawTerm`.
-    coefficient
-        Refitted without penalty (debiased).
-    coefficient_penalised
-        From the penalised or thresholded problem that selected it, or None where there was none.
+    coefficient, coefficient_penalised
+        Refitted without penalty; and of the penalised problem that selected the term, if any.
     latex
-        The term as LaTeX, without its coefficient.
+        The term without its coefficient.
     inner_ci95
         95 % intervals of the inner parameters.
     inner_at_one
-        For a closed form whose coefficient may be one, as in the law that it is named after:
-        each inner parameter with its 95 % interval (value, low, high) if the coefficient is one.
+        Inner parameters (value, low, high) if the coefficient is one, where it may be.
     ci95_given_equal_modes
-        That of one coefficient for all modes, where `ci95` holds coefficients that differ from mode
-        to mode; else None.
+        Interval of one coefficient for all modes, where `ci95` lets them differ.
     ci95_given_declared
-        That with the declared modulus and relaxation time, where `ci95` holds the coefficient with
-        those that a linear term amounts to as well; else None.
+        Interval with the declared modulus and relaxation time, where `ci95` lets them change.
     """
 
     coefficient_penalised: float | None = field(default=None, kw_only=True)
@@ -57,7 +50,7 @@ class RecoveredTerm(LawTerm):
 
     @property
     def is_told_from_zero(self) -> bool:
-        """Whether its interval says that it is there; not so without one."""
+        """Whether its interval excludes zero."""
         return self.ci95 is not None and not self.ci95[0] <= 0.0 <= self.ci95[1]
 
     @property
@@ -72,7 +65,7 @@ class RecoveredTerm(LawTerm):
 
 
 class TermTables(NotebookView):
-    """Tables of a learner's `terms` and `details`, for a fresh result and for one that was kept."""
+    """Tables of a learner's `terms` and `details`."""
 
     learner: str
     terms: tuple[RecoveredTerm, ...]
@@ -92,8 +85,8 @@ class TermTables(NotebookView):
     def path_table(self) -> pd.DataFrame:
         """Return the best law of each size, from no term on; empty where the learner has no path.
 
-        Columns: relative misfit on all runs, relative misfit on runs left out of the refit
-        (``held_out``), log evidence, and which rules choose the law.
+        Columns: relative misfit on all runs and on runs left out (``held_out``), log evidence, and
+        the rules that choose the law.
         """
         lines = []
         for member in self.details.get("path", ()):
@@ -109,10 +102,7 @@ class TermTables(NotebookView):
         return pd.DataFrame(lines)
 
     def selectors_table(self) -> pd.DataFrame:
-        """Return the terms that each rule for choosing a law takes; empty where there is no path.
-
-        A column for each term that some rule takes, and whether the rule takes it.
-        """
+        """Return whether each rule of choice takes each term; empty where there is no path."""
         chosen = self._chosen()
         terms = list(dict.fromkeys(term for support in chosen.values() for term in support))
         lines = {rule: [term in support for term in terms] for rule, support in chosen.items()}
@@ -120,10 +110,7 @@ class TermTables(NotebookView):
         return table.rename_axis("rule")
 
     def inclusion_table(self) -> pd.DataFrame:
-        """Return the probability that each term is in the law, the likeliest first.
-
-        Were the law among those that were fitted. Empty where the learner weighs none.
-        """
+        """Return the probability of each term, were the law among those fitted."""
         found = dict(self.details.get("inclusion") or {})
         return pd.DataFrame({"term": list(found), "probability": list(found.values())})
 
@@ -131,7 +118,7 @@ class TermTables(NotebookView):
         """Return the other laws that the records do not rule out, the closest predictions first.
 
         Columns: terms, coefficients, relative misfit, relative difference of predictions, log
-        evidence, and whether no record of these runs tells the two apart.
+        evidence, and whether no record distinguishes the two.
         """
         lines = [
             {
@@ -159,9 +146,8 @@ def estimates_of(
 ) -> list[Estimate]:
     """Return the coefficients of terms, and whether the data determine each.
 
-    `terms`: of the law. `left`: what the law leaves of the runs; None where that is not known.
-    `rivals`: terms of each law that the runs do not tell from it. `key`: what stands before the
-    term in the index of a summary.
+    `left`: lack of fit of the law; None if unknown. `rivals`: terms of laws that the runs do not
+    exclude. `key`: index levels before the term.
     """
     rivals = list(rivals)
     found = []
@@ -194,24 +180,24 @@ def _support(member: Mapping[str, Any]) -> set[str]:
 
 @dataclass(frozen=True)
 class LearnerResult(HasEquation, TermTables):
-    """A learned law and how it was learned.
+    """Learned law and how it was learned.
 
     Attributes
     ----------
     learner
         Name of the learner.
     law
-        The law, dimensionless, ready to simulate.
+        Dimensionless, ready to simulate.
     terms
-        The law, or its projection on a library, term by term.
+        The law, or its projection on a library.
     train_seconds
         Wall-clock time of `fit`.
     loss_history
-        Iterations and losses, both of shape (m,); empty where there is nothing to show.
+        Iterations and losses, both of shape (m,).
     details
         What else this learner can say; JSON-able.
     message
-        One sentence on how the fit ended.
+        How the fit ended.
     members
         Laws that fit the data about as well, this one among them; empty where there is one only.
     """
@@ -232,10 +218,7 @@ class LearnerResult(HasEquation, TermTables):
         return f"<LearnerResult {self.learner}: {terms}; {self.message}>"
 
     def equation(self) -> Equation:
-        """Return the law term by term, a known law below it included, dimensionless.
-
-        Of a network this is its projection on the library.
-        """
+        """Return the law with a known law below it, dimensionless; of a network its projection."""
         base = getattr(self.law, "base", None)
         found = tuple(term.in_law for term in self.terms)
         named, known = (None, ()) if base is None else law_parts(base)
@@ -278,8 +261,8 @@ def labelled_draws(estimator: Any, seed: int) -> "xarray.Dataset":
 def labelled_members(estimator: Any, runs: Iterable[Run] | None) -> "xarray.Dataset":
     """Return what each network of an ensemble predicts, dimensions member and sample.
 
-    `estimator`: a fitted `TBNNUDE`. `runs`: the flows; by default those that were fitted. σ12, N1
-    and N2 are in Pa, time is in s. Raises InputError if there are no runs, or xarray is missing.
+    `runs`: the flows; by default those fitted. σ12, N1, N2 in Pa, time in s. Raises InputError if
+    there are no runs, or xarray is missing.
     """
     wanted = getattr(estimator, "runs_", None) if runs is None else runs
     if wanted is None:

@@ -1,4 +1,4 @@
-"""What every learner does with runs: take them, and once it has a fluid predict them."""
+"""Base of the estimators: what they are fitted to, prediction, score, law, file."""
 
 import html
 from abc import abstractmethod
@@ -16,10 +16,15 @@ from discover.dataset.run import Run
 from discover.forward.fluids import in_enough_steps, observed_in_batch
 from discover.forward.grids.flow_batch import lay_out
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
-from discover.learners.known_part import KnownPart, known_part, require_known_rate
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
-from discover.learners.settings import ARITHMETIC, check_settings
+from discover.learners.settings import (
+    ARITHMETIC,
+    KnownPart,
+    check_settings,
+    known_part,
+    require_known_rate,
+)
 from discover.linear_algebra_threads import in_one_thread
 from discover.protocols.between_samples import sampling_interval
 from discover.statistics import LackOfFit, lack_of_fit
@@ -53,7 +58,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     learner: ClassVar[str]
     """Name of the learner, in files and tables."""
 
-    _saved: ClassVar[tuple[str, ...]]
+    _saved: ClassVar[tuple[str, ...]] = (
+        "n_features_in_", "law_", "fluid_", "terms_", "result_", "provenance_",
+    )  # fmt: skip
     """Attributes of the fit that a file holds."""
 
     _index = ("term",)
@@ -63,9 +70,8 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @in_one_thread
     def fit(self: _Learner, X: Iterable[Run], y=None) -> _Learner:
-        """Find the law of these runs.
+        """Find the law of runs `X`, or of a data set; `y` is ignored.
 
-        `X`: runs (`Run`), or a data set. `y`: ignored: the observations are part of the runs.
         Raises InputError if a parameter or a run is unusable.
         """
         del y
@@ -85,10 +91,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @property
     def equation_(self) -> "Equation":
-        """The law with its modes as an equation: ``latex()``, ``sympy()``, ``fluid()``.
-
-        Of a network this is its projection on the library.
-        """
+        """Law with its modes as an equation; of a network its projection on the library."""
         check_is_fitted(self, "result_")
         return replace(
             self.result_.equation(),
@@ -99,7 +102,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @property
     def lack_of_fit_(self) -> LackOfFit | None:
-        """What the law leaves of the runs it was fitted to; None of a file that does not say."""
+        """Lack of fit to the fitted runs; None of a file that does not say."""
         check_is_fitted(self, "fluid_")
         if getattr(self, "_left", None) is None and hasattr(self, "runs_"):
             self._left = self._what_it_leaves(list(self.runs_))
@@ -124,7 +127,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
 
     @property
     def text(self) -> str:
-        """The law, how well it describes the fitted runs, and which terms are determined."""
+        """Law, how well it describes the fitted runs, and which terms are determined."""
         terms = self.result_.terms
         law = spell({term.term: term.coefficient for term in terms}) if terms else "no term"
         said = [f"h = {law}."]
@@ -174,8 +177,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def save(self, path: str | Path) -> Path:
         """Write the fitted estimator to one file, without pickle; `discover.load` reads it.
 
-        The file holds parameters, modes, law, terms and what the fit was made from by name, but no
-        data, and of the search only its result. `progress` is not kept.
+        It holds parameters (but `progress`), modes, law, terms and provenance, no data.
 
         Parameters
         ----------
@@ -212,10 +214,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def to_xarray(self, X: Iterable[Run] | None = None, seed: int = 0) -> "xarray.Dataset":
         """Return what the data leave open, with named dimensions, for xarray and ArviZ.
 
-        Of `TensorSINDy` 1,000 draws of the coefficients, dimensions ``chain``, ``draw`` and
-        ``term``, as `arviz.summary` takes them. Those of a sparse law are given its terms: that
-        other terms may be right is not in them. Of `TBNNUDE` what each network predicts, dimensions
-        ``member`` and ``sample``: members are no draws from a posterior.
+        Of `TensorSINDy` 1,000 draws of the coefficients given its terms, dimensions ``chain``,
+        ``draw``, ``term``. Of `TBNNUDE` what each network predicts, dimensions ``member``,
+        ``sample``: members are no draws from a posterior.
 
         Parameters
         ----------
@@ -246,7 +247,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         X
-            Runs or a data set; of their records nothing is used but a stress that was imposed.
+            Runs or a data set; of their records only an imposed stress is used.
 
         Raises
         ------
@@ -261,11 +262,9 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def score(self, X: Iterable[Run], y=None, sample_weight=None) -> float:
         """Return one minus the relative error of what is recorded, averaged over runs.
 
-        The error of a run is the root-mean-square of prediction minus measurement over the
-        root-mean-square of the measurement, so that 1 is perfect, predicting nothing scores 0, and
-        noise of 2 % leaves 0.98 to the true law. It is not R²: a relative error is what rheologists
-        quote, and it does not depend on the mean of a signal that oscillates about zero. A law that
-        diverges scores minus infinity.
+        The error of a run is rms of prediction minus measurement over rms of the measurement: 1 is
+        perfect, 0 predicts nothing, and a law that diverges scores minus infinity. Unlike R² it
+        does not depend on the mean of an oscillating signal.
 
         Parameters
         ----------

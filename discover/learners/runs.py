@@ -1,8 +1,8 @@
-"""The runs that a learner takes."""
+"""Runs as learners take them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -28,11 +28,10 @@ from discover.words import percent_of
 def as_runs(runs: Iterable[Run], relaxation_time: PerMode = 0.0, relaxes: bool = True) -> list[Run]:
     """Return the runs as a list, each as `as_compared` has it.
 
-    `runs`: a data set, or runs. `relaxation_time`: of the modes, in s. `relaxes`: whether the fluid
-    is known to relax: the state of a run that starts periodic is then solved for. If not, or at a
-    given stress, it gets as many cycles before it as the slowest mode needs. Raises InputError if
-    there is none, one is something else, a mode is too slow to be waited for, or JAX computes in
-    single precision.
+    `relaxation_time`: of the modes, in s. `relaxes`: whether the fluid is known to relax, so that a
+    periodic start is solved for; otherwise, or at a given stress, cycles are put before the run.
+    Raises InputError if there is no run, one is something else, a mode is too slow, or JAX computes
+    in single precision.
     """
     require_double()
     if isinstance(runs, Run):
@@ -66,7 +65,7 @@ def waiting(run: Run, relaxation_time: float, relaxes: bool) -> Run:
 
 
 def require_signal(runs: Sequence[Run]) -> None:
-    """Refuse runs of which nothing was recorded but zeros."""
+    """Refuse runs whose record is zero throughout."""
     for run in runs:
         if not np.any(run.recorded):
             raise InputError(
@@ -78,11 +77,9 @@ def require_signal(runs: Sequence[Run]) -> None:
 def laid_out(
     runs: Sequence[Run], known: Fluid, mean: Mean = "values", **limits: Any
 ) -> tuple[FlowBatch, Records]:
-    """Return runs and their grids, and what was recorded in them.
+    """Return runs on time grids in the steps of the known fluid, and what was recorded in them.
 
-    `runs`: as `as_runs` returns them. `known`: the known part, whose steps the grids follow.
-    `mean`: whether each run counts alike, or each value. `**limits`: of steps, as `make_grids`
-    takes them.
+    `mean`: whether each run counts alike, or each value. `**limits`: of steps, as of `make_grids`.
     """
     n = max(map(len, runs))
     flows = lay_out(
@@ -110,9 +107,9 @@ def rough_limits(
 ) -> Mapping[str, float] | None:
     """Return limits of longer steps, as `make_grid` takes them; None where the flows have none.
 
-    Steps grow after a change of the rate, up to a strain of one. Where the fine grid follows the
-    fastest relaxation, and else where it follows the slowest, so does the rough one: in steps of
-    many relaxation times a law that relaxes faster than the known one diverges.
+    Steps grow after a change of the rate up to a strain of one, and follow the fastest relaxation
+    where the fine grid does, else the slowest: over steps of many relaxation times a law that
+    relaxes faster than the known one diverges.
     """
     controls = {protocols.control for protocols, _ in flows.parts}
     if not controls <= {"rate", *STATES}:
@@ -146,13 +143,7 @@ _CHANGE = 0.01
 """A rate is held while it stays within this fraction of what it was first."""
 
 
-@runtime_checkable
-class _Laid(Protocol):
-    @property
-    def flows(self) -> FlowBatch: ...
-
-
-_Problem = TypeVar("_Problem", bound=_Laid)
+_Problem = TypeVar("_Problem", bound=Any)  # a learner's, with its `flows`
 
 
 def shorter_where_it_pays(
@@ -164,9 +155,8 @@ def shorter_where_it_pays(
 ) -> tuple[Sequence[Run], _Problem]:
     """Return runs with shorter holds and their problem where that saves half the steps or more.
 
-    `runs`, `problem`: whole runs, and a learner's problem of them. `make`: returns the problem of
-    other runs. `relaxation_time`: of the modes, in s. `affordable`: modes times steps of all runs
-    up to which runs are followed whole.
+    `make`: returns the problem of other runs. `relaxation_time`: in s. `affordable`: modes times
+    steps up to which runs are followed whole.
     """
     times = np.atleast_1d(np.asarray(relaxation_time, dtype=float))
     if times.size * problem.flows.n_steps <= affordable:
@@ -180,16 +170,15 @@ def shorter_where_it_pays(
 
 
 def shortened_rightly(
-    whole: _Laid,
-    shorter: _Laid,
+    whole: Any,
+    shorter: Any,
     recorded: tuple[Sequence[Float[np.ndarray, " _"]], Sequence[Float[np.ndarray, " _"]]],
     misfit: float,
 ) -> str:
-    """Return what was passed over to save time, and what that changes; empty if that is too much.
+    """Return what shortening passed over and what it changes; empty if it changes too much.
 
-    `whole`, `shorter`: problems of the whole and of the shortened runs. `recorded`: what is
-    recorded of the law found in each whole run, and in each shortened one. `misfit`: what the law
-    leaves, relative to the records.
+    `recorded`: predictions of the law found in each whole and in each shortened run. `misfit`: of
+    the law, relative to the records.
     """
     off = float(
         np.max(
@@ -210,10 +199,8 @@ def shortened_rightly(
 def with_shorter_holds(runs: Sequence[Run], relaxation_time: float) -> list[Run]:
     """Return runs whose holds beyond `SETTLED` relaxation times are shortened to their logarithm.
 
-    Samples keep their stress and their place in the order; those after a long hold come earlier. A
-    run without such a hold, or in which something oscillates, is returned as it is.
-
-    `runs`: runs as a learner takes them. `relaxation_time`: the longest, in s.
+    Samples keep stress and order; those after a long hold come earlier. Runs without such a hold,
+    or that oscillate, stay. `relaxation_time`: the longest, in s.
     """
     return [_shortened(run, SETTLED * relaxation_time) for run in runs]
 

@@ -12,14 +12,6 @@ from discover.statistics.noise.noise_model import (
 from discover.statistics.noise.outliers import holds_signal
 
 __all__ = [
-    "HALF_BAND",
-    "FitVerdict",
-    "LackOfFit",
-    "NoiseModel",
-    "holds_signal",
-    "independent_samples",
-    "lack_of_fit",
-    "least_squares_covariance",
-    "noise_model",
-    "root_of",
-]
+    "HALF_BAND", "FitVerdict", "LackOfFit", "NoiseModel", "holds_signal", "independent_samples",
+    "lack_of_fit", "least_squares_covariance", "noise_model", "root_of",
+]  # fmt: skip

@@ -8,21 +8,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
+from discover.statistics.noise import whiteness
 from discover.statistics.noise.noise_model import independent_samples
-from discover.statistics.noise.whiteness import (
-    FEWEST_FAST,
-    FEWEST_TESTED,
-    SIGNIFICANCE,
-    noise_probability,
-)
 
 
 @dataclass(frozen=True)
 class ResidualSummary:
     """Noise and structure in the residuals of some runs.
 
-    `noise`: relative noise of each run, from third differences of its residual.
-    `effective_samples`: number of independent samples that the residuals of all runs are worth.
+    `noise`: relative, by run, from third differences. `effective_samples`: of all runs together.
     """
 
     noise: Float[np.ndarray, " runs"]
@@ -33,12 +27,7 @@ class ResidualSummary:
 def summarise(
     residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
 ) -> ResidualSummary:
-    """Return noise and structure of weighted residuals.
-
-    For the noise see `fast_part`, for the number of samples `independent_samples`.
-
-    `residual`: weighted residuals, padded. `weight`: their weights, zero at padding.
-    """
+    """Return noise (`fast_part`) and effective samples of weighted residuals."""
     noise, correlation, effective = [], [], 0.0
     for row, w in zip(residual, weight, strict=True):
         values = row[w > 0] * np.sqrt(np.count_nonzero(w))
@@ -55,23 +44,19 @@ def summarise(
 def fast_part(values: Float[np.ndarray, " n"]) -> float:
     """Return the standard deviation of what changes from sample to sample.
 
-    From third differences, which a smooth sequence hardly has, through their median, which a few
-    jumps hardly move   [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73, 625, for the idea].
-
-    `values` in order; of fewer than `FEWEST_FAST` nothing is said.
+    From the median of third differences, which smooth sequences and a few jumps hardly change
+    [Gasser, Sroka & Jennen-Steinmetz 1986, Biometrika 73, 625]. Zero for fewer than `FEWEST_FAST`.
     """
-    if len(values) < FEWEST_FAST:
+    if len(values) < whiteness.FEWEST_FAST:
         return 0.0
     return _median_difference([values], 3)
 
 
 def slow_part(values: Float[np.ndarray, " n"]) -> float:
-    """Return the root-mean-square of the rest: what does not change from sample to sample.
+    """Return the root-mean-square of what does not change from sample to sample.
 
-    It is at least what is left of the means over a few samples, an eighth of the noise's power: the
-    difference to `fast_part` alone is zero where that came out too large, by a tenth of 80 samples.
-
-    `values` in order.
+    At least that of means over a few samples: the difference to `fast_part` alone is zero where
+    that is too large, by a tenth of 80 samples.
     """
     values = np.asarray(values, dtype=float)
     fast = fast_part(values)
@@ -84,10 +69,7 @@ def slow_part(values: Float[np.ndarray, " n"]) -> float:
 
 
 def _median_difference(rows: Sequence[Float[np.ndarray, " _"]], order: int) -> float:
-    """Return the standard deviation that differences of an order in all rows tell of white noise.
-
-    The sum of squares of their coefficients is that of binomial ones: 20 for 1, 3, 3, 1.
-    """
+    """Return the standard deviation of white noise with these differences, by their median."""
     differences = np.concatenate([np.diff(row, order) for row in rows])
     return float(1.4826 * np.median(np.abs(differences)) / np.sqrt(comb(2 * order, order)))
 
@@ -100,25 +82,20 @@ def noise_floor(
 ) -> float:
     """Return the relative noise, mean over runs.
 
-    Where the residual is noise, white or of first order, that is its size, to which a sample far
-    outside its neighbourhood counts no more than one six times the noise: a few samples, however
-    large, say nothing of the others. Where it holds structure, it is the part of it that changes
-    from sample to sample, see `summarise`; noise that is correlated itself is then underestimated.
-    Runs too short to be tested alone are taken to be as noisy as the others, or as what changes in
-    them from sample to sample if that is more: their size is no sign of noise. Where all are so
-    short and not tested together either, or hold structure, they tell it together by what changes.
-    Those that do not judge (`judging`) do not count. Further tests are those of
-    `noise_probability`.
+    The size of a residual that is noise (single samples count up to six times the noise), else the
+    part that changes from sample to sample; correlated noise is then underestimated. Runs too short
+    to be tested are as noisy as the others, or as what changes in them if that is more. Runs that
+    are not `judging` do not count. `further`: tests, as of `noise_probability`.
     """
     rows = judging(weight)
     residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
     measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    probability = noise_probability(residual, weight, measured, further)
+    probability = whiteness.noise_probability(residual, weight, measured, further)
     samples = np.count_nonzero(weight > 0, axis=1)
-    tested = samples >= FEWEST_TESTED
-    known = probability is not None and probability > SIGNIFICANCE
-    if not known and not np.any(tested) and np.all(samples >= FEWEST_FAST):
+    tested = samples >= whiteness.FEWEST_TESTED
+    known = probability is not None and probability > whiteness.SIGNIFICANCE
+    if not known and not np.any(tested) and np.all(samples >= whiteness.FEWEST_FAST):
         return _pooled_fast_part(residual, weight)
     if not known and probability is not None:
         return float(np.mean(fast))
@@ -131,39 +108,34 @@ def noise_floor(
 def _pooled_fast_part(
     residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
 ) -> float:
-    """Return the relative noise of runs of a few samples, taken to be the same in all.
-
-    From fourth differences: between few samples a residual bends so much that third ones, and the
-    median of those of one run alone, would take a misfit for noise.
-    """
+    """Return the relative noise of short runs, the same in all, from fourth differences."""
     rows = [r[w > 0] * np.sqrt(np.count_nonzero(w)) for r, w in zip(residual, weight, strict=True)]
     return _median_difference(rows, 4)
 
 
 def _limited_size(values: Float[np.ndarray, " n"]) -> float:
-    """Return the norm of values, each no larger than so many robust deviations right beside it.
+    """Return the norm of values, each limited to so many robust deviations beside it.
 
-    A stretch that is loud counts in full; up to three samples are no stretch, two at an end.
+    A loud stretch counts in full; up to three samples are no stretch, two at an end.
     """
-    if len(values) < FEWEST_FAST:
+    if len(values) < whiteness.FEWEST_FAST:
         return float(np.linalg.norm(values))
-    beside = 1.4826 * median_filter(np.abs(values), FEWEST_FAST, mode="mirror")
+    beside = 1.4826 * median_filter(np.abs(values), whiteness.FEWEST_FAST, mode="mirror")
     return float(np.linalg.norm(np.clip(values, -_LARGEST * beside, _LARGEST * beside)))
 
 
 def judging(weight: Float[np.ndarray, "runs n"]) -> Bool[np.ndarray, " runs"]:
-    """Return which runs judge a model: those long enough to say how noisy they are.
+    """Return which runs are long enough to tell their noise; all if none is.
 
-    A run counts as much as any other, however few its samples, so that one bad sample could decide
-    alone. Where no run is long enough, all judge; see `tells_noise`.
+    A run counts as much as any other, so that one bad sample could decide alone.
     """
-    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST
+    told = np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST
     return told if np.any(told) else np.ones_like(told)
 
 
 def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
     """Return whether any run is long enough to say how noisy it is."""
-    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= FEWEST_FAST))
+    return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST))
 
 
 def is_noise(
@@ -172,13 +144,9 @@ def is_noise(
     measured: Float[np.ndarray, "runs n"] | None = None,
     further: Sequence[float] = (),
 ) -> bool:
-    """Return whether residuals may be noise, white or with a first-order correlation.
-
-    Runs too short to be tested, even together, do not say that they are not; see
-    `noise_probability`.
-    """
-    probability = noise_probability(residual, weight, measured, further)
-    return probability is None or probability > SIGNIFICANCE
+    """Return whether residuals may be noise, white or of first order; runs too short may be."""
+    probability = whiteness.noise_probability(residual, weight, measured, further)
+    return probability is None or probability > whiteness.SIGNIFICANCE
 
 
 _BLOCK, _FEWEST_BLOCKS = 8, 3
@@ -190,10 +158,9 @@ STRUCTURE = 1.5
 
 @dataclass(frozen=True)
 class Expectation:
-    """What a complete model may leave of the data.
+    """Error budget of a data set: what a complete model may leave.
 
-    `repeat_error`: relative error of a run as its repeats tell it, noise and loading together; 0
-        without any.
+    `repeat_error`: relative difference of repeated runs, noise and loading; 0 without any.
     """
 
     noise: float | None = None  # relative noise, where it is known
@@ -206,11 +173,7 @@ class Expectation:
         return float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
 
     def excuses(self, pattern: float) -> bool:
-        """Return whether a pattern of this relative size is due to the sweep or to loadings.
-
-        None is where neither leaves one, not even one of size zero: what changes from sample to
-        sample may by chance seem to be all there is.
-        """
+        """Return whether a pattern of this relative size may be due to the sweep or to loadings."""
         return self.patterned > 0.0 and pattern <= self.patterned
 
     def floor(
@@ -234,11 +197,8 @@ class Expectation:
     ) -> bool:
         """Return whether noise and the error of the linear data explain a residual.
 
-        It may not be larger than both together. Where it has a pattern that noise has not, the
-        pattern may not be larger than the error of the linear data, or than what repeated runs
-        differ by, the only ones that have any; or the whole not larger than a noise that is given,
-        of which only who gives it knows what is in it. Further tests are those of
-        `noise_probability`.
+        It may be no larger than both together. A pattern that noise has not may be no larger than
+        the error of the linear data or of repeats; or the whole no larger than a given noise.
         """
         rows = judging(weight)
         sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))

@@ -26,8 +26,7 @@ from discover.errors import InputError
 from discover.forward import data_scales
 from discover.laws import LAWS
 from discover.protocols import start_up
-from tensor_library.algebra import from_shear
-from tensor_library.terms import parse_term
+from tensor_library import from_shear, parse_term
 
 NAMED = list(named_effects().values())
 STRESS = jnp.array([1.3, -0.2, 0.1, 0.7])

@@ -7,21 +7,12 @@ import pytest
 from independent import Structured, oscillation, steps
 from independent.sweeps import first_harmonic, oscillating
 
+from discover import protocols
 from discover.dataset import Run
 from discover.effects import make_effect, named_effects
 from discover.effects.structure import Structure
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.loop.task import candidates_of
-from discover.protocols import (
-    after_alternation,
-    in_flow,
-    oscillations,
-    oscillatory_shear,
-    shear_rates,
-    start_up,
-    steady_rates,
-    step_rates,
-)
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.2
 BUILD_UP, EXPONENT, SLOWNESS, SHARE = 1.5, 0.6, 8.0, 0.3
@@ -54,26 +45,20 @@ def critical_of(name):
 def independent_of(name, critical=None, exponent=EXPONENT):
     two = FAMILY[name].levels == 2
     return Structured(
-        critical or critical_of(name),
-        (BUILD_UP, SLOWNESS * BUILD_UP) if two else (BUILD_UP,),
-        2.0 / 3.0 if two else exponent,
-        SHARE if two else 0.0,
-        by_stress=name.endswith("stress"),
-        in_modulus="modulus" in name,
-        modulus=MODULUS,
-        relaxation_time=TIME,
-        mobility=MOBILITY,
-    )
+        critical or critical_of(name), (BUILD_UP, SLOWNESS * BUILD_UP) if two else (BUILD_UP,),
+        2.0 / 3.0 if two else exponent, SHARE if two else 0.0, by_stress=name.endswith("stress"),
+        in_modulus="modulus" in name, modulus=MODULUS, relaxation_time=TIME, mobility=MOBILITY,
+    )  # fmt: skip
 
 
 def run_of(name, protocol):
-    return Run(name, TIMES, protocol, shear_rates(protocol, TIMES), np.ones(len(TIMES)))
+    return Run(name, TIMES, protocol, protocols.shear_rates(protocol, TIMES), np.ones(len(TIMES)))
 
 
 RUNS = [
-    run_of("steps", step_rates(*RATES)),
-    run_of("swing", oscillatory_shear(*SWING)),
-    run_of("pull", in_flow(start_up(0.4), "uniaxial")),
+    run_of("steps", protocols.step_rates(*RATES)),
+    run_of("swing", protocols.oscillatory_shear(*SWING)),
+    run_of("pull", protocols.in_flow(protocols.start_up(0.4), "uniaxial")),
 ]
 
 
@@ -129,7 +114,7 @@ STEADY = "thixotropic_modulus", "thixotropic_relaxation_two_times"
 )
 def test_a_steady_flow_has_the_structure_of_crosss_equation(name):
     rates = np.geomspace(1e-2, 10.0, 5)
-    run = Run("curve", np.arange(1.0, 6.0), steady_rates(rates), rates, np.ones(5))
+    run = Run("curve", np.arange(1.0, 6.0), protocols.steady_rates(rates), rates, np.ones(5))
     found = predicted([run], name)[0]
     law = independent_of(name)
     truth = [
@@ -150,9 +135,9 @@ def alternating(law, cycles=40):
 def test_an_oscillation_that_has_gone_on_has_a_periodic_structure():
     name = "thixotropic_relaxation_two_times"
     times, truth = alternating(independent_of(name))
-    rate = oscillatory_shear(*SWING)
-    flow = after_alternation(rate, times[-1], times)
-    run = Run("on", times, flow, shear_rates(rate, times), np.ones(len(times)))
+    rate = protocols.oscillatory_shear(*SWING)
+    flow = protocols.after_alternation(rate, times[-1], times)
+    run = Run("on", times, flow, protocols.shear_rates(rate, times), np.ones(len(times)))
     # of second order in the step, as above; 40 cycles are ten slow build-up times
     found = predicted([run], name, model=ALONE)[0]
     np.testing.assert_allclose(found, truth, atol=5e-3 * np.max(truth))
@@ -163,10 +148,10 @@ def test_the_state_in_steady_alternation_is_found_however_slowly_a_structure_bui
     name, (amplitude, frequency) = "thixotropic_relaxation_two_times", SWING
     times = np.linspace(0.0, 2.0 * np.pi / frequency, 33)
     runs = [
-        Run(f"{more:g}", times, after_alternation(rate, times[-1], times),
-            shear_rates(rate, times), np.ones(33))
+        Run(f"{more:g}", times, protocols.after_alternation(rate, times[-1], times),
+            protocols.shear_rates(rate, times), np.ones(33))
         for more in (0.1, 1.0, 7.0)
-        for rate in [oscillatory_shear(more * amplitude, frequency)]
+        for rate in [protocols.oscillatory_shear(more * amplitude, frequency)]
     ]  # fmt: skip
     theta = ALONE.zero()
     theta[ALONE.positions(name)] = 1.0 / RATE, build_up, SLOWNESS, SHARE
@@ -182,8 +167,9 @@ def test_moduli_of_two_structures_are_those_that_scipy_ends_at():
     law, (amplitude, frequency) = independent_of(name), SWING
     strain = np.array([amplitude / frequency])
     run = Run(
-        "sweep", np.ones(1), oscillations(strain, np.array([frequency])), strain * frequency,
-        np.ones(1), strain=strain, storage_modulus=np.ones(1), loss_modulus=np.ones(1),
+        "sweep", np.ones(1), protocols.oscillations(strain, np.array([frequency])),
+        strain * frequency, np.ones(1), strain=strain, storage_modulus=np.ones(1),
+        loss_modulus=np.ones(1),
     )  # fmt: skip
     storage, loss = predicted(run.records, name, model=ALONE)[:, 0]
 

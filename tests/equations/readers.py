@@ -1,9 +1,11 @@
-"""What a text says, by what would run or read it: Python, UFL's own evaluation, SymPy's LaTeX."""
+"""What a text says, by what would run it: Python, UFL's evaluation, SymPy's LaTeX, rheoTool."""
 
 import functools
+import re
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from sympy.parsing.latex import parse_latex
 
 # what SymPy's reader of LaTeX knows: letters and functions of one letter; \left and \right only
@@ -72,3 +74,111 @@ def value(tree, letters):
         return parts[0] ** parts[1]
     known = {"exp": np.exp, "Abs": abs, "T": np.trace, "M": max}
     return known[tree.func.__name__](*parts)
+
+
+def followed(rate, start, gradient, times, rtol=1e-8, atol=1e-8):
+    """Return the states at the times of state' = rate(state, gradient), by scipy."""
+    shape = np.shape(start)
+    found = solve_ivp(
+        lambda t, y: np.ravel(rate(y.reshape(shape), gradient)),
+        (0, times[-1]), np.ravel(start), "LSODA", times, rtol=rtol, atol=atol,
+    )  # fmt: skip
+    return found.y.T.reshape(-1, *shape)
+
+
+def shear_quantities(stress):
+    """Return σ12, N1 and N2 of stresses, shape (3, n)."""
+    s = np.asarray(stress)
+    return np.array([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]])
+
+
+class RheoToolMode:
+    """A mode by rheoTool's sources (Oldroyd_B.C, Giesekus.C, PTT.C, XPomPom.C, WhiteMetznerCY.C and
+    Saramito.C in the stress, FENE_P.C and RoliePoly.C in the conformation), of the entries of a
+    ``constitutiveProperties`` dictionary alone."""
+
+    def __init__(self, block):
+        found = dict(re.findall(r"^\s*(\w+)\s.*?(\S+);$", block, re.M))
+        number = re.compile(r"-?[\d.]+(e-?\d+)?")
+        self.e = {n: float(v) if number.fullmatch(v) else v for n, v in found.items()}
+        self.type, self.block = self.e["type"], block
+        self.in_conformation = self.type in ("FENE-P", "Rolie-Poly")
+        self.start = np.zeros((3, 3))
+        if self.in_conformation:
+            self.start = np.eye(3)
+
+    def spring(self, trace):
+        """Return the spring's factor at a trace of the conformation."""
+        if self.type == "FENE-P":
+            return 1 / (1 - trace / self.e["L2"])
+        squared, m = trace / 3.0, self.e["chiMax"] ** 2
+        if m <= 1.0:
+            return 1.0
+        return (3 - squared / m) * (1 - 1 / m) / ((1 - squared / m) * (3 - 1 / m))
+
+    def stress(self, state):
+        """Return the stress without the solvent's."""
+        if not self.in_conformation:
+            return state
+        trace, time = np.trace(state), self.e["lambda" if self.type == "FENE-P" else "lambdaD"]
+        if self.type == "FENE-P":
+            a = self.e["L2"] / (self.e["L2"] - 3)
+            return self.e["etaP"] / time * (self.spring(trace) * state - a * np.eye(3))
+        return self.e["etaP"] / time * self.spring(trace) * (state - np.eye(3))
+
+    def rate(self, state, gradient):
+        """Return the rate of change of the stress, or of the conformation."""
+        e, one, trace = self.e, np.eye(3), np.trace(state)
+        twice, convected = gradient + gradient.T, gradient @ state + state @ gradient.T
+        if self.type == "FENE-P":
+            a = e["L2"] / (e["L2"] - 3)
+            return convected - (self.spring(trace) * state - a * one) / e["lambda"]
+        if self.type == "Rolie-Poly":
+            m1 = 2 * (1 - np.sqrt(3 / trace)) / e["lambdaR"] * self.spring(trace)
+            released = e["beta"] * (trace / 3) ** e["delta"] * (state - one)
+            return convected - (state - one) / e["lambdaD"] - m1 * (state + released)
+        eta = e["etaP"]
+        if self.type == "XPomPom":
+            time = e["lambdaB"]
+            stretch = np.sqrt(1 + trace * time / (3 * eta))
+            f = 2 * time / e["lambdaS"] * np.exp(2 / e["q"] * (stretch - 1)) * (1 - 1 / stretch)
+            f += (1 - e["alpha"] / 3 * np.trace(state @ state) * (time / eta) ** 2) / stretch**2
+            left = f / time * state + e["alpha"] / eta * state @ state
+            return convected - left - eta / time**2 * (f - 1) * one + eta / time * twice
+        if self.type == "WhiteMetznerCY":
+            size = np.sqrt(2) * np.linalg.norm(twice / 2)
+            viscosity = eta * (1 + (e["K"] * size) ** e["a"]) ** ((e["n"] - 1) / e["a"])
+            time = e["lambda"] * (1 + (e["L"] * size) ** e["b"]) ** ((e["m"] - 1) / e["b"])
+            return convected - state / time + viscosity / time * twice
+        time = e["lambda"]
+        change = convected + eta / time * twice
+        if self.type == "Saramito":
+            assert e["PTTfunction"] == "none"
+            assert "(1 1 1);" in self.block
+            size = np.linalg.norm(state - trace / 3 * one) / np.sqrt(2)
+            return change - max(0.0, (size - e["tau0"]) / (eta * size + 1e-16)) * eta / time * state
+        if self.type == "Giesekus":
+            return change - e["alpha"] / eta * state @ state - state / time
+        if self.type == "PTT":
+            change = change - 0.5 * e["zeta"] * (state @ twice + twice @ state)
+            z = e["epsilon"] * time / eta * trace
+            linear = {"linear": True, "exponential": False}[e["destructionFunctionType"]]
+            return change - (1 + z if linear else np.exp(z)) * state / time
+        assert self.type == "Oldroyd-B"
+        return change - state / time
+
+
+def rheotool_modes(text):
+    """Return the modes of a ``constitutiveProperties`` dictionary."""
+    blocks = re.findall(r"M\d+\s*\{(.*?)\}", text, re.S)
+    return [RheoToolMode(block) for block in blocks or [text[text.index("parameters\n") :]]]
+
+
+def by_rheotool(text, gradient, times):
+    """Return the stress of all modes and the solvents at the times, from rest."""
+    total = 0.0
+    for mode in rheotool_modes(text):
+        states = followed(mode.rate, mode.start, gradient, times, atol=1e-10)
+        total = total + np.array([mode.stress(state) for state in states])
+        total = total + mode.e["etaS"] * (gradient + gradient.T)
+    return total

@@ -11,15 +11,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from discover.effects import ConstitutiveEffect
-from discover.effects.library_term import library_term
-from discover.effects.registry import named_effects
+from discover.effects import ConstitutiveEffect, library_term, named_effects
 from discover.equations import Equation, effect_terms, law_terms
 from discover.laws import make_law
-from tensor_library import LawTerm
-from tensor_library.algebra import INVARIANT_NAMES, TENSOR_NAMES
-from tensor_library.library import build_library
-from tensor_library.terms import parse_term
+from tensor_library import INVARIANT_NAMES, TENSOR_NAMES, LawTerm, build_library, parse_term
 
 INNER = {"epsilon": 0.31, "kappa": 0.27}
 LIBRARY = build_library(

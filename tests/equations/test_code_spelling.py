@@ -6,38 +6,77 @@ import json
 import numpy as np
 import pytest
 import sympy
-from readers import in_ufl, module_of, product_of, ufl_number
+from readers import in_ufl, module_of, product_of, rheotool_modes, ufl_number
 from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
 
 from discover.equations import Equation, equation_from_json, write_equation
 from discover.errors import InputError
-from tensor_library import LawTerm
+from tensor_library import LawTerm, parse_term
 from tensor_library.sympy_notation import RATE, STRESS, UNIT, Trace
-from tensor_library.terms import parse_term
-
-every_law = pytest.mark.parametrize("name", BOTH_SIGNS)
 
 
-@every_law
-def test_the_python_text_of_every_term_law_and_effect_says_it(name):
-    spelled = BOTH_SIGNS[name]
-    module = module_of(write_equation(spelled.equation, "python"))
-    assert agree([module["extra_term"](*state) for state in STATES], spelled.extra)
+def _value(expression, letters):
+    if expression in letters:
+        return letters[expression]
+    if expression.is_number:
+        return float(expression)
+    parts = [_value(part, letters) for part in expression.args]
+    if expression.is_Add:
+        return sum(parts)
+    if expression.is_Mul:
+        return product_of(parts)
+    if expression.is_Pow:
+        base, exponent = parts
+        return np.linalg.matrix_power(base, int(exponent)) if np.ndim(base) else base**exponent
+    return {Trace: np.trace, sympy.exp: np.exp, sympy.Abs: abs}[expression.func](*parts)
 
 
-@every_law
-def test_the_sympy_text_of_every_term_law_and_effect_says_it(name):
-    spelled = BOTH_SIGNS[name]
-    body = ast.parse(write_equation(spelled.equation, "sympy")).body
-    wanted = "extra_term"
-    assigned = [n for n in body if isinstance(n, ast.Assign) and n.targets[0].id == wanted]
+def _by_python(equation):
+    module = module_of(write_equation(equation, "python"))
+    return [module["extra_term"](*state) for state in STATES]
+
+
+def _by_sympy_text(equation):
+    body = ast.parse(write_equation(equation, "sympy")).body
+    assigned = [n for n in body if isinstance(n, ast.Assign) and n.targets[0].id == "extra_term"]
     code = compile(ast.Expression(assigned[0].value), "law", "eval")
     found = []
     for stress, rate in STATES:
         s, d = sympy.Matrix(stress), sympy.Matrix(rate)
         names = {"sympy": sympy, "unit": sympy.eye(3), "s": s, "d": d}
         found.append(eval(code, names).evalf())
-    assert agree(found, spelled.extra)
+    return found
+
+
+def _by_sympy_expression(equation):
+    expression = equation.sympy()
+    letters = ({STRESS: stress, RATE: rate, UNIT: np.eye(3)} for stress, rate in STATES)
+    return [_value(expression, one) + np.zeros((3, 3)) for one in letters]
+
+
+def _by_json(equation):
+    """By the canonical spelling itself, read with the precedence of Python."""
+    content = json.loads(write_equation(equation, "json"))
+    assert equation_from_json(content) == equation
+    terms = [(term["term"], term["coefficient"], term["inner"]) for term in content["terms"]]
+    return [_sum_of_spelled(terms, stress, rate) for stress, rate in STATES]
+
+
+def _sum_of_spelled(terms, stress, rate):
+    names = {"sigma": stress, "gammadot": rate, "I": np.eye(3)}
+    names |= {"tr": np.trace, "exp": np.exp, "abs": abs}
+    total = np.zeros((3, 3))
+    for spelling, coefficient, inner in terms:
+        text = spelling.replace(".", " @ ").replace("^", "**")
+        total = total + coefficient * eval(text, names | inner)
+    return total
+
+
+@pytest.mark.parametrize("read", [_by_python, _by_sympy_text, _by_sympy_expression, _by_json])
+@pytest.mark.parametrize("name", BOTH_SIGNS)
+def test_the_text_of_every_term_law_and_effect_says_it(name, read):
+    spelled = BOTH_SIGNS[name]
+    assert agree(read(spelled.equation), spelled.extra)
 
 
 # the pieces of those of degree two are those of degree one, and powers
@@ -57,82 +96,19 @@ def test_the_ufl_text_of_terms_laws_and_effects_says_them(name):
     assert agree(found, spelled.extra[1])
 
 
-@every_law
-def test_the_sympy_expression_of_every_term_law_and_effect_says_it(name):
-    spelled = BOTH_SIGNS[name]
-    expression = spelled.equation.sympy()
-    found = []
-    for stress, rate in STATES:
-        letters = {STRESS: stress, RATE: rate, UNIT: np.eye(3)}
-        found.append(_value(expression, letters) + np.zeros((3, 3)))
-    assert agree(found, spelled.extra)
-
-
-def _value(expression, letters):
-    if expression in letters:
-        return letters[expression]
-    if expression.is_number:
-        return float(expression)
-    parts = [_value(part, letters) for part in expression.args]
-    if expression.is_Add:
-        return sum(parts)
-    if expression.is_Mul:
-        return product_of(parts)
-    if expression.is_Pow:
-        base, exponent = parts
-        return np.linalg.matrix_power(base, int(exponent)) if np.ndim(base) else base**exponent
-    return {Trace: np.trace, sympy.exp: np.exp, sympy.Abs: abs}[expression.func](*parts)
-
-
-@every_law
-def test_the_json_of_every_term_law_and_effect_says_it(name):
-    """By the canonical spelling itself, read with the precedence of Python."""
-    spelled = BOTH_SIGNS[name]
-    content = json.loads(write_equation(spelled.equation, "json"))
-    found = []
-    for stress, rate in STATES:
-        names = {"sigma": stress, "gammadot": rate, "I": np.eye(3)}
-        functions = {"tr": np.trace, "exp": np.exp, "abs": abs}
-        total = np.zeros((3, 3))
-        for term in content["terms"]:
-            text = term["term"].replace(".", " @ ").replace("^", "**")
-            total = total + term["coefficient"] * eval(text, functions | names | term["inner"])
-        found.append(total)
-    assert agree(found, spelled.extra)
-    assert equation_from_json(content) == spelled.equation
-
-
 def _physical_rate(equation, stress, gradient):
     """dτ/dt beside the convected terms, in Pa/s, of a one-mode equation without solvent."""
     (modulus,), (time,) = equation.modulus, equation.relaxation_time
     s, d = stress / modulus, time * (gradient + gradient.T)
-    extra = np.zeros((3, 3))
-    for term in equation.terms:
-        text = term.term.replace(".", " @ ").replace("^", "**")
-        names = {"sigma": s, "gammadot": d, "I": np.eye(3), "tr": np.trace, "exp": np.exp}
-        extra = extra + term.coefficient * eval(text, names | term.inner)
+    terms = [(term.term, term.coefficient, dict(term.inner)) for term in equation.terms]
+    extra = _sum_of_spelled(terms, s, d)
     return modulus / time * (d - s - extra)
 
 
 def _rheotool_rate(text, stress, gradient):
-    """The same by Oldroyd_B.C, Giesekus.C and PTT.C of rheoTool, from the numbers in the file."""
-    lines = (line.split() for line in text.splitlines() if line.strip().endswith(";"))
-    entries = {line[0]: line[-1].rstrip(";") for line in lines}
-    kind = entries["type"]
-    eta, time = float(entries["etaP"]), float(entries["lambda"])
-    twice = gradient + gradient.T
-    change = eta / time * twice
-    if kind == "PTT":
-        zeta, epsilon = float(entries["zeta"]), float(entries["epsilon"])
-        z = epsilon * time / eta * np.trace(stress)
-        linear = entries["destructionFunctionType"] == "linear"
-        change = change - 0.5 * zeta * (stress @ twice + twice @ stress)
-        return change - (1.0 + z if linear else np.exp(z)) * stress / time
-    if kind == "Giesekus":
-        change = change - float(entries["alpha"]) / eta * stress @ stress
-    else:
-        assert kind == "Oldroyd-B"
-    return change - stress / time
+    """The same by rheoTool's sources."""
+    (mode,) = rheotool_modes(text)
+    return mode.rate(stress, gradient) - gradient @ stress - stress @ gradient.T
 
 
 TAKEN = {

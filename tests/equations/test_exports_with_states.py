@@ -8,8 +8,7 @@ import pytest
 import sympy
 from independent import Giesekus, Structured, Thixotropic
 from independent.homogeneous import UNIT
-from readers import in_ufl, module_of, ufl_number
-from scipy.integrate import solve_ivp
+from readers import followed, in_ufl, module_of, shear_quantities, ufl_number
 
 from discover.effects import StateEffect, make_effect, named_effects
 from discover.equations import (
@@ -26,9 +25,7 @@ from discover.equations import Tested as Where
 from discover.equations.formats.in_a_solver import in_a_solver
 from discover.errors import InputError
 from discover.laws import LibraryExpansion, TensorBasisNetwork, make_law
-from tensor_library import LawTerm
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, TermLibrary, parse_term
 
 ALPHA, MODULUS, TIME = 0.2, 100.0, 1.5
 CRITICAL = {"inverse_critical_rate": 0.5, "build_up_time": 2.0}
@@ -76,23 +73,20 @@ def reference(name, gradient):
     law = CASES[name][1]
     # Moore's structure is broken by the shear rate alone, as a number or as a flow's intensity
     rate = gradient if isinstance(law, Structured) else gradient[0, 1]
-    found = solve_ivp(
-        lambda t, y: law.change(y, rate),
-        (0, TIMES[-1]), law.rest(), "LSODA", TIMES, rtol=1e-10, atol=1e-10,
-    )  # fmt: skip
-    return np.array([law.stress(y, rate) for y in found.y.T])
+    found = followed(law.change, law.rest(), rate, TIMES, rtol=1e-10, atol=1e-10)
+    return np.array([law.stress(y, rate) for y in found])
 
 
 def integrated(module, gradient):
-    def change(t, y):
+    def change(y, gradient):
         stress, structure = y[:9].reshape(1, 3, 3), y[9:]
         rates = module["stress_rate"](stress, gradient, structure)
         return np.append(rates, module["structure_rate"](stress, gradient, structure))
 
     start = np.append(np.zeros(9), module["STRUCTURE_AT_REST"])
-    found = solve_ivp(change, (0, TIMES[-1]), start, "LSODA", TIMES, rtol=1e-10, atol=1e-10)
+    found = followed(change, start, gradient, TIMES, rtol=1e-10, atol=1e-10)
     return np.array(
-        [module["total_stress"](y[:9].reshape(1, 3, 3), gradient, y[9:]) for y in found.y.T]
+        [module["total_stress"](y[:9].reshape(1, 3, 3), gradient, y[9:]) for y in found]
     )
 
 
@@ -118,8 +112,7 @@ def test_a_structure_with_another_time_would_show():
 def test_the_integrator_in_the_text_carries_the_structure_along(name):
     times = np.concatenate([[0.0], TIMES])
     found = np.transpose(written(name, "python")["simulate_shear"](lambda t: 2.0, times))[1:]
-    s = reference(name, GRADIENTS["shear"])
-    wanted = np.stack([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]], axis=1)
+    wanted = shear_quantities(reference(name, GRADIENTS["shear"])).T
     # steps of a fiftieth of the shortest time, of fourth order
     np.testing.assert_allclose(found, wanted, atol=1e-5 * np.max(wanted))
 

@@ -10,8 +10,15 @@ import pytest
 import sympy
 from independent import PomPom
 from independent.homogeneous import UNIT
-from readers import in_ufl, module_of, read_latex, ufl_number, value
-from scipy.integrate import solve_ivp
+from readers import (
+    followed,
+    in_ufl,
+    module_of,
+    read_latex,
+    shear_quantities,
+    ufl_number,
+    value,
+)
 
 from discover.equations import Equation, NamedPart, write_equation
 from discover.errors import InputError
@@ -35,11 +42,8 @@ def reference(name, gradient):
         law = PomPom(
             c["q"], c["stretch_time_ratio"] * time, g, time, name == "pom_pom_drag_strain", _FADES
         )
-        found = solve_ivp(
-            lambda t, y, law=law: law.change(y, gradient),
-            (0, TIMES[-1]), law.rest(), "LSODA", TIMES, rtol=1e-9, atol=1e-11,
-        )  # fmt: skip
-        total = total + np.array([law.stress(y, 0.0) for y in found.y.T])
+        states = followed(law.change, law.rest(), gradient, TIMES, rtol=1e-9, atol=1e-11)
+        total = total + np.array([law.stress(y, 0.0) for y in states])
     return total
 
 
@@ -47,11 +51,11 @@ def integrated(rates, gradient):
     """Return the stress of both modes, of rates(mode, stress, y, gradient)."""
     total = 0.0
     for k in range(2):
-        found = solve_ivp(
-            lambda t, y, k=k: np.append(*rates(k, y[:9].reshape(3, 3), y[9:], gradient)),
-            (0, TIMES[-1]), np.zeros(10), "LSODA", TIMES, rtol=1e-9, atol=1e-9,
+        states = followed(
+            lambda y, flow, k=k: np.append(*rates(k, y[:9].reshape(3, 3), y[9:], flow)),
+            np.zeros(10), gradient, TIMES, rtol=1e-9, atol=1e-9,
         )  # fmt: skip
-        total = total + found.y.T[:, :9].reshape(-1, 3, 3)
+        total = total + states[:, :9].reshape(-1, 3, 3)
     return total
 
 
@@ -108,8 +112,7 @@ def test_the_integrator_in_the_text_carries_the_variable_along():
     module = module_of(text("pom_pom", "python"))
     times = np.concatenate([[0.0], TIMES])
     found = np.transpose(module["simulate_shear"](lambda t: 2.5, times))[1:]
-    s = reference("pom_pom", GRADIENTS["shear"])
-    wanted = np.stack([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]], axis=1)
+    wanted = shear_quantities(reference("pom_pom", GRADIENTS["shear"])).T
     # steps of a fiftieth of the shortest time, of fourth order
     np.testing.assert_allclose(found, wanted, atol=1e-4 * np.max(wanted))
 

@@ -11,8 +11,7 @@ from spelled_laws import EFFECTS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agr
 from discover.comparison.comparison import Comparison
 from discover.equations import Equation, NamedPart, write_equation
 from discover.report.comparison.report import equations_tex
-from tensor_library import LawTerm
-from tensor_library.terms import CandidateTerm, parse_term
+from tensor_library import CandidateTerm, LawTerm, parse_term
 
 
 def extra_by_latex(law, letters=()):

@@ -24,16 +24,10 @@ from tensor_library import (
 
 PAGE = "adding-a-term.md"
 FORM = ClosedForm(
-    "levelling",
-    "(tr(sigma)/sqrt(1+(mu*tr(sigma))^2))",
-    "mu",
-    0.5,
-    (1e-3, 10.0),
-    lambda trace, mu: trace / jnp.sqrt(1.0 + (mu * trace) ** 2),
-    4,
-    "this test",
+    "levelling", "(tr(sigma)/sqrt(1+(mu*tr(sigma))^2))", "mu", 0.5, (1e-3, 10.0),
+    lambda trace, mu: trace / jnp.sqrt(1.0 + (mu * trace) ** 2), 4, "this test",
     lambda trace, mu: trace / sympy.sqrt(1 + (mu * trace) ** 2),
-)
+)  # fmt: skip
 SAMPLES = """
 import jax.numpy as jnp, numpy as np, pathlib, discover as dc
 from discover.equations import Equation

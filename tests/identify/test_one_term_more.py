@@ -7,8 +7,7 @@ from discover.dataset import Run
 from discover.identify.structure import analyse_structure
 from discover.identify.twins import one_term_more
 from discover.protocols import start_up
-from tensor_library.law_terms import LawTerms
-from tensor_library.library import build_library
+from tensor_library import LawTerms, build_library
 
 ROWS = 200
 X = np.linspace(0.0, 1.0, ROWS)

@@ -10,8 +10,7 @@ from discover.identify.relations import weak_directions
 from discover.identify.structure import analyse_structure
 from discover.protocols import oscillatory_shear
 from discover.simulate import synthetic_dataset
-from tensor_library import build_library, parse_term
-from tensor_library.law_terms import LawTerms
+from tensor_library import LawTerms, build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 FLOWS = {f"laos_{wi:g}_{de:g}": oscillatory_shear(wi, de) for wi in (1.0, 2.0) for de in (0.5, 1.0)}

@@ -6,15 +6,8 @@ import numpy as np
 import pytest
 
 from discover.forward.grids import make_grids
+from discover.identify import side_by_side
 from discover.identify.exact_series import compare_series
-from discover.identify.side_by_side import (
-    SAME,
-    differences,
-    random_histories,
-    separations,
-    stresses_in_histories,
-    stresses_of_laws,
-)
 from discover.identify.twins import find_twins, hidden_stresses
 from discover.laws import (
     ExponentialPhanThienTanner,
@@ -26,8 +19,7 @@ from discover.laws import (
 )
 from discover.protocols import in_flow, stack_protocols, start_up
 from discover.simulate import simulate
-from tensor_library import build_library, parse_term
-from tensor_library.law_terms import LawTerms
+from tensor_library import LawTerms, build_library, parse_term
 
 SLIP = "sigma.gammadot+gammadot.sigma"
 PTT = "(exp(epsilon*tr(sigma))-1)*sigma"
@@ -76,7 +68,7 @@ def test_a_fitted_coefficient_has_its_twin_too():
     assert twin.law.coefficients["tr(sigma)*gammadot"] == pytest.approx(
         slip * (1 - slip / 2), abs=1e-5
     )  # the fraction nearest to the coefficient with a denominator up to 1e5
-    assert twin.difference.sigma12 < SAME
+    assert twin.difference.sigma12 < side_by_side.SAME
 
 
 def test_one_term_of_two_can_be_exchanged():
@@ -95,8 +87,10 @@ def test_laws_that_feel_the_trace_have_no_small_twin(law):
 
 def test_giesekus_is_no_twin_of_maxwell_at_any_mobility_worth_the_name():
     others = [LawTerms({"sigma.sigma": a}) for a in (0.001, 0.2)]
-    apart = differences(stresses_in_histories(LIBRARY, [LawTerms({}), *others]))
-    assert all(d.sigma12 > SAME for d in apart)
+    apart = side_by_side.differences(
+        side_by_side.stresses_in_histories(LIBRARY, [LawTerms({}), *others])
+    )
+    assert all(d.sigma12 > side_by_side.SAME for d in apart)
     assert apart[0].sigma12 < 0.1 * apart[1].sigma12
     series = compare_series({}, {"sigma.sigma": Fraction(1, 5)})
     assert None not in (series.sigma12, series.N1, series.N2)
@@ -104,15 +98,15 @@ def test_giesekus_is_no_twin_of_maxwell_at_any_mobility_worth_the_name():
 
 def test_a_law_that_runs_away_is_infinitely_far():
     laws = [LawTerms({}), LawTerms({"tr(sigma)*sigma": -5.0})]
-    (apart,) = differences(stresses_in_histories(LIBRARY, laws))
+    (apart,) = side_by_side.differences(side_by_side.stresses_in_histories(LIBRARY, laws))
     assert apart.sigma12 == np.inf
 
 
 def test_random_histories_span_weak_to_strong_flows_and_repeat():
-    flows = random_histories()
+    flows = side_by_side.random_histories()
     assert flows.amplitude.min() < 0.5
     assert flows.amplitude.max() > 2.0
-    again = random_histories.__wrapped__()
+    again = side_by_side.random_histories.__wrapped__()
     assert np.array_equal(flows.protocols.phases, again.protocols.phases)
 
 
@@ -122,7 +116,7 @@ def test_laws_side_by_side_extend_as_one_alone():
     laws = [LawTerms({"sigma.sigma": 0.2}), LawTerms({})]
     protocol = in_flow(start_up(0.3), "uniaxial")
     grids = make_grids([protocol], [times])
-    stress = stresses_of_laws(LIBRARY, laws, stack_protocols([protocol]), grids)
+    stress = side_by_side.stresses_of_laws(LIBRARY, laws, stack_protocols([protocol]), grids)
     alone = simulate(Fluid.dimensionless(Giesekus(0.2)), protocol, times).components
     # fourth-order steps of 0.05 on rates of order one
     np.testing.assert_allclose(stress[0, 0, :, 0], alone[:, 0], atol=1e-6)
@@ -131,8 +125,8 @@ def test_laws_side_by_side_extend_as_one_alone():
 
 def test_what_separates_a_law_from_itself_is_nothing():
     law = LawTerms({"sigma.sigma": 0.2})
-    stresses = stresses_in_histories(LIBRARY, [law, law])
-    assert separations(LIBRARY, [law, law], stresses) == [()]
+    stresses = side_by_side.stresses_in_histories(LIBRARY, [law, law])
+    assert side_by_side.separations(LIBRARY, [law, law], stresses) == [()]
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.laws import Fluid, make_law
-from discover.laws.base import AbstractConstitutiveLaw
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, make_law
 from discover.laws.expansion import in_shared_form, law_of_terms
-from discover.laws.tensor_basis_network import TensorBasisNetwork
 from discover.programs.program_cache import Compiled
 from discover.protocols import oscillatory_shear
 from discover.simulate import simulate

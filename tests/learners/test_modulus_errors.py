@@ -11,8 +11,7 @@ from discover.comparison import learning
 from discover.errors import InputError
 from discover.study.in_memory import declared_fluid
 from discover.study.schema import Study
-from tensor_library.library import TermLibrary
-from tensor_library.terms import parse_term
+from tensor_library import TermLibrary, parse_term
 
 MODULUS, TIME = np.array([300.0, 400.0, 200.0]), np.array([3.0, 0.4, 0.05])
 MOBILITY, NOISE, SWEEP_NOISE = 0.3, 0.01, 0.03

@@ -7,7 +7,7 @@ from independent.folders import write_table
 
 import discover as dc
 from discover.learners import runs as learner_runs
-from discover.learners.known_part import known_part
+from discover.learners.settings import known_part
 from discover.learners.tbnn_ude import estimator as of_network
 from discover.learners.tbnn_ude.problem import make_problem
 

@@ -11,8 +11,7 @@ from discover.dataset.run import Loading
 from discover.errors import InputError
 from discover.forward import make_batch
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
-from discover.protocols import imposed_stress, oscillations
-from discover.protocols.control import steady_rates
+from discover.protocols import imposed_stress, oscillations, steady_rates
 
 TIMES = np.linspace(0.1, 4.0, 40)
 PLAIN = dc.Run("a.csv", TIMES, dc.start_up(1.0), np.ones(40), 1.0 - np.exp(-TIMES))

@@ -9,16 +9,7 @@ import numpy as np
 import pytest
 
 from discover.laws import Fluid
-from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe
-from discover.learners.tbnn_ude.ensemble import (
-    choose_member,
-    coefficient_spread,
-    halves_of_runs,
-    member_misfits,
-    member_predictions,
-    seen_in,
-    train_others,
-)
+from discover.learners.tbnn_ude import TBNNUDE, DefaultRecipe, ensemble
 from discover.learners.tbnn_ude.least_squares import Stopping, sample_states
 from discover.learners.tbnn_ude.problem import Trained, make_problem
 from discover.learners.tbnn_ude.session import initial_law, invariant_sizes
@@ -49,7 +40,7 @@ def first(problem):
 
 @pytest.fixture(scope="module")
 def others(problem, first):
-    return train_others(problem, first, jax.random.split(jax.random.key(1), 2), RECIPE)[0]
+    return ensemble.train_others(problem, first, jax.random.split(jax.random.key(1), 2), RECIPE)[0]
 
 
 @pytest.mark.slow
@@ -63,17 +54,21 @@ def test_members_differ_in_their_tensors_and_in_their_weights(first, others):
 
 @pytest.mark.slow
 def test_every_member_learns(problem, first, others):
-    misfits = member_misfits([first.law, *(member.law for member in others)], problem)
+    misfits = ensemble.member_misfits([first.law, *(member.law for member in others)], problem)
     assert np.all(misfits[1:] < 0.2 * misfits[0])
 
 
 @pytest.mark.slow
 def test_members_that_fit_disagree_where_shear_stress_does_not_decide(problem, others):
-    predicted = member_predictions([Fluid.dimensionless(m.law) for m in others], TEST, TIMES)
+    predicted = ensemble.member_predictions(
+        [Fluid.dimensionless(m.law) for m in others], TEST, TIMES
+    )
     low, high = predicted.band("N1")
     # the truth acts on the stress; a law on the rate tensor has another N1 for the same σ12
     assert np.linalg.norm(high - low) > 0.02 * np.linalg.norm(high)
-    spread = coefficient_spread([m.law for m in others], sample_states(others[0].law, problem))
+    spread = ensemble.coefficient_spread(
+        [m.law for m in others], sample_states(others[0].law, problem)
+    )
     assert {name for name, value in spread.items() if value > 0.0} == {"sigma", "gammadot"}
 
 
@@ -106,35 +101,35 @@ def test_members_that_fit_are_handed_on_and_the_others_are_not(constant):
     assert len(handed_on) == (sum(fits) if sum(fits) > 1 else 0)
     # of the size of the noise: those that fit all data cannot lie far from the truth
     fluids = [Fluid.dimensionless(law) for law in constant.fitting_]
-    low, high = member_predictions(fluids, TEST, TIMES).band("N1")
+    low, high = ensemble.member_predictions(fluids, TEST, TIMES).band("N1")
     assert np.linalg.norm(high - low) < 0.1 * np.linalg.norm(high)
 
 
 def test_the_simplest_of_the_members_that_fit_is_taken(first):
     members = [replace(first, tensors=tuple(range(n))) for n in (3, 1, 2)]
-    chosen, fits = choose_member(members, np.array([0.0100, 0.0102, 0.0101]), 5e-4)
+    chosen, fits = ensemble.choose_member(members, np.array([0.0100, 0.0102, 0.0101]), 5e-4)
     assert chosen == 1
     assert np.all(fits)
     # far from the least misfit it would be simple and wrong
-    chosen, fits = choose_member(members, np.array([0.0100, 0.0300, 0.0101]), 5e-4)
+    chosen, fits = ensemble.choose_member(members, np.array([0.0100, 0.0300, 0.0101]), 5e-4)
     assert chosen == 2
     np.testing.assert_array_equal(fits, [True, False, True])
     # below what a rheometer resolves all fit
-    _, fits = choose_member(members, np.array([1e-5, 3e-4, 1e-6]), 5e-4)
+    _, fits = ensemble.choose_member(members, np.array([1e-5, 3e-4, 1e-6]), 5e-4)
     assert np.all(fits)
-    _, fits = choose_member(members, np.array([1e-2, np.inf, 1e-2]), 5e-4)
+    _, fits = ensemble.choose_member(members, np.array([1e-2, np.inf, 1e-2]), 5e-4)
     np.testing.assert_array_equal(fits, [True, False, True])
 
 
 def test_halves_of_the_runs_hold_half_of_them():
-    halves = halves_of_runs(8, 4, jax.random.key(0))
+    halves = ensemble.halves_of_runs(8, 4, jax.random.key(0))
     assert [int(np.sum(half)) for half in halves] == [4, 4, 4, 4]
     np.testing.assert_array_equal(halves[0], ~halves[1])
     assert not np.array_equal(halves[2], halves[3])
 
 
 def test_a_run_that_is_not_seen_has_no_residual(problem):
-    seen = seen_in(problem, np.array([True, False]))
+    seen = ensemble.seen_in(problem, np.array([True, False]))
     np.testing.assert_array_equal(seen.records.weight[0], problem.records.weight[0])
     np.testing.assert_array_equal(seen.records.seen.sum(axis=1), [41, 0])
 
@@ -144,17 +139,17 @@ def test_a_member_that_runs_away_is_counted_and_left_out_of_the_band(others):
     good = others[0].law
     lost = eqx.tree_at(lambda law: law.constants, good, jnp.zeros(8).at[3].set(-8.0))
     fluids = [Fluid.dimensionless(law) for law in (good, lost)]
-    predicted = member_predictions(fluids, TEST, TIMES)
+    predicted = ensemble.member_predictions(fluids, TEST, TIMES)
     np.testing.assert_array_equal(np.isnan(predicted.sigma12).any(axis=1), [False, True])
     np.testing.assert_array_equal(predicted.band("sigma12")[0], predicted.sigma12[0])
-    none = member_predictions(fluids[1:], TEST, TIMES)
+    none = ensemble.member_predictions(fluids[1:], TEST, TIMES)
     assert np.all(np.isnan(none.band("N1")))
 
 
 def test_a_single_run_has_no_halves(problem, first):
     alone = replace(first, varies=False)
     one = eqx.tree_at(lambda tree: tree.flows, problem, problem.flows.some(0, 1))
-    members, how = train_others(one, alone, jax.random.split(jax.random.key(0), 2), RECIPE)
+    members, how = ensemble.train_others(one, alone, jax.random.split(jax.random.key(0), 2), RECIPE)
     assert members == [alone, alone]
     assert "do not differ" in how
 

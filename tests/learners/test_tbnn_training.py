@@ -9,24 +9,8 @@ from independent.homogeneous import GiesekusFluid
 
 from discover.dataset import Run
 from discover.laws import Giesekus
-from discover.learners.tbnn_ude import TBNNUDE
-from discover.learners.tbnn_ude.least_squares import (
-    Objective,
-    Stopping,
-    minimise,
-    parts,
-    prior_residual,
-    reweighted,
-    sample_states,
-)
+from discover.learners.tbnn_ude import TBNNUDE, least_squares, recipes
 from discover.learners.tbnn_ude.problem import DefaultRecipe, make_problem
-from discover.learners.tbnn_ude.recipes import (
-    PaperRecipe,
-    make_network,
-    paper_loss,
-    train_default,
-    train_paper,
-)
 from discover.learners.tbnn_ude.session import Session, initial_law, is_white
 from discover.learners.tbnn_ude.variational import Rebuild, side_by_side, states_and_jacobian
 from discover.protocols import in_flow, oscillatory_shear, start_up
@@ -52,12 +36,12 @@ def giesekus_problem():
 
 @pytest.fixture(scope="module")
 def trained(giesekus_problem):
-    return train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+    return recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
 
 
 @pytest.mark.slow
 def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(giesekus_problem):
-    law = make_network(jax.random.key(1), 3, True)
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     weights = rebuild.start
     _, jacobian = states_and_jacobian(weights, rebuild, giesekus_problem)
@@ -76,7 +60,7 @@ def test_the_jacobian_of_the_variational_equation_is_that_of_the_trajectory(gies
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 2, 3])
 def test_halves_of_the_runs_side_by_side_are_all_runs_at_once(giesekus_problem, n):
-    law = make_network(jax.random.key(1), 3, True)
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     whole = giesekus_problem
 
@@ -116,7 +100,7 @@ def test_constants_without_a_network_are_those_beside_one_that_is_zero(giesekus_
 
 def test_maxwell_data_leave_nothing_to_learn():
     # negative control: with −σ known there is no extra term, and none may be invented
-    trained = train_default(problem_of("ucm", {}), jax.random.key(0), True, SMALL)
+    trained = recipes.train_default(problem_of("ucm", {}), jax.random.key(0), True, SMALL)
     assert float(jnp.max(jnp.abs(trained.law.constants))) < 1e-6
     assert not trained.varies
 
@@ -125,17 +109,17 @@ def test_maxwell_data_leave_nothing_to_learn():
 def test_the_network_is_called_in_when_constants_leave_structure():
     problem = problem_of("ptt_linear", {"epsilon": 0.4})
     recipe = dataclasses.replace(SMALL, width=6, steps=10, polish_steps=60)
-    trained = train_default(problem, jax.random.key(0), True, recipe)
+    trained = recipes.train_default(problem, jax.random.key(0), True, recipe)
     assert trained.varies
     # one tensor, the stress itself, with a coefficient that varies: N2 stays exactly zero
     np.testing.assert_array_equal(trained.law.network_mask, [0, 1, 0, 0, 0, 0, 0, 0])
     constants = dataclasses.replace(recipe, max_tensors=0)
-    alone = train_default(problem, jax.random.key(0), True, constants)
+    alone = recipes.train_default(problem, jax.random.key(0), True, constants)
     assert trained.misfit < 0.5 * alone.misfit
 
 
 def test_the_same_key_gives_the_same_law(giesekus_problem, trained):
-    again = train_default(giesekus_problem, jax.random.key(0), True, SMALL)
+    again = recipes.train_default(giesekus_problem, jax.random.key(0), True, SMALL)
     np.testing.assert_array_equal(again.misfits, trained.misfits)
     for one, two in zip(jax.tree.leaves(again.law), jax.tree.leaves(trained.law), strict=True):
         np.testing.assert_array_equal(one, two)
@@ -146,18 +130,25 @@ def test_a_start_that_runs_away_neither_crashes_nor_gives_nan(giesekus_problem):
     good = law
     law = eqx.tree_at(lambda tree: tree.constants, law, jnp.zeros(8).at[3].set(-8.0))
     rebuild = Rebuild.of_constants(law, np.ones(8, bool), np.ones(8))
-    cloud = sample_states(good, giesekus_problem)
-    objective = Objective(giesekus_problem, rebuild, cloud, reweighted(good, cloud, 1e-3))
-    weights = minimise(rebuild.start, objective, 3)
+    cloud = least_squares.sample_states(good, giesekus_problem)
+    objective = least_squares.Objective(
+        giesekus_problem, rebuild, cloud, least_squares.reweighted(good, cloud, 1e-3)
+    )
+    weights = least_squares.minimise(rebuild.start, objective, 3)
     assert np.all(np.isfinite(weights))
 
 
 def test_the_prior_is_the_sum_of_root_mean_squares_at_its_fixed_point(giesekus_problem):
     law = initial_law(jax.random.key(0), 4, True, jnp.ones(8))
     law = eqx.tree_at(lambda tree: tree.constants, law, jnp.array([0, 0.5, 0.0, 0.3, 0, 0, 0, 0]))
-    cloud = sample_states(law, giesekus_problem)
-    value = float(jnp.sum(prior_residual(law, cloud, reweighted(law, cloud, 0.01)) ** 2))
-    amount, variation = parts(law, cloud)
+    cloud = least_squares.sample_states(law, giesekus_problem)
+    value = float(
+        jnp.sum(
+            least_squares.prior_residual(law, cloud, least_squares.reweighted(law, cloud, 0.01))
+            ** 2
+        )
+    )
+    amount, variation = least_squares.parts(law, cloud)
     expected = 0.01 * float(jnp.sum(jnp.sqrt(jnp.mean(amount**2, axis=0))))
     assert float(jnp.max(jnp.abs(variation))) < 1e-12  # constants do not vary
     assert value == pytest.approx(expected, rel=2e-3)  # the floor of 1e-4 in the weights
@@ -175,9 +166,9 @@ def test_whiteness_tells_noise_from_structure(seed, kind):
 
 @pytest.mark.slow
 def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem):
-    law = make_network(jax.random.key(3), 5, True)
+    law = recipes.make_network(jax.random.key(3), 5, True)
     active = jnp.array([True, False, True])
-    loss = float(paper_loss(law.network, law, giesekus_problem, active, 0.01))
+    loss = float(recipes.paper_loss(law.network, law, giesekus_problem, active, 0.01))
     problem = giesekus_problem
     residual = np.asarray(problem.predicted(law) - problem.records.recorded)
     weights = sum(
@@ -190,8 +181,8 @@ def test_the_paper_s_loss_is_a_sum_over_series_plus_the_penalty(giesekus_problem
 
 @pytest.mark.slow
 def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus_problem):
-    recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=3e-3)
-    _, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50, learning_rate=3e-3)
+    _, losses = recipes.train_paper(giesekus_problem, jax.random.key(0), True, recipe)
     assert losses.shape == (150,)
     for series in range(3):
         assert losses[50 * series + 49] < losses[50 * series]
@@ -200,11 +191,11 @@ def test_the_paper_s_recipe_adds_series_and_lowers_the_loss_within_each(giesekus
 
 @pytest.mark.slow
 def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
-    recipe = PaperRecipe(width=4, iterations_per_series=50)
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50)
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
     model = TBNNUDE(recipe=recipe, n_members=1, random_state=3).fit(data.runs)
     (key,) = jax.random.split(jax.random.key(3), 1)
-    law, _ = train_paper(giesekus_problem, key, True, recipe)
+    law, _ = recipes.train_paper(giesekus_problem, key, True, recipe)
     for one, two in zip(jax.tree.leaves(model.law_), jax.tree.leaves(law), strict=True):
         np.testing.assert_array_equal(one, two)
     assert model.result_.details["recipe"] == "PaperRecipe"
@@ -212,8 +203,8 @@ def test_the_estimator_trains_what_the_paper_s_recipe_does(giesekus_problem):
 
 @pytest.mark.slow
 def test_an_absurd_learning_rate_is_survived(giesekus_problem):
-    recipe = PaperRecipe(width=4, iterations_per_series=50, learning_rate=50.0)
-    law, losses = train_paper(giesekus_problem, jax.random.key(0), True, recipe)
+    recipe = recipes.PaperRecipe(width=4, iterations_per_series=50, learning_rate=50.0)
+    law, losses = recipes.train_paper(giesekus_problem, jax.random.key(0), True, recipe)
     assert not np.all(np.isfinite(losses))  # some trials did run away
     assert all(
         bool(jnp.all(jnp.isfinite(w))) for w in jax.tree.leaves(eqx.filter(law, eqx.is_array))
@@ -224,7 +215,7 @@ def test_an_absurd_learning_rate_is_survived(giesekus_problem):
 def test_the_network_stands_on_a_known_base_law():
     data = synthetic_dataset("giesekus", {"alpha": 0.3}, FLOWS, duration=10.0, n_samples=51)
     problem = make_problem(data.runs, np.ones(1), np.ones(1))
-    trained = train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
+    trained = recipes.train_default(problem, jax.random.key(0), True, SMALL, base_law=Giesekus(0.1))
     assert float(trained.law.constants[3]) == pytest.approx(0.2, abs=1e-4)  # the rest of 0.3
 
 
@@ -232,7 +223,7 @@ def test_a_descent_far_behind_its_rival_is_given_up_and_one_close_behind_is_not(
     pace = [1.0 / 2**step for step in range(10)]
 
     def steps_until_given_up(times_worse):
-        stopping = Stopping(0.0, pace)
+        stopping = least_squares.Stopping(0.0, pace)
         misfits = (times_worse * value for value in pace)
         return next((i for i, misfit in enumerate(misfits) if stopping.done(misfit)), len(pace))
 
@@ -258,7 +249,7 @@ def test_in_mixed_flows_the_residual_and_its_jacobian_are_those_of_scipy():
     recorded = problem.records.recorded
     # the training grid errs by 4e-6 of the stress in shear; extension stretches faster
     assert float(jnp.max(jnp.abs(problem.predicted(Giesekus(0.3)) - recorded))) < 1e-4
-    law = make_network(jax.random.key(1), 3, True)
+    law = recipes.make_network(jax.random.key(1), 3, True)
     rebuild = Rebuild.everything(law)
     along, jacobian = states_and_jacobian(rebuild.start, rebuild, problem)
     np.testing.assert_allclose(

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from discover.statistics import holds_signal, lack_of_fit
-from discover.statistics.noise.whiteness import (
-    SIGNIFICANCE,
-    cycle,
-    noise_probability,
-    separate_probability,
-)
+from discover.statistics.noise import whiteness
 from discover.statistics.residual import Expectation
 
 SAMPLES = 300
@@ -61,11 +56,11 @@ def test_spikes_once_a_cycle_are_found_by_the_cycle():
     once[::33] = 3.0
     turn = np.arange(SAMPLES) * 2.0 * np.pi / 33.0
     record = 10.0 * np.sin(turn)
-    assert cycle(record) == pytest.approx(33.0, abs=0.5)
+    assert whiteness.cycle(record) == pytest.approx(33.0, abs=0.5)
     here, weight = generator.standard_normal(SAMPLES), np.ones((1, SAMPLES))
-    assert noise_probability((here + once)[None], weight) > 1e-3
-    assert noise_probability((here + once)[None], weight, record[None]) < 1e-3
-    assert noise_probability(here[None], weight, record[None]) > 1e-3
+    assert whiteness.noise_probability((here + once)[None], weight) > 1e-3
+    assert whiteness.noise_probability((here + once)[None], weight, record[None]) < 1e-3
+    assert whiteness.noise_probability(here[None], weight, record[None]) > 1e-3
 
 
 PROPORTIONAL = np.abs(np.sin(TIMES)) + 0.1
@@ -85,7 +80,7 @@ def test_noise_of_any_size_is_rarely_taken_for_structure(correlation, size):
     taken = 0
     for seed in range(30):
         rows = np.array([size * correlated(correlation, 100 * seed + i) for i in range(3)])
-        taken += noise_probability(rows, weight, np.tile(WAVE, (3, 1))) <= 1e-3
+        taken += whiteness.noise_probability(rows, weight, np.tile(WAVE, (3, 1))) <= 1e-3
     # significance 0.001: more than 2 of 30 has a probability below 1e-5
     assert taken <= 2
 
@@ -164,7 +159,7 @@ def test_separate_points_of_noise_alone_agree_as_seldom_as_the_level_says():
     generator = np.random.default_rng(2)
     # louder where the stress is large, as of a flow curve
     rows = [generator.standard_normal(n) * np.geomspace(1.0, 3.0, n) for n in [7, 12, 25] * 100]
-    low = sum(separate_probability([row]) <= 0.05 for row in rows)
+    low = sum(whiteness.separate_probability([row]) <= 0.05 for row in rows)
     # 5 % of 300, within three standard deviations of a binomial count
     assert low <= 15 + 3 * np.sqrt(300 * 0.05 * 0.95)
 
@@ -172,8 +167,8 @@ def test_separate_points_of_noise_alone_agree_as_seldom_as_the_level_says():
 def test_a_smooth_misfit_of_separate_points_is_no_noise_though_few_are_tested_otherwise():
     smooth = np.cos(np.linspace(0.0, 2.0 * np.pi, 20))
     left = 3.0 * smooth + np.random.default_rng(0).standard_normal(20)
-    assert noise_probability(left[None], np.ones((1, 20))) is None
-    assert separate_probability([left]) < 0.01
+    assert whiteness.noise_probability(left[None], np.ones((1, 20))) is None
+    assert whiteness.separate_probability([left]) < 0.01
 
 
 @pytest.mark.parametrize("error", [0.0, 0.02])
@@ -183,8 +178,8 @@ def test_a_pattern_that_the_sweep_excuses_is_explained_and_yet_no_noise(error):
     excused = lack_of_fit([smooth + noise], [WAVE], Expectation(linear_error=error))
     assert excused.verdict == ("explained" if error else "unexplained")
     assert excused.probability is not None
-    assert excused.probability <= SIGNIFICANCE
+    assert excused.probability <= whiteness.SIGNIFICANCE
     assert ("a pattern no larger than the linear data's error" in excused.reason) == bool(error)
     plain = lack_of_fit([noise], [WAVE], Expectation(linear_error=error))
     assert plain.verdict == "explained"
-    assert plain.probability > SIGNIFICANCE
+    assert plain.probability > whiteness.SIGNIFICANCE

@@ -9,13 +9,7 @@ from discover.statistics import lack_of_fit
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
 from discover.statistics.noise.whiteness import noise_probability
-from discover.statistics.residual import (
-    Expectation,
-    is_noise,
-    judging,
-    noise_floor,
-    tells_noise,
-)
+from discover.statistics.residual import Expectation, is_noise, judging, noise_floor, tells_noise
 
 RUNS, SAMPLES = 6, 60
 WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))

@@ -1,8 +1,7 @@
-"""Laws as Python text that needs nothing of this package: with numpy, or with SymPy.
+"""Laws as Python text with numpy or SymPy alone.
 
-The text is put together from tables and from `repr` of numbers; no name of a file or study reaches
-it except in comments. Matrices of numpy and of SymPy share ``@`` and ``trace()``, so that one table
-serves both; UFL, in a file of its own, changes a few entries of it.
+Made of tables and of `repr` of numbers; names of files or studies occur in comments only. ``@`` and
+``trace()`` serve numpy and SymPy alike; UFL changes a few entries.
 """
 
 import re
@@ -233,16 +232,12 @@ variables_rate = [{rates}]
 def numpy_code(equation: Equation) -> str:
     """Return a module with the law as a function of numpy arrays.
 
-    Raises InputError if the equation has a named law of which nobody said how it is written.
+    Raises InputError if the equation has a named law without written form.
     """
     return filled(
-        _NUMPY_TEMPLATE,
-        equation,
-        CodeNotation(),
-        "np.zeros((3, 3))",
-        rates=_NUMPY_RATES,
+        _NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))", rates=_NUMPY_RATES,
         structure=structure_fields(equation, CodeNotation(), "numpy"),
-    )
+    )  # fmt: skip
 
 
 def sympy_code(equation: Equation) -> str:
@@ -263,15 +258,9 @@ def sympy_code(equation: Equation) -> str:
     for name in () if named is None else named.function.rates:
         constants += f'{name} = sympy.Symbol("{name}", real=True)\n'
     return filled(
-        _SYMPY_TEMPLATE,
-        equation,
-        _SympyCodeNotation(),
-        "sympy.zeros(3, 3)",
-        constants,
-        "",
-        _SYMPY_RATES,
-        structure_fields(equation, _SympyCodeNotation(), "sympy"),
-    )
+        _SYMPY_TEMPLATE, equation, _SympyCodeNotation(), "sympy.zeros(3, 3)", constants, "",
+        _SYMPY_RATES, structure_fields(equation, _SympyCodeNotation(), "sympy"),
+    )  # fmt: skip
 
 
 _OF_VARIABLES = """
@@ -279,20 +268,14 @@ _OF_VARIABLES = """
 
 
 def filled(
-    template: str,
-    equation: Equation,
-    notation: CodeNotation,
-    nothing: str,
-    constants: str | None = None,
-    indent: str = "    ",
-    rates: str = "",
+    template: str, equation: Equation, notation: CodeNotation, nothing: str,
+    constants: str | None = None, indent: str = "    ", rates: str = "",
     structure: Mapping[str, str] = NOTHING,
-) -> str:
+) -> str:  # fmt: skip
     """Return a module: a template with the law in a notation.
 
-    `constants`: what holds the constants of a named law; by default a list of one table for each
-    mode. `rates`: A template of what says how structure variables change, for a law that has some.
-    `structure`: fields of the states of the whole fluid, from `structure_fields`.
+    `constants`: holder of a named law's constants; by default a list with a table for each mode.
+    `rates`: template of the rates of structure variables. `structure`: from `structure_fields`.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
@@ -320,24 +303,17 @@ def filled(
             )
     return template.format(
         header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
-        relaxation=" - s" if equation.linear_relaxation else "",
-        modulus=_numbers(equation.modulus),
+        relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
-        solvent=repr(float(equation.solvent_viscosity)),
-        tested=_tested(equation),
+        solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
         constants=table if constants is None else constants,
-        mode=", mode" if variables else ", mode=0" if named else "",
-        of_mode=", k" if named else "",
-        also=", variables" if variables else "",
-        also_k=", variables[k]" if variables else "",
+        mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
+        also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
         of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
-        variables_rate=changing,
-        **structure,
-        **stepped(equation, len(variables)),
-        where=where,
+        variables_rate=changing, **structure, **stepped(equation, len(variables)), where=where,
         extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
-    )
+    )  # fmt: skip
 
 
 def _constants(equation: Equation) -> str:

@@ -1,4 +1,4 @@
-"""What a flow solver has to know of a law: how short its steps must be, and whether A stays one."""
+"""Limits of a law in a flow solver: longest stable step, and positivity of the conformation."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ _TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits 
 
 @dataclass(frozen=True)
 class InASolver:
-    """The extremes over the edge of a law's box.
+    """Extremes over the edge of a law's box.
 
-    `smallest_eigenvalue`, `of_mode`: of the conformation, dimensionless (I + σ_k/G_k; of chains
-        that end, I + σ_k/(k G_k)), and its mode counted from 1; NaN where the law diverged.
-    `largest_step`, `limiting_mode`: longest stable step of explicit Euler for the stress of a mode,
-        in s; infinite where nothing decays.
+    `smallest_eigenvalue`, `of_mode`: of the conformation (I + σ_k/G_k; of chains that end, I +
+    σ_k/(k G_k)), and its mode from 1; NaN where the law diverged. `largest_step`, `limiting_mode`:
+    longest stable step of explicit Euler for the stress of a mode, in s; infinite where nothing
+    decays.
     """
 
     weissenberg: float  # largest Wi of the box, at which the flows were
@@ -35,7 +35,7 @@ class InASolver:
 
     @property
     def text(self) -> str:
-        """The same in one sentence."""
+        """Limits in one sentence."""
         flows = f"At Wi {self.weissenberg:.3g}, the edge of the box, in start-up and oscillation"
         if not np.isfinite(self.smallest_eigenvalue):
             return f"{flows} of shear, mode {self.of_mode} diverges."
@@ -71,15 +71,12 @@ class _Budget:
 
 
 def in_a_solver(equation: Equation) -> InASolver | str | None:
-    """Return how a law behaves at the edge of the box in which it was learned; None without one.
+    """Return how a law behaves at the edge of the box in which it was learned.
 
-    A sentence where finding out would take too long.
-
-    None too where the whole fluid has a state, which no flow of one mode brings about.
-
-    Each mode goes through start-up of shear at the largest Wi, and through oscillation at the
-    largest Wi and the least and the largest De. A step is stable where |1 + Δt μ| ≤ 1 for every
-    eigenvalue μ of the linearised stress equation that decays.
+    A sentence where that takes too long; None without a box, or with a state of the whole fluid.
+    Each mode goes through start-up at the largest Wi, and oscillation at it and the least and
+    largest De. A step is stable where |1 + Δt μ| ≤ 1 for every decaying eigenvalue μ of the
+    linearised stress equation.
     """
     if equation.tested is None or equation.states:
         return None

@@ -1,4 +1,4 @@
-"""Laws as JSON: the form in which result files hold them, and from which all others are made."""
+"""Laws as JSON, as result files hold them and all other formats are made from."""
 
 from typing import Any, Literal
 
@@ -95,10 +95,9 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
 
 
 def equation_from_json(content: object, where: str = "the law") -> Equation:
-    """Return the equation that JSON holds.
+    """Return the equation that `equation_to_json` wrote.
 
-    `content`: what `equation_to_json` returned, after a way through a file. Raises InputError if
-    something in it is missing, unknown or no number; names the key.
+    Raises InputError, naming the key, if something in it is missing, unknown or no number.
     """
     again = "Write the results again with --overwrite."
     try:

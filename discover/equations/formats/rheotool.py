@@ -1,14 +1,10 @@
 """Laws as rheoTool's ``constant/constitutiveProperties``, where rheoTool knows the law.
 
-Names and equations are those of rheoTool's library ``constitutiveEquations``, tree ``of90``
-[Pimenta & Alves 2017, JNNFM 239, 85; github.com/fppimenta/rheoTool]: ``Oldroyd-B``, ``Giesekus``
-(``alpha``), ``PTT`` (``epsilon``, ``zeta``, ``destructionFunctionType`` linear or exponential),
-``FENE-P`` (``L2``), ``Rolie-Poly``, ``XPomPom``, ``WhiteMetznerCY``, ``Saramito``, and
-``multiMode`` over them, each mode with constants of its own. Its PTT carries the slip parameter ζ
-of Johnson & Segalman, ½ζ(τ·γ̇ + γ̇·τ), so that law is PTT with ε = 0.
-
-rheoTool's FENE-P relaxes the conformation by (f A − a I)/λ with a = L²/(L² − 3); in the stress
-form of this package that is a relaxation time λ/a at the same zero-shear viscosity.
+Names and equations are those of its library ``constitutiveEquations``, tree ``of90`` [Pimenta &
+Alves 2017, JNNFM 239, 85; github.com/fppimenta/rheoTool]. Its PTT carries the slip ζ of Johnson &
+Segalman, ½ζ(τ·γ̇ + γ̇·τ), so that law is PTT with ε = 0. Its FENE-P relaxes the conformation by (f
+A − a I)/λ with a = L²/(L² − 3): in this package's stress form a relaxation time λ/a at the same
+viscosity.
 """
 
 from collections.abc import Mapping, Sequence
@@ -52,12 +48,10 @@ _DIMENSIONS = {
 
 @dataclass(frozen=True)
 class RheoToolModel:
-    """A law in rheoTool's words.
+    """Law in rheoTool's words: `type`, word `options`, and `parameters` over time and modulus.
 
-    `parameters`: parameters by rheoTool's name, times over the relaxation time and stresses over
-        the modulus.
-    `drive`, `relax`: factors on modulus and relaxation rate that the terms ``gammadot`` and
-        ``sigma`` amount to.
+    `drive`, `relax`: factors on modulus and relaxation rate by terms ``gammadot`` and ``sigma``.
+    `notes`: what was passed over.
     """
 
     type: str  # entry ``type``
@@ -93,12 +87,10 @@ OF_NAME: Mapping[str, tuple[str, Mapping[str, str], Mapping[str, float], Mapping
 
 
 def rheotool_model(equation: Equation, tolerance: float = TOLERANCE) -> RheoToolModel:
-    """Return the law in rheoTool's words.
-
-    Terms ``sigma`` and ``gammadot`` are another relaxation time and modulus, and are written so.
+    """Return the law in rheoTool's words; ``sigma`` and ``gammadot`` change time and modulus.
 
     `tolerance`: relative deviation from a form of rheoTool's that is passed over. Raises InputError
-    if rheoTool has no such law; says which term is in the way.
+    if rheoTool has no such law, naming the term in the way.
     """
     if equation.named is not None:
         below = equation.named.built().as_terms()

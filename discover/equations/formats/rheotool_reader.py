@@ -16,10 +16,10 @@ _DEEPEST = 20
 
 
 def read_rheotool(text: str) -> Equation:
-    """Return the law of a ``constitutiveProperties`` dictionary.
+    """Return the law of a ``constitutiveProperties`` dictionary; macros and code are not run.
 
-    `text`: the file. Of macros, includes and code streams nothing is carried out. Raises InputError
-    if the text is no such dictionary, or its law is not one that `rheotool_text` writes.
+    Raises InputError if the text is no such dictionary, or its law is not one that `rheotool_text`
+    writes.
     """
     tokens = _TOKEN.findall(_COMMENT.sub(" ", text))
     content, _ = _dictionary(tokens, 0, 0)
@@ -42,13 +42,9 @@ def read_rheotool(text: str) -> Equation:
         named, found = law_parts(named.built())
         terms = tuple(t for t in found if t.coefficient and t.inner.get("epsilon") != 0.0)
     return Equation(
-        terms,
-        moduli,
-        times,
-        solvent_viscosity=sum(solvents),
-        title="rheoTool constitutiveProperties",
-        named=named,
-    )
+        terms, moduli, times, solvent_viscosity=sum(solvents),
+        title="rheoTool constitutiveProperties", named=named,
+    )  # fmt: skip
 
 
 def _mode(entries: dict[str, Any]) -> tuple[str, dict[str, float], float, float, float]:

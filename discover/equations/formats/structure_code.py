@@ -1,7 +1,4 @@
-"""States of the whole fluid in exported Python: a structure that flow breaks, the heat of the flow.
-
-Their fields of the templates are empty where a law has none, so that its text stays as it was.
-"""
+"""States of the whole fluid in exported Python; their fields are empty where a law has none."""
 
 from typing import Any
 

@@ -1,12 +1,20 @@
-"""Laws as LaTeX and MathML."""
+"""Laws as LaTeX, MathML and SymPy expressions."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from discover.equations.parts import NamedPart
-from tensor_library.law_terms import LawTerm
-from tensor_library.notation import LatexNotation, Notation, greek_letter, latex_number, printed
-from tensor_library.terms import parse_term
+from tensor_library import LawTerm, parse_term
+from tensor_library.notation import (
+    LatexNotation,
+    Notation,
+    greek_letter,
+    latex_number,
+    printed,
+)
+
+if TYPE_CHECKING:
+    import sympy
 
 PREAMBLE = """% Written by discover. Dimensionless: stress over modulus, time over relaxation time.
 % The triangle marks the upper convected derivative. Needs amsmath and bm or boldsymbol.
@@ -25,8 +33,7 @@ def law_latex(
 ) -> str:
     """Return a dimensionless law as one LaTeX equation.
 
-    `linear_relaxation`: whether the −σ is there beside h. `named`: A law with a name to whose h the
-    terms are added.
+    `linear_relaxation`: whether the −σ is there. `named`: a law to whose h the terms are added.
     """
     # all on the left, so that each term has the sign that tables and files give it
     text = r"\overset{\nabla}{\boldsymbol{\sigma}}"
@@ -64,10 +71,7 @@ def _factor(term: LawTerm) -> float | None:
 
 
 def latex_letters(named: NamedPart, notation: LatexNotation) -> dict[str, str]:
-    """Return how LaTeX writes the constants and the defined scalars of a law with a name.
-
-    What differs from mode to mode has the index k.
-    """
+    """Return the LaTeX of a named law's constants and defined scalars, with index k by mode."""
     function = named.function
 
     def letter(name: str) -> str:
@@ -171,8 +175,7 @@ def term_mathml(
 ) -> str:
     """Return a term by its canonical spelling, without `math` element.
 
-    `inner`: inner parameters by name; one that is missing stays a letter. `coefficient`: number in
-    front.
+    `inner`: by name; one that is missing stays a letter. `coefficient`: number in front.
     """
     return parse_term(name).spell(MathmlNotation(), coefficient, inner)
 
@@ -183,10 +186,7 @@ def term_element(name: str, inner: Mapping[str, float] | None = None) -> str:
 
 
 class InUnitsNotation(MathmlNotation):
-    """The same in units, for each mode: τ for σ/G, and λ before γ̇.
-
-    `modes`: how many there are; of several each symbol has the index k.
-    """
+    """MathML in units, for each mode: τ for σ/G, and λ before γ̇, with index k of several modes."""
 
     def __init__(self, modes: int):
         index = "<msub>{}<mi>k</mi></msub>" if modes > 1 else "{}"
@@ -205,19 +205,13 @@ _SIGN = "<mo form='infix'>{}</mo>"
 
 
 def law_element(
-    terms: Sequence[LawTerm],
-    linear_relaxation: bool,
-    named: NamedPart | None = None,
-    modes: int = 0,
-    solvent: bool = False,
-    rest: bool = False,
-) -> str:
-    """Return the whole law, displayed; a long one goes on in the next line.
+    terms: Sequence[LawTerm], linear_relaxation: bool, named: NamedPart | None = None,
+    modes: int = 0, solvent: bool = False, rest: bool = False,
+) -> str:  # fmt: skip
+    """Return the whole law, displayed; each summand is a `math` element, so that lines break.
 
-    Browsers do not break a `math` element, so each summand is one of its own.
-
-    `modes`: of a law in Pa and s how many there are; 0 for a dimensionless one. `solvent`: whether
-    a law in Pa and s has a solvent. `rest`: whether it has a summand h that stands elsewhere.
+    `modes`: how many a law in Pa and s has; 0 for a dimensionless one. `solvent`: whether that has
+    one. `rest`: whether it has a summand h that stands elsewhere.
     """
     notation = InUnitsNotation(modes) if modes else MathmlNotation()
     stress, rate = notation.tensor("sigma"), notation.tensor("gammadot")
@@ -263,3 +257,28 @@ def _whole_stress(notation: InUnitsNotation, modes: int, solvent: bool) -> str:
     added = f"<mo>+</mo><msub><mi>η</mi><mi>s</mi></msub>{_TENSORS['gammadot']}" if solvent else ""
     stress = f"{_TENSORS['sigma']}<mo>=</mo>{total}{notation.modulus}{notation.stress}{added}"
     return f"<mspace width='2em'/>{stress}"
+
+
+def extra_term_expression(terms: Sequence[LawTerm], named: NamedPart | None) -> "sympy.Expr":
+    """Return h over the non-commuting tensors of `tensor_library.sympy_notation`.
+
+    Constants that differ from mode to mode, and structure variables, stay letters.
+    """
+    import sympy
+
+    from tensor_library.sympy_notation import SympyNotation
+
+    total: sympy.Expr = sympy.Integer(0)
+    notation = SympyNotation()
+    if named is not None:
+        letters = {name: sympy.Float(value) for name, value in named.constants[0].items()}
+        letters |= {name: sympy.Symbol(name) for name in named.differing}
+        function = named.function
+        letters |= {name: sympy.Symbol(name) for name in (*function.where, *function.rates)}
+        where, summands = function.spell(notation, letters)
+        total = sympy.Add(*summands)
+        for name, value in reversed(where):
+            total = total.subs(letters[name], value)
+    for term in terms:
+        total = total + parse_term(term.term).spell(notation, term.coefficient, term.inner)
+    return total

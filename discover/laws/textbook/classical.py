@@ -109,14 +109,14 @@ _CONTAINS = {"ucm": {"epsilon": 0.0}}
 
 
 class FenePeterlin(AbstractConstitutiveLaw):
-    """FENE-P law   [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
+    """FENE-P law [Bird, Dotson & Johnson 1980, JNNFM 7, 213].
 
-    With the conformation A at equilibrium I, σ = f A − I and f = (L² − 3)/(L² − tr A). Eliminating
-    A gives f = 1 + tr(σ)/L² and, with the upper convected derivative of A equal to −σ,
+    With σ = f A − I and f = (L² − 3)/(L² − tr A) = 1 + tr(σ)/L², eliminating the conformation A
+    gives
 
-        h = (f − 1) σ − (ḟ/f)(σ + I),    ḟ = (tr(σ·γ̇) − f tr σ)/(L² − tr A),
+        h = (f − 1) σ − (ḟ/f)(σ + I),    ḟ = (tr(σ·γ̇) − f tr σ)/(L² − tr A).
 
-    so that the law is one of Maxwell type whose extra term depends on the rate. L² → ∞ is UCM.
+    L² → ∞ is UCM.
     """
 
     maximum_extension_squared: Float[Array, ""] = eqx.field(converter=as_parameter)  # L², over 3

@@ -1,5 +1,7 @@
 """Extended pom-pom law of branched melts."""
 
+from typing import ClassVar
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -27,10 +29,7 @@ class ExtendedPomPom(AbstractConstitutiveLaw):
     anisotropy: Float[Array, ""] = eqx.field(converter=as_parameter)  # α
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract."""
-        return True
+    retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h(σ) as above."""

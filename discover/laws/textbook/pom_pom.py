@@ -1,19 +1,13 @@
 """Pom-pom law of branched melts, differential: a backbone that turns, stretches and ends."""
 
 from functools import partial
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import (
-    AbstractConstitutiveLaw,
-    NamedLaw,
-    State,
-    as_parameter,
-    as_state,
-    stress_in,
-)
+from discover.laws import base
 from discover.laws.textbook.extended_pom_pom import NAMED as EXTENDED
 from discover.laws.textbook.rolie_poly import stretch_of
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
@@ -26,7 +20,7 @@ _ONE_ARM = 1e-3
 """The least of q − 1 in a division."""
 
 
-class PomPom(AbstractConstitutiveLaw):
+class PomPom(base.AbstractConstitutiveLaw):
     """Differential pom-pom law   [McLeish & Larson 1998, J. Rheol. 42, 81].
 
     A backbone of orientation S and stretch Λ, with q arms at each end, of which S follows an
@@ -47,24 +41,17 @@ class PomPom(AbstractConstitutiveLaw):
     A is positive definite in every flow, and with it σ + I.
     """
 
-    arms: Float[Array, ""] = eqx.field(converter=as_parameter)  # q
-    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # λ_s/λ
+    arms: Float[Array, ""] = eqx.field(converter=base.as_parameter)  # q
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=base.as_parameter)  # λ_s/λ
     drag_strain: bool = eqx.field(static=True, default=False)
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def variables(self) -> int:
-        """One, y."""
-        return 1
+    variables: ClassVar[int] = 1
+    retracts: ClassVar[bool] = True
 
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract."""
-        return True
-
-    def extra_term(self, stress: State, rate: Symmetric) -> State:
+    def extra_term(self, stress: base.State, rate: Symmetric) -> base.State:
         """Return h(σ, y, γ̇) as above, and of y what its change is short of −y."""
-        sigma, y = stress_in(stress), stress[4]
+        sigma, y = base.stress_in(stress), stress[4]
         one = identity_like(sigma)
         stretch = stretch_of(sigma)
         growth = inner(sigma + one, rate) / (3.0 * stretch**2)  # S:γ̇
@@ -80,7 +67,7 @@ class PomPom(AbstractConstitutiveLaw):
         turning = jnp.exp(-jnp.maximum(y, -50.0))
         deviator = sigma - trace(sigma) / 3.0 * one
         extra = turning * deviator - sigma + (retraction + halted) * (sigma + one)
-        return as_state(extra, stress).at[4].set(1.0 - turning - y - growth)
+        return base.as_state(extra, stress).at[4].set(1.0 - turning - y - growth)
 
 
 def _written(drag_strain: bool = False) -> IsotropicFunction:
@@ -109,7 +96,7 @@ _RANGES = {name: ends for name, ends in EXTENDED["xpp"].parameters.items() if na
 _RANGE_SOURCES = {name: EXTENDED["xpp"].range_sources[name] for name in _RANGES}
 
 NAMED = {
-    "pom_pom": NamedLaw(
+    "pom_pom": base.NamedLaw(
         "pom-pom",
         PomPom,
         _RANGES,
@@ -117,7 +104,7 @@ NAMED = {
         source="McLeish & Larson 1998, J. Rheol. 42, 81",
         written=_written,
     ),
-    "pom_pom_drag_strain": NamedLaw(
+    "pom_pom_drag_strain": base.NamedLaw(
         "pom-pom with drag-strain coupling",
         partial(PomPom, drag_strain=True),
         _RANGES,

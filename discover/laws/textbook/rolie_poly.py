@@ -1,10 +1,13 @@
 """Rolie–Poly law of entangled linear chains, with stretch, without end or with one."""
 
+from typing import ClassVar
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, as_parameter
+from discover.laws.base import AbstractConstitutiveLaw, NamedLaw, State, as_parameter
 from tensor_library.algebra import Symmetric, identity_like, inner, trace
 from tensor_library.isotropic_function import IsotropicFunction, scalars
 
@@ -12,24 +15,20 @@ _EXPONENT = -0.5  # δ of Likhtman & Graham
 
 
 class RoliePoly(AbstractConstitutiveLaw):
-    """Rolie–Poly law   [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11].
+    """Rolie–Poly law [Likhtman & Graham 2003, JNNFM 114, 1, eq. 11].
 
     In the conformation A = I + σ, of stretch Λ = √(tr A/3),
 
         h = 2 (λ/τ_R)(1 − 1/Λ)(A + β Λ^{2δ} σ),    δ = −1/2:
 
-    beside reptation, with λ, a stretched chain retracts within its Rouse time τ_R and releases
-    constraints of others.
+    beside reptation a stretched chain retracts in its Rouse time τ_R and releases constraints.
     """
 
     stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_R/λ
     constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract."""
-        return True
+    retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h(σ) as above."""
@@ -41,10 +40,9 @@ class RoliePoly(AbstractConstitutiveLaw):
 
 
 class FiniteRoliePoly(AbstractConstitutiveLaw):
-    """Rolie–Poly law of chains that end   [Kabanemi & Hétu 2009, JNNFM 160, 113].
+    """Rolie–Poly law of chains that end [Kabanemi & Hétu 2009, JNNFM 160, 113].
 
-    Springs are k(Λ) times as stiff as Hooke's, both in the stress and in the retraction; k is
-    Cohen's function, one at rest and without bound at Λ_m:
+    Springs are k(Λ) times as stiff as Hooke's, k being Cohen's function, without bound at Λ_m:
 
         σ = k (A − I),    A▽ = −(A − I) − r (A + β Λ^{2δ} (A − I)),    r = 2 (λ/τ_R) k (1 − 1/Λ),
         k = (3 − Λ²/m)(1 − 1/m) / [(1 − Λ²/m)(3 − 1/m)],    m = Λ_m².
@@ -57,10 +55,7 @@ class FiniteRoliePoly(AbstractConstitutiveLaw):
     maximum_stretch: Float[Array, ""] = eqx.field(converter=as_parameter)  # Λ_m
     linear_relaxation: bool = eqx.field(static=True, default=True)
 
-    @property
-    def retracts(self) -> bool:
-        """Whether chains retract."""
-        return True
+    retracts: ClassVar[bool] = True
 
     def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
         """Return h = (1 − k) γ̇ + k r (A + β Λ^{2δ} (A − I)) − (k̇/k) σ."""
@@ -102,11 +97,68 @@ def _logarithmic_slope(squared, limit):
     return 2.0 / (limit * (3.0 - squared / limit) * (1.0 - squared / limit))
 
 
-def stretch_of(stress: Symmetric) -> Float[Array, ""]:
-    """Return Λ = √(tr A/3) of the conformation A = I + σ, as a chain that is never shorter than 0.
+class RoliePolyBlend(AbstractConstitutiveLaw):
+    """Rolie–Double–Poly law of two components [Boudara et al. 2019, J. Rheol. 63, 71].
 
-    Only trial steps of an integrator come near that bound.
+    A_ij is the conformation of component i along its entanglements with j; A_i = Σ_j φ_j A_ij, Λ_i
+    = √(tr A_i/3):
+
+        σ = Σ_i φ_i (A_i − I),
+        A_ij▽ = −½ (1/τ_i + 1/τ_j)(A_ij − I) − r_i A_ij − β r_j Λ_i^{2δ} (A_ij − I),
+        r_i = (2/τ_s,i)(1 − 1/Λ_i),    δ = −1/2.
+
+    The long chains' τ is λ. The four A_ij − I stand behind σ in the state, long before short; a
+    term added to h relaxes in λ. All long is `RoliePoly`.
     """
+
+    long_fraction: Float[Array, ""] = eqx.field(converter=as_parameter)  # φ of the long chains
+    short_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ/λ of short ones
+    stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_s/τ, long
+    short_stretch_time_ratio: Float[Array, ""] = eqx.field(converter=as_parameter)  # τ_s/τ, short
+    constraint_release: Float[Array, ""] = eqx.field(converter=as_parameter)  # β
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    tensors: ClassVar[int] = 4
+    variables: ClassVar[int] = 16
+    retracts: ClassVar[bool] = True
+
+    def _times(self) -> tuple[Float[Array, "2"], Float[Array, "2"]]:
+        """Return τ_i and τ_s,i over λ."""
+        own = jnp.stack([jnp.ones_like(self.short_time_ratio), self.short_time_ratio])
+        ratios = jnp.stack([self.stretch_time_ratio, self.short_stretch_time_ratio])
+        return own, own * ratios
+
+    def relaxations(self) -> Float[Array, "5 2"]:
+        """Return the rates beside −1 at which σ and each tensor relax at rest, and their traces."""
+        times, stretching = self._times()
+        lost = 0.5 * (1.0 / times[:, None] + 1.0 / times[None, :]) - 1.0
+        faster = jnp.broadcast_to(1.0 / stretching[:, None], (2, 2))
+        of_pairs = jnp.stack([lost.ravel(), faster.ravel()], axis=1)
+        return jnp.concatenate([jnp.zeros((1, 2)), of_pairs])
+
+    def shares(self) -> Float[Array, "4"]:
+        """Return φ_i φ_j."""
+        share = jnp.stack([self.long_fraction, 1.0 - self.long_fraction])
+        return (share[:, None] * share[None, :]).ravel()
+
+    def extra_term(self, stress: State, rate: Symmetric) -> State:
+        """Return h of σ, and of each A_ij − I what its change is short of −(A_ij − I)."""
+        del rate
+        pairs = stress[4:].reshape(2, 2, 4)
+        share = jnp.stack([self.long_fraction, 1.0 - self.long_fraction])
+        times, stretching = self._times()
+        stretch = jax.vmap(stretch_of)(jnp.tensordot(share, pairs, axes=(0, 1)))
+        retraction = 2.0 / stretching * (1.0 - 1.0 / stretch)
+        lost = 0.5 * (1.0 / times[:, None] + 1.0 / times[None, :])
+        released = self.constraint_release * stretch[:, None] ** (2.0 * _EXPONENT) * retraction
+        whole = (lost - 1.0 + retraction[:, None] + released)[..., None] * pairs
+        extra = whole + retraction[:, None, None] * identity_like(stress[:4])
+        total = jnp.tensordot(self.shares(), extra.reshape(4, 4), axes=1)
+        return jnp.concatenate([total, extra.ravel()])
+
+
+def stretch_of(stress: Symmetric) -> Float[Array, ""]:
+    """Return Λ = √(tr A/3) of A = I + σ, bounded from below for trial steps of integrators."""
     return jnp.sqrt(jnp.maximum(1.0 + trace(stress) / 3.0, 1e-12))
 
 
@@ -173,5 +225,33 @@ NAMED = {
         source="Kabanemi & Hétu 2009, J. Non-Newtonian Fluid Mech. 160, 113",
         written=_written_finite,
         contains={"rolie_poly": {"maximum_stretch": 100.0}},
+    ),
+    "rolie_poly_blend": NamedLaw(
+        "Rolie–Poly blend of two lengths",
+        RoliePolyBlend,
+        {
+            "long_fraction": (0.0, 1.0),
+            "short_time_ratio": (1e-4, 1.0),
+            "stretch_time_ratio": _RANGES["stretch_time_ratio"],
+            "short_stretch_time_ratio": _RANGES["stretch_time_ratio"],
+            "beta": _RANGES["beta"],
+        },
+        {
+            "long_fraction": "a share of the volume",
+            "short_time_ratio": "Likhtman & Graham 2003: τ_d grows as the cube of the length; a "
+            "blend of lengths that differ twentyfold has 1e-4",
+            "stretch_time_ratio": _RANGE_SOURCES["stretch_time_ratio"],
+            "short_stretch_time_ratio": _RANGE_SOURCES["stretch_time_ratio"],
+            "beta": _RANGE_SOURCES["beta"],
+        },
+        source="Boudara, Peterson, Leal & Read 2019, J. Rheol. 63, 71",
+        is_one_mode=False,
+        contains={
+            "rolie_poly": {
+                "long_fraction": 1.0,
+                "short_time_ratio": 1.0,
+                "short_stretch_time_ratio": 1.0,
+            }
+        },
     ),
 }

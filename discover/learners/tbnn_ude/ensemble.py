@@ -1,16 +1,10 @@
-"""Several networks that reach the data by different ways.
+"""Ensemble of networks that reach the data by different ways.
 
-Shear stress cannot tell many laws apart, and one network is one of them. Weights alone do not make
-members honest: on the same tensors they end in the same law. So the ways differ too.
-
-- Where coefficients vary, laws that were less likely than the first are members, whether they have
-  few tensors or vary little. The others take turns: one starts from the tensor that came next in
-  the race, one has the tensors that won it, with initial weights of its own. Without a race they
-  are drawn from what the data leave of the first one's weights.
-- Where constants suffice no initial weight takes part, and members learn from halves of the runs.
-
-What those disagree on that fit all data, the data leave open. They share the compiled programs of
-the first, and none repeats its search.
+Shear stress cannot distinguish many laws, and networks with other weights on the same tensors end
+in the same one, so the ways differ: less likely laws that were met, other first tensors, other
+initial weights, or draws from what the data leave of the weights. Where constants suffice, members
+learn from halves of the runs. What those that fit disagree on, the data leave open. All share the
+compiled programs of the first.
 """
 
 from collections.abc import Sequence
@@ -21,8 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws import Fluid, TensorBasisNetwork
 from discover.learners.tbnn_ude.evidence import posterior_draws
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit
 from discover.learners.tbnn_ude.problem import DefaultRecipe, Trained, TrainingProblem
@@ -83,10 +76,7 @@ def train_others(
 def halves_of_runs(
     n_runs: int, n_halves: int, key: Key[Array, ""]
 ) -> list[Bool[np.ndarray, " runs"]]:
-    """Return halves of the runs: every other one, the rest, then at random.
-
-    Runs come in an order, of rate or of frequency, so every other one covers the range.
-    """
+    """Return halves of the runs: every other one (they are ordered), the rest, then at random."""
     even = np.arange(n_runs) % 2 == 0
     halves = [even, ~even]
     rng = np.random.default_rng(np.asarray(jax.random.key_data(key)))
@@ -95,7 +85,7 @@ def halves_of_runs(
 
 
 def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
-    """Return the problem with only some of the runs looked at; its shapes stay the same."""
+    """Return the problem with only some of the runs counting; its shapes stay the same."""
     return replace(problem, records=problem.records.only(jnp.asarray(runs)))
 
 
@@ -107,12 +97,10 @@ def choose_member(
 ) -> tuple[int, Bool[np.ndarray, " members"]]:
     """Return the member to be reported, and which ones fit.
 
-    The likeliest of those that fit; without noise, the fewest varying tensors among those of nearly
-    the least misfit. A median of laws would be no law.
-
-    `members`: all of them; where constants suffice the first alone has seen all runs and is taken.
-    `misfits`: relative misfit of each on all runs. `resolved`: relative misfit that a rheometer
-    does not resolve. `surprise`: from `evidence.surprises`, where noise hides more than that.
+    The likeliest of those that fit; without noise the fewest varying tensors near the least misfit.
+    `misfits`: relative, on all runs; where constants suffice the first member is taken. `resolved`:
+    relative misfit that a rheometer does not resolve. `surprise`: from `surprises`, where noise
+    hides more.
     """
     least = float(np.min(misfits))
     fits = misfits <= max(FITS * least, resolved)
@@ -135,7 +123,7 @@ def member_misfits(
 
 @dataclass(frozen=True)
 class MemberPredictions:
-    """What every member of an ensemble predicts in one flow.
+    """Predictions of every member of an ensemble in one flow.
 
     `sigma12`, `N1`, `N2` in Pa, shape (members, n); nan throughout for a member that diverges.
     """
@@ -146,10 +134,7 @@ class MemberPredictions:
     N2: Float[np.ndarray, "members n"]
 
     def band(self, quantity: str) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
-        """Return the lowest and the highest prediction at each time; nan where all diverged.
-
-        `quantity`: ``"sigma12"``, ``"N1"`` or ``"N2"``.
-        """
+        """Return the lowest and highest ``sigma12``, ``N1`` or ``N2`` at each time."""
         values = getattr(self, quantity)
         kept = values[~np.any(np.isnan(values), axis=1)]
         if not len(kept):
@@ -160,10 +145,7 @@ class MemberPredictions:
 def member_predictions(
     fluids: Sequence[Fluid], protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> MemberPredictions:
-    """Return what is recorded of every member in a flow, and its normal stress differences.
-
-    `fluids`: the members, as `TBNNUDE.ensemble_fluids_` holds them.
-    """
+    """Return what is recorded of every member in a flow, and its normal stress differences."""
     rows = np.full((3, len(fluids), len(times)), np.nan)
     for i, fluid in enumerate(fluids):
         try:

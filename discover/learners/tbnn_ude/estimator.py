@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -15,29 +15,16 @@ from sklearn.utils.validation import check_is_fitted
 from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.forward.fluids import in_enough_steps, observed_in_batch
-from discover.forward.grids.flow_batch import lay_out
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
-from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
 from discover.learners.runs import rough_limits, shortened_rightly, shorter_where_it_pays
-from discover.learners.settings import PerMode, default_library
-from discover.learners.tbnn_ude.ensemble import (
-    MemberPredictions,
-    choose_member,
-    coefficient_spread,
-    member_misfits,
-    member_predictions,
-    train_others,
-)
+from discover.learners.settings import KnownPart, PerMode, default_library
+from discover.learners.tbnn_ude import ensemble
 from discover.learners.tbnn_ude.evidence import surprises
 from discover.learners.tbnn_ude.least_squares import Cloud, law_misfit, sample_states
 from discover.learners.tbnn_ude.problem import (
-    STRAIN_STEP,
     DefaultRecipe,
     Trained,
     TrainingProblem,
@@ -47,12 +34,12 @@ from discover.learners.tbnn_ude.projection import Projection, project
 from discover.learners.tbnn_ude.recipes import PaperRecipe, train_default, train_paper, work
 from discover.progress import Progress, by_steps
 from discover.protocols.protocol import FlowProtocol
-from tensor_library.algebra import TENSOR_NAMES
-from tensor_library.library import TermLibrary
+from tensor_library import TENSOR_NAMES, TermLibrary
 
 RECIPES = ("default", "thorough", "paper")
 
 
+@dataclass(eq=False, repr=False)
 class TBNNUDE(RunPrediction):
     """A tensor-basis neural network inside the differential equation, from shear stress alone.
 
@@ -120,47 +107,21 @@ class TBNNUDE(RunPrediction):
     """
 
     learner = "tbnn_ude"
-    _saved = (
-        "n_features_in_",
-        "law_",
-        "fluid_",
-        "terms_",
-        "result_",
-        "members_",
-        "ensemble_fluids_",
-        "ensemble_",
-        "fitting_",
-        "provenance_",
-    )
+    _saved = (*RunPrediction._saved, "members_", "ensemble_fluids_", "ensemble_", "fitting_")
     _saved_types = (LearnerResult, RecoveredTerm, DefaultRecipe, PaperRecipe, Provenance)
 
-    def __init__(
-        self,
-        recipe: str | DefaultRecipe | PaperRecipe = "default",
-        modulus: PerMode = 1.0,
-        relaxation_time: PerMode = 1.0,
-        known_relaxation: bool = True,
-        base_law: AbstractConstitutiveLaw | None = None,
-        n_members: int = 3,
-        projection_library: TermLibrary | None = None,
-        quick: bool = False,
-        random_state: int = 0,
-        progress: Progress | None = None,
-        base: Fluid | None = None,
-        solvent_viscosity: float = 0.0,
-    ):
-        self.recipe = recipe
-        self.modulus = modulus
-        self.relaxation_time = relaxation_time
-        self.known_relaxation = known_relaxation
-        self.base_law = base_law
-        self.n_members = n_members
-        self.projection_library = projection_library
-        self.quick = quick
-        self.random_state = random_state
-        self.progress = progress
-        self.base = base
-        self.solvent_viscosity = solvent_viscosity
+    recipe: str | DefaultRecipe | PaperRecipe = "default"
+    modulus: PerMode = 1.0
+    relaxation_time: PerMode = 1.0
+    known_relaxation: bool = True
+    base_law: AbstractConstitutiveLaw | None = None
+    n_members: int = 3
+    projection_library: TermLibrary | None = None
+    quick: bool = False
+    random_state: int = 0
+    progress: Progress | None = None
+    base: Fluid | None = None
+    solvent_viscosity: float = 0.0
 
     def _learn(self, runs: list[Run], known: KnownPart, shorten: bool = True) -> None:
         started = time.perf_counter()
@@ -184,11 +145,11 @@ class TBNNUDE(RunPrediction):
         keys = jax.random.split(jax.random.key(self.random_state), self.n_members)
         trained, agreement = self._train_all(problem, keys, recipe, known)
         members = [member.law for member in trained]
-        misfits = member_misfits(members, problem)
+        misfits = ensemble.member_misfits(members, problem)
         resolved, surprise = _resolved(recipe), None
         if isinstance(recipe, DefaultRecipe) and np.min(misfits) > resolved and trained[0].varies:
             surprise = surprises(members, problem)
-        chosen, fits = choose_member(trained, misfits, resolved, surprise)
+        chosen, fits = ensemble.choose_member(trained, misfits, resolved, surprise)
         best = replace(trained[chosen], misfit=float(misfits[chosen]))
 
         self.members_ = members
@@ -224,7 +185,7 @@ class TBNNUDE(RunPrediction):
                 "n_constants": _count_of_numbers(best.law, best.varies),
                 "projection_misfit": projection.misfit,
                 "ensemble": agreement,
-                "coefficient_spread_of_members": coefficient_spread(members, cloud),
+                "coefficient_spread_of_members": ensemble.coefficient_spread(members, cloud),
                 "members": [
                     {
                         "misfit": float(misfit),
@@ -240,7 +201,7 @@ class TBNNUDE(RunPrediction):
 
     def predict_members(
         self, protocol: FlowProtocol, times: Float[np.ndarray, " n"]
-    ) -> MemberPredictions:
+    ) -> ensemble.MemberPredictions:
         """Return σ12, N1 and N2 of every member in a flow, with their bands.
 
         Parameters
@@ -249,18 +210,7 @@ class TBNNUDE(RunPrediction):
             Any flow, also one that no training saw; times in s, shape (n,), from 0 on.
         """
         check_is_fitted(self, "ensemble_fluids_")
-        return member_predictions(self.ensemble_fluids_, protocol, times)
-
-    def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
-        flows = lay_out(
-            [run.protocol for run in runs],
-            [run.time for run in runs],
-            strain_step=STRAIN_STEP,
-            relaxation_time=self.fluid_.settling_time,
-        )
-        flows = in_enough_steps(self.fluid_, flows)
-        observed = np.asarray(observed_in_batch(self.fluid_, flows))
-        return [observed[i, : len(run), 0] for i, run in enumerate(runs)]
+        return ensemble.member_predictions(self.ensemble_fluids_, protocol, times)
 
     def _recipe(self) -> DefaultRecipe | PaperRecipe:
         if isinstance(self.recipe, DefaultRecipe | PaperRecipe):
@@ -291,7 +241,7 @@ class TBNNUDE(RunPrediction):
                     pool.map(lambda key: self._train(problem, key, recipe, known, say), keys[1:])
                 )
             return [first, *others], "trained from initial weights of their own"
-        others, agreement = train_others(problem, first, keys[1:], recipe, say)
+        others, agreement = ensemble.train_others(problem, first, keys[1:], recipe, say)
         return [first, *others], agreement
 
     def _train(self, problem: TrainingProblem, key, recipe, known: KnownPart, say) -> Trained:
@@ -310,14 +260,9 @@ def _resolved(recipe: DefaultRecipe | PaperRecipe) -> float:
 
 def _problem(runs: Sequence[Run], known: KnownPart, **limits: float) -> TrainingProblem:
     return make_problem(
-        runs,
-        known.modulus,
-        known.relaxation_time,
-        solvent_viscosity=known.solvent_viscosity,
-        known_relaxation=known.linear_relaxation,
-        base=known.law,
-        **limits,
-    )
+        runs, known.modulus, known.relaxation_time, solvent_viscosity=known.solvent_viscosity,
+        known_relaxation=known.linear_relaxation, base=known.law, **limits,
+    )  # fmt: skip
 
 
 _WORTH_TRAINING_ON = 1.5

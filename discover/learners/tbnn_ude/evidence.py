@@ -1,12 +1,10 @@
-"""Which of several laws that fit noisy data alike is the likelier, by what each had to be told.
+"""Laplace evidence of laws that fit noisy data alike, which penalises those that follow the noise.
 
-Two laws may leave the same noise and yet differ in what they took to get there: the one is smooth,
-the other bends wherever the noise does. The evidence of Laplace's approximation counts that: with
-weights w of a standard normal prior and Jacobian J of the residuals in units of the noise,
+With weights w of a standard normal prior and Jacobian J of the residuals over the noise,
 
     −2 ln E = χ² + |w|² + ln det(1 + JᵀJ),
 
-up to a constant that all laws share   [MacKay 1992, Neural Computation 4, 448].
+up to a common constant [MacKay 1992, Neural Computation 4, 448].
 """
 
 from collections.abc import Sequence
@@ -18,15 +16,9 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
 from discover.laws.tensor_basis_network import TensorBasisNetwork
+from discover.learners.tbnn_ude import variational
 from discover.learners.tbnn_ude.least_squares import cloud_of, law_misfit, relative_misses
 from discover.learners.tbnn_ude.problem import TrainingProblem
-from discover.learners.tbnn_ude.variational import (
-    Along,
-    Rebuild,
-    rebuilt,
-    side_by_side,
-    trajectories,
-)
 
 
 def surprises(
@@ -34,13 +26,10 @@ def surprises(
 ) -> Float[np.ndarray, " laws"]:
     """Return −2 ln E of every law; the least is the likeliest.
 
-    It is infinite for a law that diverges, if there is one that does not: in the training flows,
-    or in the same flows at twice the rate, in which every fluid has a finite stress.
-
-    The noise is what the best of them leaves. Where that is correlated, so that no law of these is
-    the whole one, its samples count as fewer, as a first-order autoregression has it.
+    Infinite for a law that diverges in the training flows, or in them at twice the rate, if another
+    does not. The noise is what the best law leaves; correlated samples count as fewer (AR(1)).
     """
-    along = [trajectories(law, problem) for law in laws]
+    along = [variational.trajectories(law, problem) for law in laws]
     misses = [np.asarray(relative_misses(one, problem)) for one in along]
     squares = np.array([np.sum(one**2) for one in misses])
     squares = np.where(np.isfinite(squares), squares, np.inf)
@@ -61,7 +50,7 @@ def endures(law: TensorBasisNetwork, problem: TrainingProblem) -> bool:
     """Return whether a law's stress stays finite in the training flows at twice the rate."""
     twice = problem.flows.faster(jnp.full(len(problem.flows), 2.0))
     faster = eqx.tree_at(lambda tree: tree.flows, problem, twice)
-    return bool(np.all(np.isfinite(np.asarray(trajectories(law, faster).states))))
+    return bool(np.all(np.isfinite(np.asarray(variational.trajectories(law, faster).states))))
 
 
 def posterior_draws(
@@ -69,13 +58,10 @@ def posterior_draws(
 ) -> list[TensorBasisNetwork]:
     """Return laws around a trained one that fit the data about as well.
 
-    They are drawn from the Gaussian of Laplace's approximation. Where the law is bent, or the noise
-    correlated, it reaches beyond the laws that fit: a draw is halved until it does.
-
-    `law`: trained on the problem, with coefficients that vary. `keys`: one for each draw. `fits`:
-    largest relative misfit over that of the law.
+    Drawn from Laplace's Gaussian, and halved until the relative misfit is at most `fits` times that
+    of the law. `keys`: one for each draw.
     """
-    along = trajectories(law, problem)
+    along = variational.trajectories(law, problem)
     misses = np.asarray(relative_misses(along, problem))
     least = float(np.sqrt(np.sum(misses**2)))
     precision = _independent(misses, problem.records.seen) / max(least**2, 1e-300)
@@ -88,7 +74,7 @@ def posterior_draws(
         step = np.zeros_like(start)
         step[acts] = spread @ np.asarray(jax.random.normal(key, (spread.shape[1],)))
         for _ in range(_HALVINGS):
-            drawn = rebuilt(rebuild, jnp.asarray(start + step))
+            drawn = variational.rebuilt(rebuild, jnp.asarray(start + step))
             left = np.asarray(law_misfit(drawn, problem))
             if np.max(np.abs(left)) < np.inf and np.linalg.norm(left) <= fits * least:
                 found.append(drawn)
@@ -101,7 +87,7 @@ _HALVINGS = 8
 
 
 def _told(
-    law: TensorBasisNetwork, along: Along, problem: TrainingProblem, precision: float
+    law: TensorBasisNetwork, along: variational.Along, problem: TrainingProblem, precision: float
 ) -> float:
     """Return |w|² + ln det(1 + JᵀJ), over the weights that act."""
     rebuild, acts, columns = _sensitivities(law, along, problem)
@@ -111,23 +97,23 @@ def _told(
 
 
 def _sensitivities(
-    law: TensorBasisNetwork, along: Along, problem: TrainingProblem
-) -> tuple[Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
-    """Return the weights of a law, which of them act, and what those change of the residuals."""
+    law: TensorBasisNetwork, along: variational.Along, problem: TrainingProblem
+) -> tuple[variational.Rebuild, Bool[np.ndarray, " p"], Float[np.ndarray, "rows q"]]:
+    """Return the weights of a law, which of them act, and their derivatives of the residuals."""
     cloud = cloud_of(along, problem)
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     moving = (np.asarray(law.network_mask) > 0) | (np.asarray(law.constants) != 0.0)
     varies = np.any(np.asarray(law.network_mask) > 0)
-    make = Rebuild.with_network if varies else Rebuild.of_constants
+    make = variational.Rebuild.with_network if varies else variational.Rebuild.of_constants
     rebuild = make(law, moving, 1.0 / jnp.maximum(size, 1e-6))
-    _, jacobian = side_by_side(rebuild.start, rebuild, problem)
+    _, jacobian = variational.side_by_side(rebuild.start, rebuild, problem)
     acts = np.asarray(rebuild.moves)
     _, columns = problem.records.linearised(along.recorded, jacobian)
     return rebuild, acts, np.asarray(columns)[..., acts].reshape(-1, int(np.sum(acts)))
 
 
 def _independent(misses: Float[np.ndarray, "runs n"], mask: np.ndarray) -> float:
-    """Return how many independent samples the residuals are worth."""
+    """Return the effective number of independent samples of the residuals."""
     pairs = mask[:, 1:] & mask[:, :-1]
     product = np.sum(np.where(pairs, misses[:, 1:] * misses[:, :-1], 0.0))
     correlation = np.clip(product / max(float(np.sum(misses**2)), 1e-300), 0.0, 0.99)

@@ -22,8 +22,7 @@ from discover.learners.tbnn_ude.variational import (
     trajectories,
 )
 from discover.programs import compiled, on_device
-from tensor_library.algebra import inner, integrity_basis
-from tensor_library.kinematics import rate_of_deformation
+from tensor_library import inner, integrity_basis, rate_of_deformation
 
 STATES_PER_RUN = 8
 """Enough to see where a coefficient varies; every state is 16 rows of each least-squares step."""
@@ -35,9 +34,8 @@ _FLOOR = 1e-4
 class Cloud(eqx.Module):
     """States along the trajectories of a law, at which a network is looked at.
 
-    `weight`: what a state counts for, shape (m,): one where there is one mode. Of several modes
-        each counts by its modulus over the stress of the run: a slow one's dimensionless stress may
-        be a million, and its modulus too small for the record to show it.
+    `weight`: one for a single mode; else modulus over stress of the run, as a slow mode's
+    dimensionless stress may be huge and invisible. Shape (m,).
     """
 
     stress: Float[Array, "m 4"]  # dimensionless stress of a mode, shape (m, 4)
@@ -122,10 +120,9 @@ def reweighted(
 
 
 def least_variation(strength: float | Float[Array, ""]) -> PriorWeights:
-    """Return the weights of a plain quadratic penalty on variation, the same for every tensor.
+    """Return the weights of a quadratic penalty κ on variation, the same for every tensor.
 
-    `strength`: κ. Amounts are penalised 1e-5 times as much: only where the data say nothing of
-    them.
+    Amounts are penalised 1e-5 times as much: only where the data say nothing of them.
     """
     every = strength * jnp.ones(N_COEFFICIENTS)
     return PriorWeights(1e-5 * every, every)
@@ -140,18 +137,17 @@ _MORE_DAMPING, _LESS_DAMPING = 4.0, 1.0 / 3.5
 
 
 class Linearised(NamedTuple):
-    """An objective around some parameters: residuals (rows,), and derivatives (rows, p)."""
+    """Objective around some parameters: residuals (rows,), and derivatives (rows, p)."""
 
     rows: Float[Array, " rows"]
     matrix: Float[Array, "rows p"]
 
 
 class Steps:
-    """A descent step by step, each from a linearisation that is computed elsewhere.
+    """Levenberg–Marquardt descent step by step, from linearisations computed elsewhere.
 
-    Levenberg–Marquardt with the damping of a trust region   [Moré 1978, The Levenberg-Marquardt
-    algorithm; constants: Gould et al. 2005, 4OR 3, 227, as optimistix has them], in NumPy: for
-    every number of rows and parameters a program would take longer to compile than its steps take.
+    Damping of a trust region [Moré 1978; constants: Gould et al. 2005, 4OR 3, 227, as optimistix],
+    in NumPy: a program for each shape would take longer to compile than its steps take.
 
     Attributes
     ----------
@@ -168,10 +164,7 @@ class Steps:
         self._known: tuple[np.ndarray, ...] | None = None
 
     def take(self, linearised: Linearised) -> None:
-        """Take the step to the trial if it is one down, and find the next trial.
-
-        A trial whose residuals are not finite is none down.
-        """
+        """Take the step to the trial if it goes down, and find the next trial."""
         rows, matrix = (_OF_WEIGHTS * np.asarray(part) for part in linearised)
         with np.errstate(over="ignore", invalid="ignore"):  # of a trial that runs away
             if self._known is None or self._is_down(rows):
@@ -208,10 +201,7 @@ Integrate = Callable[[Array, Rebuild, TrainingProblem], tuple[Along, Float[Array
 
 
 class Objective(eqx.Module):
-    """What a round of training minimises, apart from the weights.
-
-    `cloud`, `prior`: where the prior looks, and how strong it is.
-    """
+    """Objective of a round of training: problem, law, and where and how strong the prior is."""
 
     problem: TrainingProblem
     rebuild: Rebuild  # which weights move, and the law around them
@@ -224,8 +214,8 @@ def linearise(
 ) -> Linearised:
     """Return the objective around some weights.
 
-    The integration is a program of its own, apart from the solver's step: compiled inside it, it
-    took as long again. Outside of a transformation it may be done by `side_by_side`.
+    The integration is a program apart from the solver's step: inside it, it compiles as long again.
+    Outside of a transformation it may be done by `side_by_side`.
     """
     along, jacobian = integrate(weights, objective.rebuild, objective.problem)
     return _with_prior(weights, objective, along, jacobian)
@@ -244,13 +234,11 @@ def _with_prior(weights, objective, along, jacobian):
 
 
 class Stopping:
-    """Decides when a descent has ended: at its target, or when steps no longer pay.
+    """Stopping rule of a descent: at its target, or when steps no longer pay.
 
-    A rejected step is no sign of an end: it teaches the damping. Only steps taken count, unless
-    one rejection follows another. Of two descents that compete, the one far behind is given up.
-
-    `target`: misfit that is accepted. `pace`: misfits of a rival after each of its steps, or
-    None.
+    Rejected steps teach the damping, so only steps taken count, unless many are rejected in a row.
+    `target`: misfit that is accepted. `pace`: misfits of a rival after each of its steps; a descent
+    far behind it is given up.
     """
 
     def __init__(self, target: float, pace: Sequence[float] | None = None):
@@ -292,21 +280,13 @@ def relative_misses(along: Along, problem: TrainingProblem) -> Float[Array, "run
 
 
 def minimise(
-    weights: Float[Array, " p"],
-    objective: Objective,
-    steps: int,
-    callback: Callback | None = None,
-    target: float = 0.0,
-    pace: Sequence[float] | None = None,
-) -> Float[Array, " p"]:
+    weights: Float[Array, " p"], objective: Objective, steps: int, callback: Callback | None = None,
+    target: float = 0.0, pace: Sequence[float] | None = None,
+) -> Float[Array, " p"]:  # fmt: skip
     """Return better weights after at most `steps` Levenberg–Marquardt steps.
 
-    A step to weights whose trajectories diverge has a misfit that is not finite; it is rejected
-    and the damping grows.
-
-    `weights`: where to start. `steps`: largest number of steps. `callback`: called after every step
-    with the relative misfit of the best weights. `target`: stop when the norm of all residuals is
-    below this. `pace`: misfits of a rival after each of its steps: stop when far behind it.
+    `callback`: called after every step with the relative misfit of the best weights. `target`,
+    `pace`: as of `Stopping`.
     """
     descent, stopping = Steps(weights), Stopping(target, pace)
     for _ in range(steps):

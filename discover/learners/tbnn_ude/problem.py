@@ -1,4 +1,4 @@
-"""The training data of a network, laid out for batched integration."""
+"""Training problem of a network, laid out for batched integration, and its recipe."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,10 +14,7 @@ from discover.dataset.run import Run
 from discover.forward import Records
 from discover.forward.fluids import observed_on_grid
 from discover.forward.grids.flow_batch import FlowBatch
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.multimode import Fluid
-from discover.laws.tensor_basis_network import TensorBasisNetwork
-from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
 from discover.learners.runs import laid_out
 from discover.programs import on_device
 from discover.statistics.noise.noise_model import rms
@@ -31,9 +28,8 @@ _IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
 class TrainingProblem(eqx.Module):
     """Records of several runs, and the modes that the network serves.
 
-    `stress`: root-mean-square of the stress of each run in Pa, with which the prior compares its
-        states, shape (runs,).
-    `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
+    `stress`: rms stress of each run in Pa, with which the prior compares its states, shape (runs,).
+    `modulus`, `relaxation_time`: of each mode in Pa and s, shape (k,).
     """
 
     flows: FlowBatch  # the runs, on fixed time grids
@@ -59,9 +55,8 @@ class TrainingProblem(eqx.Module):
     def mean_squared_errors(self, law: AbstractConstitutiveLaw) -> Float[Array, " runs"]:
         """Return the mean squared error of each run, of stresses over the sum of the moduli.
 
-        Its derivative, in reverse mode through the steps with recursive checkpoints, was
-        measured at half the cost of storing every step and at a ninth of the continuous adjoint
-        (51, 94 and 481 ms for the paper's network).
+        In reverse mode with recursive checkpoints at half the cost of storing every step and a
+        ninth of the continuous adjoint (51, 94 and 481 ms for the paper's network).
         """
         weight, total = self.records.weight, jnp.sum(self.modulus)
         unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
@@ -71,26 +66,17 @@ class TrainingProblem(eqx.Module):
 
 
 def make_problem(
-    runs: Sequence[Run],
-    modulus: Float[np.ndarray, " k"],
-    relaxation_time: Float[np.ndarray, " k"],
-    strain_step: float = STRAIN_STEP,
-    solvent_viscosity: float = 0.0,
-    known_relaxation: bool = True,
-    base: AbstractConstitutiveLaw | None = None,
-    **limits: Any,
-) -> TrainingProblem:
+    runs: Sequence[Run], modulus: Float[np.ndarray, " k"], relaxation_time: Float[np.ndarray, " k"],
+    strain_step: float = STRAIN_STEP, solvent_viscosity: float = 0.0, known_relaxation: bool = True,
+    base: AbstractConstitutiveLaw | None = None, **limits: Any,
+) -> TrainingProblem:  # fmt: skip
     """Return the training problem of some runs.
 
-    The default grid is that of the paper's series with a step of 0.1: its error, 4e-6 of the
-    stress, is far below what a network reaches.
-
-    `runs`: runs whose record is learned. `modulus`, `relaxation_time`: modes, in Pa and s.
-    `strain_step`: largest strain of a step of the integration. `solvent_viscosity` in Pa s.
-    `known_relaxation`: whether the fluid relaxes in these times, and not only in what is learned;
-    ignored where `base` is given. `base`: the known law, for steps that follow it; by default UCM.
-    `**limits`: further limits of steps, as `make_grid` takes them. Raises InputError if what was
-    recorded in a run is zero throughout.
+    `modulus`, `relaxation_time`: modes, in Pa and s. `strain_step`: of the integration; the error
+    of the default, 4e-6 of the stress, is far below what a network reaches. `known_relaxation`:
+    whether the fluid relaxes in these times; ignored with `base`, the known law whose steps are
+    followed, by default UCM. `**limits`: of steps, as of `make_grid`. Raises InputError if a record
+    is zero throughout.
     """
     law = UpperConvectedMaxwell(known_relaxation) if base is None else base
     known = Fluid(law, modulus, relaxation_time)
@@ -109,19 +95,14 @@ def make_problem(
 
 @dataclass(frozen=True)
 class DefaultRecipe:
-    """Settings of the default recipe; none of them knows which law made the data.
+    """Settings of the default recipe, independent of the law that made the data.
 
-    `width`: neurons in each of two hidden layers; half as many where coefficients vary little.
-    `affordable`: work (modes times runs times steps of time) up to which functions on single
-        tensors are tried; the recipe ``"thorough"`` always tries them.
-    `strengths`: strength of the penalty in the rounds of the first stage, relative to the squared
-        stress.
-    `variations`: strength of the penalty on variation, likewise: the first that leaves noise alone
-        ends.
-    `removed_below`: a term whose root mean square is below this part of the largest is removed.
-    `resolved`: relative misfit below which no further tensor is asked for: less than rheometers
-        resolve.
-    `exact`: relative misfit at which data count as fitted exactly: the error of integration.
+    `width`: neurons in each of two hidden layers, half where coefficients vary little.
+    `affordable`: work (modes × runs × steps) up to which functions on single tensors are tried.
+    `strengths`, `variations`: of the penalties in successive rounds, relative to the squared
+    stress; of the latter the first that leaves noise alone ends. `removed_below`: a smaller term,
+    by rms over the largest, is removed. `resolved`: relative misfit below what rheometers resolve.
+    `exact`: that of integration.
     """
 
     width: int = 12
@@ -139,10 +120,10 @@ class DefaultRecipe:
 
 @dataclass(frozen=True)
 class Trained:
-    """A trained law.
+    """Trained law.
 
-    `tensors`: tensors whose coefficients vary, in the order in which they were taken.
-    `passed_over`: the other tensors, from which a law could have started, the least misfit first.
+    `tensors`: those whose coefficients vary, in the order taken. `passed_over`: the others from
+    which a law could have started, the least misfit first.
     """
 
     law: TensorBasisNetwork  # after the polish without prior

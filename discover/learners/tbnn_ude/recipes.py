@@ -44,9 +44,9 @@ def train_default(
 ) -> Trained:
     """Return a law trained by the default recipe.
 
-    `key`: for the initial weights. `linear_relaxation`: whether −σ is known. `progress`: called
-    after every step with step, total number of steps (at most) and misfit. `base_law`: known law to
-    which the network is added.
+    `key`: of the initial weights. `linear_relaxation`: whether −σ is known. `progress`: called
+    after every step with step, largest number of steps and misfit. `base_law`: known law below the
+    network.
     """
     recipe = recipe or DefaultRecipe()
     session = Session(problem, recipe, progress)
@@ -94,7 +94,7 @@ def train_default(
 
 
 def work(problem: TrainingProblem) -> float:
-    """Return modes times runs times steps of time: what an integration of a problem costs."""
+    """Return modes × runs × steps of time: the cost of integrating a problem."""
     return float(problem.modulus.size * problem.flows.n_steps)
 
 
@@ -111,16 +111,12 @@ def train_constants(
 
 
 def train_along(
-    problem: TrainingProblem,
-    key: PRNGKeyArray,
-    found: TensorBasisNetwork,
-    groups: Sequence[Sequence[int]],
-    recipe: DefaultRecipe,
-    progress: Progress | None,
-) -> Trained:
+    problem: TrainingProblem, key: PRNGKeyArray, found: TensorBasisNetwork,
+    groups: Sequence[Sequence[int]], recipe: DefaultRecipe, progress: Progress | None,
+) -> Trained:  # fmt: skip
     """Return a law whose tensors are given, from initial weights of its own.
 
-    `found`: a trained law: its invariant scale, base and known relaxation are taken over. `groups`:
+    `found`: trained law, of which invariant scale, base and known relaxation are kept. `groups`:
     tensors, taken group by group while the law has not settled.
     """
     session = Session(problem, recipe, progress)
@@ -143,15 +139,10 @@ def _finish(
     settled = session.settled(law)
     end = "the residual is noise or nothing" if settled else "the residual still has structure"
     return Trained(
-        law,
-        penalised,
-        np.asarray(session.misfits),
-        misfit,
-        varies,
-        f"{what}; relative misfit {misfit:.2g}; {end}",
-        tuple(session.taken) if varies else (),
+        law, penalised, np.asarray(session.misfits), misfit, varies,
+        f"{what}; relative misfit {misfit:.2g}; {end}", tuple(session.taken) if varies else (),
         tuple(session.passed_over),
-    )
+    )  # fmt: skip
 
 
 PaperProgress = Callable[[int, int, float], None]

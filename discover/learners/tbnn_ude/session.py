@@ -1,4 +1,4 @@
-"""What the rounds of one training share, and the rounds that every law goes through."""
+"""Rounds of one training, and what they share."""
 
 from collections.abc import Callable, Sequence
 
@@ -10,17 +10,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
-from discover.learners.tbnn_ude.least_squares import (
-    Cloud,
-    Objective,
-    PriorWeights,
-    cloud_of,
-    least_variation,
-    minimise,
-    parts,
-    relative_misses,
-    reweighted,
-)
+from discover.learners.tbnn_ude import least_squares
 from discover.learners.tbnn_ude.problem import DefaultRecipe, TrainingProblem
 from discover.learners.tbnn_ude.variational import Along, Rebuild, rebuilt, trajectories
 from discover.programs import compiled, on_device
@@ -64,7 +54,7 @@ def without_network(
 
 
 @compiled
-def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
+def invariant_sizes(cloud: least_squares.Cloud) -> Float[Array, "8"]:
     """Return the root mean square of every invariant, or one where it vanishes."""
     invariants = jax.vmap(scalar_invariants)(cloud.stress, cloud.rate)
     shares = (cloud.weight**2 / jnp.mean(cloud.weight**2))[:, None]
@@ -73,7 +63,7 @@ def invariant_sizes(cloud: Cloud) -> Float[Array, "8"]:
 
 
 @compiled
-def constant_scale(cloud: Cloud) -> Float[Array, "8"]:
+def constant_scale(cloud: least_squares.Cloud) -> Float[Array, "8"]:
     """Return the unit of each constant: one over the root mean square of its tensor."""
     size = jnp.sqrt(jnp.mean(cloud.size**2, axis=0))
     return 1.0 / jnp.maximum(size, 1e-6)
@@ -86,11 +76,11 @@ def with_tensors(law: TensorBasisNetwork, tensors: np.ndarray) -> TensorBasisNet
 
 
 def without_empty_terms(
-    law: TensorBasisNetwork, cloud: Cloud, removed_below: float
+    law: TensorBasisNetwork, cloud: least_squares.Cloud, removed_below: float
 ) -> TensorBasisNetwork:
     """Return the law without the terms, and the variations, that the prior has emptied."""
     amount, variation = (
-        np.sqrt(np.mean(np.asarray(rows) ** 2, axis=0)) for rows in parts(law, cloud)
+        np.sqrt(np.mean(np.asarray(rows) ** 2, axis=0)) for rows in least_squares.parts(law, cloud)
     )
     limit = removed_below * max(float(np.max(amount)), 1e-12)
     present = amount > limit
@@ -117,7 +107,7 @@ def is_white(residual: Float[np.ndarray, "runs n"], mask: np.ndarray) -> bool:
 
 
 class Session:
-    """What the rounds of one training share: the data, the history, the progress."""
+    """Rounds of one training: they share the data, the history and the progress."""
 
     def __init__(self, problem: TrainingProblem, recipe: DefaultRecipe, progress: Progress | None):
         self.problem, self.recipe, self.progress = problem, recipe, progress
@@ -143,13 +133,13 @@ class Session:
             self._latest = (law, trajectories(law, self.problem))
         return self._latest[1]
 
-    def cloud(self, law: TensorBasisNetwork) -> Cloud:
+    def cloud(self, law: TensorBasisNetwork) -> least_squares.Cloud:
         """Return the points of stress and rate that a law passes."""
-        return cloud_of(self.along(law), self.problem)
+        return least_squares.cloud_of(self.along(law), self.problem)
 
     def residual(self, law: TensorBasisNetwork) -> np.ndarray:
         """Return what a law misses, relative to each run, shape (runs, n)."""
-        return np.asarray(relative_misses(self.along(law), self.problem))
+        return np.asarray(least_squares.relative_misses(self.along(law), self.problem))
 
     def misfit(self, law: TensorBasisNetwork) -> float:
         """Return the relative misfit of a law; infinite where it diverges."""
@@ -158,7 +148,8 @@ class Session:
 
     def round(
         self, law: TensorBasisNetwork, strength: float, tensors: np.ndarray, network: bool,
-        steps: int, pace: list[float] | None = None, prior: PriorWeights | None = None,
+        steps: int, pace: list[float] | None = None,
+        prior: least_squares.PriorWeights | None = None,
     ) -> TensorBasisNetwork:  # fmt: skip
         """Return a law trained for one round, by default with the prior reweighted at its start.
 
@@ -170,10 +161,10 @@ class Session:
         make = Rebuild.with_network if network else Rebuild.of_constants
         rebuild = make(law, tensors, constant_scale(cloud))
         if prior is None:
-            prior = reweighted(law, cloud, jnp.asarray(strength))
-        objective = Objective(self.problem, rebuild, cloud, prior)
+            prior = least_squares.reweighted(law, cloud, jnp.asarray(strength))
+        objective = least_squares.Objective(self.problem, rebuild, cloud, prior)
         target = 0.1 * self.recipe.exact
-        weights = minimise(rebuild.start, objective, steps, self.record, target, pace)
+        weights = least_squares.minimise(rebuild.start, objective, steps, self.record, target, pace)
         trained = rebuilt(rebuild, weights)
         # a law that diverges in some run is no progress
         return trained if np.isfinite(self.misfit(trained)) else law
@@ -208,7 +199,7 @@ class Session:
     ) -> TensorBasisNetwork:
         """Return a law trained on almost without prior, round by round while that pays.
 
-        Each round begins with a fresh damping and with a prior as weak as the misfit is by then.
+        Each round begins with a fresh damping and a prior as weak as the misfit is by then.
         """
         for _ in range(_MOST_POLISHES):
             before = misfit
@@ -281,8 +272,7 @@ def _polished(
 ) -> tuple[int, TensorBasisNetwork, TensorBasisNetwork]:
     """Return the tensor that does best in the end, and its law before and after polish.
 
-    The race says little of what a few more steps make of the next ones: before a second tensor
-    is asked for, the first has to be the right one.
+    The race hardly predicts the next steps: the first tensor has to be right before a second.
     """
     ends = []
     for reached, tensor, trial in trials[:_POLISHED]:
@@ -303,7 +293,7 @@ def nearly_constant_functions(
 ) -> list[TensorBasisNetwork]:
     """Return laws whose coefficients vary as little as the residual allows, the last the best.
 
-    Those before it are held to less variation still.
+    Earlier ones are held to less variation still.
     """
     everything = np.ones(N_COEFFICIENTS, bool)
     law = with_tensors(start, everything)
@@ -312,7 +302,7 @@ def nearly_constant_functions(
     before = np.inf
     variations = session.recipe.variations
     for number, strength in enumerate([*variations, *_MORE_ROUNDS * variations[-1:]]):
-        prior = least_variation(jnp.asarray(strength))
+        prior = least_squares.least_variation(jnp.asarray(strength))
         law = session.round(law, strength, everything, True, session.recipe.steps, prior=prior)
         misfit = session.misfit(law)
         if misfit < before:  # the same law twice is no second opinion

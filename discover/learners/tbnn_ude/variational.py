@@ -1,9 +1,8 @@
-"""Trajectories together with their derivatives by every weight.
+"""Trajectories with their derivatives by every weight.
 
 The variational equation dS/dt = J S + ∂f/∂θ, with S = ∂σ/∂θ and J = ∂f/∂σ, is integrated beside the
-state as one ordinary differential equation. J is 4 × 4, or little more, and as many reverse passes
-through a tiny network give it together with ∂f/∂θ, where one forward pass per weight would cost
-hundreds.
+state. J is 4 × 4, so that four reverse passes give it and ∂f/∂θ, where forward passes would be one
+per weight.
 """
 
 from collections.abc import Callable
@@ -64,11 +63,10 @@ def places_of(law: TensorBasisNetwork) -> TensorBasisNetwork:
 
 
 class Rebuild(eqx.Module):
-    """Makes a law from a vector that holds some of its numbers.
+    """Law from a vector that holds some of its numbers.
 
-    The variational equation carries a column for every entry of the vector, so numbers that never
-    move in a round are left out of it; those that merely happen not to are held by a mask, which
-    needs no other program.
+    The variational equation has a column for every entry, so numbers that never move in a round are
+    left out; those that happen not to are held by a mask, which needs no other program.
     """
 
     template: TensorBasisNetwork  # a law; what is not in the vector comes from it
@@ -88,8 +86,7 @@ class Rebuild(eqx.Module):
     ) -> "Rebuild":
         """Return the vector of the eight constants.
 
-        `law`: the template. `moving`: which of them move. `scale`: unit of each: a constant is as
-        large as the stress that it contributes.
+        `law`: the template. `moving`: which of them move. `scale`: unit of each.
         """
         n = _count_of(law)
         positions = on_device(np.arange(n - N_COEFFICIENTS, n))
@@ -101,10 +98,8 @@ class Rebuild(eqx.Module):
     ) -> "Rebuild":
         """Return the vector of the network's weights, then the eight constants.
 
-        Output weights of tensors that do not move act on nothing and are left out, so the length
-        depends on how many move, not on which.
-
-        Parameters as in `of_constants`; `moving` must be known when a program is compiled.
+        Output weights of tensors that do not move are left out: the length depends on how many
+        move. Parameters as in `of_constants`; `moving` must be known when a program is compiled.
         """
         moving = np.asarray(moving)
         network: Any = places_of(law).network
@@ -149,11 +144,9 @@ def with_cheap_tangents(
 ) -> Callable[[Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]]:
     """Return the rate of a law whose tangents cost little, however many there are.
 
-    Four pullbacks give the derivative by stress, rate and every number of the law at once; each
-    tangent is then a product with a small matrix, where one through the law evaluates all of it.
-
-    `stress_rate`: of what is given, of a tree of numbers by which is differentiated, of σ and of
-    λL. `given`: a tree through which no derivative passes.
+    Four pullbacks give the derivatives by stress, rate and every number of the law at once; each
+    tangent is then a small matrix product. `stress_rate`: of `given` (not differentiated), of a
+    tree of numbers, of σ and of λL.
     """
     # what is traced has to be handed in: a rule for derivatives must not close over it
     arrays, rest = eqx.partition(given, eqx.is_array)
@@ -187,9 +180,9 @@ def with_cheap_tangents(
 
 
 class Along(NamedTuple):
-    """What a law makes of the runs, at their samples.
+    """Records of a law in the runs, at their samples, and its states there.
 
-    `recorded`: what is recorded, in Pa, of creep the strain, shape (runs, n).
+    `recorded`: in Pa, of creep the strain, shape (runs, n).
     """
 
     recorded: Float[Array, "runs n"]
@@ -200,8 +193,8 @@ class Along(NamedTuple):
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
     """Return what is recorded of a law at every sample, and its states there.
 
-    Compiling an integration costs a hundred times its run, with derivatives or without. Misfits and
-    states are therefore both read off the program that also trains the constants.
+    Read off the program that also trains the constants: compiling an integration costs a hundred
+    times its run.
     """
     everything = np.ones(N_COEFFICIENTS)
     rebuild = Rebuild.of_constants(law, everything.astype(bool), everything)
@@ -213,8 +206,8 @@ def side_by_side(
 ) -> tuple[Along, Float[Array, "runs n p"]]:
     """Return what `states_and_jacobian` does, computed for two halves of the runs in threads.
 
-    Left to itself the compiled program uses two cores for longer than it takes on one: what it
-    shares out is too small. To be called from outside of any transformation.
+    Left to itself the compiled program uses two cores for longer than it takes on one. To be called
+    from outside of any transformation.
     """
     n = len(problem.flows)
     # halves of one size share a program; of an odd number of runs the middle one is in both
@@ -241,7 +234,7 @@ def states_and_jacobian(
     count: int | None = None,
     first: Int[Array, ""] | np.int32 | int = 0,
 ) -> tuple[Along, Float[Array, "runs n p"]]:
-    """Return what is recorded and the states at the samples, and what each weight changes of it."""
+    """Return what is recorded and the states at the samples, with derivatives by each weight."""
     flows = problem.flows if count is None else problem.flows.some(first, count)
     modulus, fluid = problem.modulus, problem.fluid(rebuild(weights))
 

@@ -1,6 +1,7 @@
 """The scikit-learn estimator: runs in, a sparse constitutive law out."""
 
 import time
+from dataclasses import dataclass
 from typing import Any
 
 import jax.numpy as jnp
@@ -12,25 +13,13 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.left_out import left_out
-from discover.laws.base import AbstractConstitutiveLaw
-from discover.laws.expansion import LibraryExpansion
-from discover.laws.multimode import Fluid
+from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion
 from discover.learners import LearnerResult, RecoveredTerm
 from discover.learners.files import Provenance
-from discover.learners.known_part import KnownPart
 from discover.learners.run_prediction import RunPrediction
-from discover.learners.settings import PerMode, check_library, default_library
+from discover.learners.settings import KnownPart, PerMode, check_library, default_library
+from discover.learners.tensor_sindy import report
 from discover.learners.tensor_sindy.optimisers import check_optimiser
-from discover.learners.tensor_sindy.report import (
-    by_evidence,
-    compare_rules,
-    covariance_of_terms,
-    inclusion,
-    noise_of,
-    path_table,
-    recovered_terms,
-    rival_table,
-)
 from discover.learners.tensor_sindy.search import (
     SupportSearch,
     choose_by_held_out,
@@ -47,6 +36,7 @@ _ROUNDS = 8
 """Lines of text that a search is expected to say."""
 
 
+@dataclass(eq=False, repr=False)
 class TensorSINDy(RunPrediction):
     """Sparse regression on a frame-invariant library, from shear stress alone.
 
@@ -126,51 +116,23 @@ class TensorSINDy(RunPrediction):
     """
 
     learner = "tensor_sindy"
-    _saved = (
-        "n_features_in_",
-        "law_",
-        "fluid_",
-        "terms_",
-        "result_",
-        "library_",
-        "coefficients_",
-        "inner_",
-        "covariance_",
-        "provenance_",
-    )
+    _saved = (*RunPrediction._saved, "library_", "coefficients_", "inner_", "covariance_")
     _saved_types = (LearnerResult, RecoveredTerm, Provenance)
 
-    def __init__(
-        self,
-        library: TermLibrary | None = None,
-        optimizer: str | BaseOptimizer = "stlsq",
-        modulus: PerMode = 1.0,
-        relaxation_time: PerMode = 1.0,
-        solvent_viscosity: float = 0.0,
-        known_relaxation: bool = True,
-        base_law: AbstractConstitutiveLaw | None = None,
-        use_normal_stresses: bool = False,
-        selection: str = "evidence",
-        max_terms: int = 5,
-        progress: Progress | None = None,
-        base: Fluid | None = None,
-        modulus_covariance: Float[np.ndarray, "c c"] | None = None,
-        random_state: int = 0,
-    ):
-        self.library = library
-        self.optimizer = optimizer
-        self.modulus = modulus
-        self.relaxation_time = relaxation_time
-        self.solvent_viscosity = solvent_viscosity
-        self.known_relaxation = known_relaxation
-        self.base_law = base_law
-        self.use_normal_stresses = use_normal_stresses
-        self.selection = selection
-        self.max_terms = max_terms
-        self.progress = progress
-        self.base = base
-        self.modulus_covariance = modulus_covariance
-        self.random_state = random_state
+    library: TermLibrary | None = None
+    optimizer: str | BaseOptimizer = "stlsq"
+    modulus: PerMode = 1.0
+    relaxation_time: PerMode = 1.0
+    solvent_viscosity: float = 0.0
+    known_relaxation: bool = True
+    base_law: AbstractConstitutiveLaw | None = None
+    use_normal_stresses: bool = False
+    selection: str = "evidence"
+    max_terms: int = 5
+    progress: Progress | None = None
+    base: Fluid | None = None
+    modulus_covariance: Float[np.ndarray, "c c"] | None = None
+    random_state: int = 0
 
     def _learn(self, runs: list[Run], known: KnownPart) -> None:
         started = time.perf_counter()
@@ -191,13 +153,13 @@ class TensorSINDy(RunPrediction):
         elif self.selection == "one_standard_error" and held_out is not None:
             number = choose_by_one_standard_error(held_out)
         else:
-            number = by_evidence(search, path)
+            number = report.by_evidence(search, path)
         chosen = path[number]
 
         self.search_ = search
         self.library_ = library
-        self.terms_ = recovered_terms(search, chosen)
-        self.covariance_ = covariance_of_terms(search, chosen)
+        self.terms_ = report.recovered_terms(search, chosen)
+        self.covariance_ = report.covariance_of_terms(search, chosen)
         self.coefficients_ = np.zeros(len(library))
         self.inner_ = np.array(library.inner_default, dtype=float)
         for term in self.terms_:
@@ -218,19 +180,19 @@ class TensorSINDy(RunPrediction):
             train_seconds=time.perf_counter() - started,
             loss_history=(np.arange(1.0, misfits.size + 1.0), np.minimum.accumulate(misfits**2)),
             details={
-                "path": path_table(search, path, held_out),
+                "path": report.path_table(search, path, held_out),
                 "chosen": number,
                 "selection": self.selection,
-                "selectors": compare_rules(search, path, held_out, chosen),
-                "inclusion": inclusion(search),
-                "rivals": rival_table(search, chosen),
+                "selectors": report.compare_rules(search, path, held_out, chosen),
+                "inclusion": report.inclusion(search),
+                "rivals": report.rival_table(search, chosen),
                 "covariance": None if covariance is None else covariance.tolist(),
                 "iterations": len(misfits),
                 "optimizer": self.optimizer
                 if isinstance(self.optimizer, str)
                 else type(self.optimizer).__name__,
                 "misfit": misfit,
-                "noise": noise_of(chosen, rows),
+                "noise": report.noise_of(chosen, rows),
                 "n_observations": rows,
             },
             message=(

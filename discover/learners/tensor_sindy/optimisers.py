@@ -22,11 +22,7 @@ _RIDGE = 1e-8  # columns have unit norm: enough to make collinear ones solvable,
 
 @dataclass(frozen=True)
 class SparseSolution:
-    """One solution of a sparse linear problem.
-
-    `coefficients`: all coefficients as the optimiser left them: thresholded or penalised, not
-        refitted.
-    """
+    """Solution of a sparse linear problem; coefficients thresholded or penalised, not refitted."""
 
     support: tuple[int, ...]  # positions of the non-zero coefficients, increasing
     coefficients: Float[np.ndarray, " n"]
@@ -54,14 +50,9 @@ def solve_sparse(
 ) -> list[SparseSolution]:
     """Return the solutions of an optimiser from its mildest to its strictest setting.
 
-    Columns are brought to unit norm and the target too, so that one threshold means the same in
-    every problem: the share of the signal that a term must carry.
-
-    `optimizer`: a name of `OPTIMISERS`, or a pysindy optimiser, which is used as it is set.
-    `design`, `target`: the linear problem design @ c ≈ target. `max_terms`: largest support of
-    interest to a forward method.
-
-    Returns solutions with different, non-empty supports.
+    Columns and target are brought to unit norm, so that a threshold is the share of the signal that
+    a term must carry. `optimizer`: a name of `OPTIMISERS`, or a pysindy optimiser as it is set.
+    `max_terms`: largest support of interest to a forward method. Supports differ and are not empty.
     """
     check_optimiser(optimizer)
     norms = np.linalg.norm(design, axis=0)
@@ -83,11 +74,7 @@ def solve_sparse(
 def default_support(
     optimizer, design: Float[np.ndarray, "rows n"], target: Float[np.ndarray, " rows"]
 ) -> tuple[int, ...]:
-    """Return the support that a pysindy optimiser leaves at its own default setting.
-
-    On the bare columns, as a user of pysindy would have it; an optimiser that was given is used as
-    it is set.
-    """
+    """Return the support that a pysindy optimiser leaves on the bare columns at its own setting."""
     check_optimiser(optimizer)
     made = (
         {"stlsq": STLSQ, "sr3": SR3, "ssr": SSR, "frols": FROLS}[optimizer.lower()]()

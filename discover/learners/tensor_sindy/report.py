@@ -1,4 +1,4 @@
-"""What a search found, as terms with their intervals and as plain JSON-able tables."""
+"""Results of a search: terms with their intervals, and JSON-able tables."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -122,8 +122,7 @@ def path_table(
 ) -> list[dict[str, Any]]:
     """Return one row for each member of the path: support, size, misfits, log evidence.
 
-    The misfit in runs left out is the root mean square over them; ``held_out_by_run`` gives it for
-    each, by name.
+    ``held_out``: rms of the misfit over the runs left out; ``held_out_by_run``: each, by name.
     """
     names = [run.name for run in search.fitter.rows.runs]
     rows = []
@@ -140,9 +139,8 @@ def path_table(
 def rival_table(search: SupportSearch, chosen: Fit) -> list[dict[str, Any]]:
     """Return the other laws that the records do not rule out, closest first.
 
-    A rival is no larger than the chosen support. Its ``difference`` is the relative
-    root-mean-square difference of the two predictions; it is an ``exact`` tie where no record of
-    these runs tells the two apart.
+    No larger than the chosen support. ``difference``: relative rms difference of the predictions;
+    ``exact``: no record of these runs distinguishes the two.
     """
     rivals = []
     for fit in search.alive():
@@ -198,7 +196,7 @@ def by_evidence(search: SupportSearch, path: Sequence[Fit]) -> int:
 
 
 def noise_of(fit: Fit, observations: int) -> dict[str, float]:
-    """Return the noise that a fit leaves, relative to the records, and what samples are worth."""
+    """Return the noise that a fit leaves, relative to the records, and the effective samples."""
     share = (1.0 - fit.noise.correlation) / (1.0 + fit.noise.correlation)
     return {
         "size": fit.noise.common,

@@ -14,8 +14,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.search import Key, Search
-from discover.learners.known_part import KnownPart
-from discover.learners.settings import ARITHMETIC
+from discover.learners.settings import ARITHMETIC, KnownPart
 from discover.learners.tensor_sindy.optimisers import solve_sparse
 from discover.progress import require_wanted
 from tensor_library.library import TermLibrary
@@ -24,15 +23,10 @@ _LEVEL = 0.01
 
 
 def choose_by_held_out(errors: Float[np.ndarray, "path runs"]) -> int:
-    """Return the simplest member whose error in runs left out cannot be told from the best one's.
+    """Return the simplest member whose error in runs left out is not significantly above the best.
 
-    `errors`: relative misfit of each member in each run that its fit did not see.
-
-    Notes
-    -----
-    Simpler than the best is preferred unless a paired t-test on the logarithms of the errors, run
-    by run, rejects it at 1 %. The supports were found with all runs in view, so that the error of
-    too large a member is somewhat flattered: the strict level answers that.
+    `errors`: relative misfit in runs that the fit did not see. A paired t-test on their logarithms
+    at 1 %; strict, as the supports were found with all runs in view.
     """
     floored = np.log(_floored(errors))
     best = int(np.argmin(np.mean(floored, axis=1)))
@@ -48,10 +42,8 @@ def choose_by_held_out(errors: Float[np.ndarray, "path runs"]) -> int:
 def choose_by_one_standard_error(errors: Float[np.ndarray, "path runs"]) -> int:
     """Return the simplest member within one standard error of the best in runs left out.
 
-    The rule of one standard error   [Breiman et al. 1984, Classification and Regression Trees,
-    ch. 3.4.3]: the mean over runs of the squared error is no larger than the best one's plus the
-    standard error of that mean. What is left out is a whole run, so that the correlation of
-    neighbouring samples does not pass for independent evidence.
+    On the mean over runs of the squared error [Breiman et al. 1984, Classification and Regression
+    Trees, ch. 3.4.3]; whole runs are left out, as neighbouring samples are correlated.
     """
     squares = _floored(errors) ** 2
     means = np.mean(squares, axis=1)
@@ -74,15 +66,11 @@ _NEGLIGIBLE = 1e-6
 def library_problem(
     runs: Sequence[Run], library: TermLibrary, known: KnownPart, use_normal_stresses: bool
 ) -> Problem:
-    """Return the problem of finding library terms beside a known part.
+    """Return the problem of finding library terms beside a known part, in fluid and noise alone.
 
-    The records hold the fluid and noise: an instrument's faults are for a closed loop, or for
-    `compare`, which takes them out beforehand.
-
-    `runs`: as `as_runs` returns them. `library`: candidate terms. `known`: the known part; errors
-    of its moduli are nuisances. `use_normal_stresses`: whether N1 and N2, where measured, are
-    fitted too. Raises InputError if normal stresses would be fitted twice, or a covariance is none
-    of the moduli.
+    Errors of the known moduli are nuisances; instrument effects are for a closed loop or `compare`.
+    `use_normal_stresses`: whether measured N1 and N2 are fitted too. Raises InputError if normal
+    stresses would be fitted twice, or a covariance is none of the moduli.
     """
     fluid, observed = known.fluid, list(runs)
     if use_normal_stresses:
@@ -125,10 +113,10 @@ def _checked(covariance, modes: int):
 
 @dataclass(frozen=True)
 class LinearModel:
-    """y − σ(c₀) + S c₀ ≈ S c: what the records say of the coefficients near a trial law.
+    """y − σ(c₀) + S c₀ ≈ S c: the records near a trial law, linear in the coefficients.
 
-    `design`: S by terms, over the noise of the trial law, what nuisances imitate taken out, and
-        compressed to as many rows as unknowns: least-squares problems over it are unchanged.
+    `design`: S by terms over the noise, orthogonal to the nuisances, compressed to as many rows as
+    unknowns. `target`: the left-hand side, likewise.
     """
 
     design: Float[np.ndarray, "rows n"]
@@ -189,14 +177,12 @@ _NEAR, _MOST_NEAR = 12.0, 24
 
 
 class SupportSearch(Search):
-    """Every support that was fitted, and the moves between them.
+    """Search among supports.
 
-    The records are linear in the coefficients near a trial law. There a sparse optimiser proposes
-    supports of any size, and every further term is scored; all of them are fitted, and the search
-    goes on from the likeliest, until no proposal is likelier.
-
-    `fitter`: what fits them, to a problem whose candidates are the terms of the library. `library`:
-    the terms. `most`: largest support. `say`: called with a line of text now and then.
+    Near a trial law the records are linear in the coefficients: a sparse optimiser proposes
+    supports of any size, and every further term is scored. All are fitted, and the search goes on
+    from the likeliest until no proposal is likelier. `most`: largest support. `say`: takes a line
+    of text.
     """
 
     def __init__(
@@ -219,14 +205,13 @@ class SupportSearch(Search):
         return float(np.sqrt(np.mean(off**2)))
 
     def indistinguishable(self, one: Fit, other: Fit) -> bool:
-        """Return whether no record of these runs tells two fits apart."""
+        """Return whether no record of these runs distinguishes two fits."""
         return self.difference(one, other) <= max(_SAME * other.noise.common, ARITHMETIC)
 
     def complexity(self, fit: Fit) -> tuple:
         """Return the order in which indistinguishable fits are preferred.
 
-        Fewer terms, then lower complexity, then fewer invariants (a constant coefficient before
-        a state-dependent one), then the order of the library.
+        Fewer terms, lower complexity, fewer invariants, order of the library.
         """
         terms = [self.library.terms[i] for i in self.support(fit)]
         return (

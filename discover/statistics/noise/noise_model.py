@@ -1,4 +1,4 @@
-"""The noise of a fit, as its residual shows it: a size for each run, one autocorrelation."""
+"""Noise of a fit from its residual: a size for each run, one autocorrelation."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,12 +19,10 @@ _CONTRADICTS = 0.01
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Autoregressive noise, with one correlation for all sequences and a variance for each.
+    """Autoregressive noise with one correlation for all sequences and a variance for each.
 
-    `coefficients`: φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,); empty for white noise.
-    `correlation`: of samples k apart, from k = 0, shape (longest sequence,).
-    `effective_samples`: number of independent samples whose mean would be as uncertain as that of
-        all sequences.
+    `coefficients`: φ of e_t = Σ φ_j e_{t−j} + innovation, shape (order,). `correlation`: by lag
+    from 0, shape (longest sequence,). `effective_samples`: of all sequences.
     """
 
     coefficients: Float[np.ndarray, " order"]
@@ -47,15 +45,10 @@ def noise_model(
 ) -> NoiseModel:
     """Return the noise model of residuals, its order chosen by BIC.
 
-    The autocovariance is pooled over the sequences, so that short runs share one correlation, and
-    the variance where nothing says that theirs is another; the Yule–Walker equations give the
-    coefficients   [Brockwell & Davis 1991, Time Series, ch. 8].
-
-    `residuals`: one sequence for each run and observed quantity, in the order of time. Where
-    sampling is uneven the correlation is one by sample, not by time. `n_parameters`: number of
-    fitted parameters, which the variance allows for. `sizes`: of what is taken for noise of one
-    size in each sequence: where a long run has smaller weights than a short one, its residuals are
-    smaller and its noise is not. By default the residuals are.
+    The autocovariance is pooled over the sequences, and the variance where nothing contradicts;
+    Yule–Walker equations give the coefficients [Brockwell & Davis 1991, Time Series, ch. 8].
+    `residuals`: one sequence for each run and quantity, in the order of time. `n_parameters`:
+    fitted ones. `sizes`: of each sequence, in whose units noise is alike.
     """
     sizes = [1.0] * len(residuals) if sizes is None else sizes
     alike = [r / size for r, size in zip(residuals, sizes, strict=True)]
@@ -93,10 +86,7 @@ def noise_model(
 
 
 def _variance(values: Float[np.ndarray, " n"], pooled: float, n_parameters: int) -> float:
-    """Return the variance of a sequence: its own, or if it is short and no other, that of all.
-
-    The flow curve of a rheometer is quieter than its transients, or louder.
-    """
+    """Return the variance of a sequence: its own, or that of all if it is short and alike."""
     squares, n = float(values @ values), len(values)
     free = n - n_parameters
     if n >= _FEWEST_FOR_OWN_VARIANCE:
@@ -154,12 +144,9 @@ def least_squares_covariance(
 ) -> tuple[Float[np.ndarray, "p p"], Float[np.ndarray, "p p"], NoiseModel]:
     """Return C = (SᵀS)⁻¹ SᵀΩS (SᵀS)⁻¹, (SᵀS)⁻¹, and the noise of which Ω is made.
 
-    Where a sensitivity is not finite, both are infinite. What no sample sees has no inverse: there
-    (SᵀS)⁻¹ is the pseudo-inverse, and the deviation in C is far larger than any finding.
-
-    `columns`: sensitivities S. `sequences`: rows of each sequence of observations, in the order of
-    time. `sizes`: of the noise of each sequence, if it is taken to be the same in all, as
-    `noise_model` takes them.
+    Infinite where a sensitivity is not finite. What no sample sees has the pseudo-inverse, and in C
+    a deviation far beyond any finding. `columns`: S. `sequences`: rows of each sequence in the
+    order of time. `sizes`: as of `noise_model`.
     """
     if not (np.all(np.isfinite(columns)) and np.all(np.isfinite(residual))):
         # of a law that diverges beside its fit: nothing is known of its constants
@@ -183,12 +170,10 @@ def least_squares_covariance(
 
 
 def independent_samples(values: Float[np.ndarray, " n"]) -> float:
-    """Return the number of independent samples that a correlated sequence is worth.
+    """Return the effective sample size of a correlated sequence [Geyer 1992, Stat. Sci. 7, 473].
 
-    n/(1 + 2 Σ ρ_k), summed up to the first lag at which nothing is correlated any more   [Geyer
-    1992, Stat. Sci. 7, 473, for sums that end where the correlation is lost]. Of a smooth sequence
-    this counts its swings and not its samples, so it does not depend on how densely it was
-    sampled; with the correlation of neighbours alone, the count would fall the more one measures.
+    n/(1 + 2 Σ ρ_k), summed to the first lag without correlation: it counts the swings of a smooth
+    sequence, however densely sampled.
     """
     n = len(values)
     power = float(np.sum(values**2))
@@ -206,10 +191,7 @@ _ALIKE = 0.8  # share of them that is read equally often
 
 
 def read_times(record: Float[np.ndarray, " n"]) -> int:
-    """Return how often each value of a record is read; 1 where values are new, or repeat by chance.
-
-    A coarse converter repeats values too, but not all of them equally often.
-    """
+    """Return the hold length of a record: how often each value is read; 1 if new or by chance."""
     lengths = np.diff(np.flatnonzero(np.diff(record)))
     if len(lengths) < _FEWEST:
         return 1
@@ -226,7 +208,7 @@ def rms(values: ArrayLike) -> float:
 
 
 def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
-    """Return what the columns cannot describe of values, shape (m,) or (m, k)."""
+    """Return the part of values, shape (m,) or (m, k), that the columns cannot describe."""
     norms = np.linalg.norm(columns, axis=0)
     kept = columns[:, norms > 0.0] / norms[norms > 0.0]
     if not kept.shape[1]:
@@ -237,11 +219,7 @@ def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray
 def squared_distance(
     difference: Float[np.ndarray, " n"], factor: Float[np.ndarray, "k n"]
 ) -> float:
-    """Return dᵀ (I + FᵀF)⁻¹ d without the n × n matrix.
-
-    By singular values: draws that nearly diverge spread so far that the k × k matrix of Woodbury's
-    identity is singular to rounding.
-    """
+    """Return dᵀ (I + FᵀF)⁻¹ d by singular values, which bear draws that nearly diverge."""
     _, sizes, rows = np.linalg.svd(factor, full_matrices=False)
     along = rows @ difference
     beside = difference - along @ rows

@@ -1,4 +1,4 @@
-"""Samples of a record that stand alone: a knock, a spark, a lost bit."""
+"""Outliers of records, and whether records hold a signal."""
 
 from collections.abc import Callable, Sequence
 
@@ -31,14 +31,11 @@ _SMOOTH = 5
 def isolated(record: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     """Return which samples of a record are outliers: off the record before and after them.
 
-    A sample, or two side by side, is an outlier if what the samples before it extrapolate to, what
-    those after it do, and what lies between both are all missed to the same side, by far more than
-    noise, which is told by third differences in the neighbourhood   [after Hampel 1974, J. Am.
-    Stat. Assoc. 69, 383, with lines for his median], and by more than the record without it bends.
-    So the peak of an overshoot is none, nor either side of a step, nor a stretch that is loud. Of
-    the last three samples, the second and the third, one alone is an outlier if it is off twice as
-    far, for there is less beside it. The first is none: it may be what an instrument needs to
-    settle. Samples that read exactly zero are held against those that do not.
+    One or two samples are outliers if extrapolation from before, from after, and interpolation all
+    miss to one side by far more than the noise around (third differences) [after Hampel 1974, J.
+    Am. Stat. Assoc. 69, 383] and than the record bends: no peak, step or loud stretch. Of the last
+    three samples, the second and third, one alone counts if twice as far off; the first never.
+    Samples of exactly zero are held against those that are not.
     """
     values = np.asarray(record, dtype=float)
 
@@ -54,10 +51,8 @@ def stray(
 ) -> Bool[np.ndarray, " n"]:
     """Return which samples are outliers of a fit.
 
-    Those of the record alone (`isolated`), and those that a model misses by far more than the
-    samples around, where the record too is off on its own: a step that a model takes a sample too
-    late is missed as much, but the record is level on one side of it. Nothing is said of the first
-    sample.
+    Those of the record (`isolated`), and those that a model misses by far more than around, where
+    the record is off too: not a step that a model takes late. Never the first sample.
     """
     missed, values = np.asarray(residual, dtype=float), np.asarray(record, dtype=float)
     left = np.flatnonzero(~isolated(record))
@@ -67,10 +62,7 @@ def stray(
 def _set_aside(
     left: Int[np.ndarray, " m"], n: int, find: Callable[[np.ndarray], np.ndarray]
 ) -> Bool[np.ndarray, " _"]:
-    """Return which of n samples are not left once what `find` finds among them is taken out.
-
-    Asked again of what is then left, for one outlier may hide another.
-    """
+    """Return which of n samples `find` takes out, asked again of what remains."""
     for _ in range(_PASSES):
         if len(left) < 2 * _BESIDE + _WIDEST:
             break
@@ -170,10 +162,7 @@ def _dropped(values: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
 def _is_apart(
     before: Float[np.ndarray, " n"], own: float, after: Float[np.ndarray, " m"], noise: float
 ) -> bool:
-    """Return whether a sample with so few after it that they have no line is off them and others.
-
-    What settles, or gives way, is off in the samples after it as well.
-    """
+    """Return whether a sample near an end is off those beside it; not what settles or gives way."""
     one, two, three = before[-1], before[-2], before[-3]
     missed = [own - 2.0 * one + two, own - 3.0 * (one - two) - three]  # a line, and a parabola
     bends = np.abs(np.diff(before, 2))
@@ -215,11 +204,7 @@ def _local_noise(values: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 
 
 def _local_spread(sizes: Float[np.ndarray, " m"], n: int, first: int) -> Float[np.ndarray, " _"]:
-    """Return the robust standard deviation around each of n samples.
-
-    Near an end of the record it is that of the samples next to the end: a window that repeats the
-    last one would take its size for that of all.
-    """
+    """Return the robust standard deviation around each of n samples; at an end that next to it."""
     width = min(_NEIGHBOURHOOD, len(sizes))
     middle = np.clip(np.arange(n) - first - width // 2, 0, len(sizes) - width)
     medians = np.median(np.lib.stride_tricks.sliding_window_view(sizes, width), axis=1)
@@ -235,14 +220,11 @@ _OTHER_RATE = 1.1  # flows whose rates differ by less than this factor are one f
 def holds_signal(
     measured: Sequence[Float[np.ndarray, " _"]], rates: Sequence[Float[np.ndarray, " _"]] | None
 ) -> bool:
-    """Return whether records hold something that a law could be told from.
+    """Return whether records hold something that a law could be inferred from.
 
-    They hold nothing if every one of them is noise (`noise_probability`) about its mean, and the
-    means are one constant within their errors, although the rates differ: so looks a sensor that is
-    dead or was never connected. Records whose rates do not differ, or are not given, hold nothing
-    only if that constant is zero. What is too short to tell is taken to hold something.
-
-    `measured`: records of all runs, in one unit. `rates`: what was imposed, at the samples.
+    Not if each is noise about its mean and the means are one constant within their errors although
+    the rates differ; nor, where these do not or are not given, if that constant is zero. Short
+    records are taken to hold something. `measured`: in one unit. `rates`: imposed, at the samples.
     """
     rows = [np.asarray(row, dtype=float) for row in measured]
     if not rows or any(len(row) < FEWEST_TESTED for row in rows):

@@ -1,8 +1,4 @@
-"""Is the noise of several runs correlated alike? A misfit depends on the flow; noise does not.
-
-What a law that is nearly right leaves of one run may pass for noise that is correlated there. But
-the same instrument recorded the other runs, and where its noise is white in them it is no other.
-"""
+"""Test of equal autocorrelation of runs: a misfit depends on the flow, noise does not."""
 
 from collections.abc import Sequence
 
@@ -21,18 +17,13 @@ _PLAIN = 0.05  # probability above which nothing needs to be drawn
 def same_correlation_probability(
     rows: Sequence[Float[np.ndarray, " _"]], intervals: Sequence[float]
 ) -> float:
-    """Return how probable correlations that differ as much as those of rows are, if all are one.
+    """Return the probability of correlations that differ so much between runs, if all are one.
 
-    Of the likelihoods of first-order correlated noise the product of the largest of each row is
-    held against the largest with one correlation, either from sample to sample or over time,
-    ρ^(interval): whichever suits better   [Wilks 1938, Ann. Math. Stat. 9, 60]. Where it may be
-    small, it is found on the innovations of the rows themselves with signs drawn by lot, so it
-    holds whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma
-    distribution is put through the ratios drawn. Always the same lots are drawn.
-
-    `rows`: residuals of each run, in order, in any unit. `intervals`: time between neighbouring
-    samples of each; not a number of what is recorded otherwise than the other runs, which is left
-    out, as runs of fewer than 24 samples are.
+    Likelihood ratio of first-order noise with one correlation, from sample to sample or over time,
+    ρ^(interval), whichever suits better [Wilks 1938, Ann. Math. Stat. 9, 60]; where it may be
+    small, by the wild bootstrap (signs drawn with a fixed seed) on the innovations [Liu 1988, Ann.
+    Stat. 16, 1696] with a gamma distribution. `rows`: residuals of each run. `intervals`: sampling
+    intervals; not a number leaves a run out, as fewer than 24 samples do.
     """
     told = [
         (np.asarray(row, dtype=float), float(interval))

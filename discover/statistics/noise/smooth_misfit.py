@@ -1,8 +1,6 @@
-"""Is a residual noise, or noise about a smooth misfit? What a law that is not quite right leaves.
+"""Test of a smooth misfit beside correlated noise.
 
-Noise with a first-order correlation bends as slowly as a misfit does, and takes up much of one. The
-two differ in how the slow part goes over into the fast one: such noise falls off gradually, while a
-smooth misfit stands on a floor of what changes from sample to sample.
+First-order noise falls off gradually in frequency; a smooth misfit stands on a floor.
 """
 
 from collections.abc import Sequence
@@ -27,18 +25,13 @@ _PLAIN = 2.0  # gain in log likelihood below which nothing needs to be drawn
 
 
 def smooth_misfit_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
-    """Return how probable a smooth part as clear as that of these rows is, if they are noise.
+    """Return the probability of so clear a smooth part of these rows, if they are noise.
 
-    Noise with one first-order correlation, and a size for each run, is held against the same with a
-    smooth part beside it, whose size each run has of its own and which has so many half swings
-    along a run that its spectrum falls as 1/(1 + (k/k₀)⁴). Both likelihoods are taken in the
-    cosine transform, which all but diagonalises either covariance   [after Whittle 1953, Ark. Mat.
-    2, 423; Ahmed, Natarajan & Rao 1974, IEEE Trans. Comput. 23, 90]. How much is gained by chance
-    is found on the innovations of the rows themselves, with signs drawn by lot, so it holds
-    whatever their size does along a run   [Liu 1988, Ann. Stat. 16, 1696]; a gamma distribution is
-    put through the gains drawn. Always the same lots are drawn.
-
-    `rows`: residuals of each run, in order, in any unit.
+    Likelihood of first-order noise, with a size for each run, against the same with a smooth part,
+    whose spectrum falls as 1/(1 + (k/k₀)⁴), in the cosine transform [after Whittle 1953, Ark. Mat.
+    2, 423; Ahmed, Natarajan & Rao 1974, IEEE Trans. Comput. 23, 90]; by the wild bootstrap (signs
+    drawn with a fixed seed) on the innovations [Liu 1988, Ann. Stat. 16, 1696] with a gamma
+    distribution. `rows`: residuals of each run.
     """
     gain, rho = _gain([row[None] for row in rows])
     if gain[0] < _PLAIN:

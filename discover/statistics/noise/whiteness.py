@@ -1,8 +1,7 @@
-"""Is a residual noise? Tests that hold whatever the noise's size does along a run.
+"""Tests of residuals for noise that hold whatever its size does along a run.
 
-Noise may be white or have one first-order correlation, and may be louder in some stretches than in
-others: in a start-up, or where the stress is large. A stretch counts by its order and not by its
-size, so that a loud one neither hides a pattern nor is one.
+Noise may be white or of one first-order correlation, and louder in some stretches: a stretch counts
+by its order and not by its size.
 """
 
 from collections.abc import Sequence
@@ -24,14 +23,11 @@ _SAME_PLACE_REPEATED = 1e-3
 
 
 def same_place_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
-    """Return how probable samples are that stand out so alike at one place of several runs.
+    """Return the probability of samples that stand out so alike at one place of several runs.
 
-    Noise may be louder at a place than elsewhere, but of one run it knows nothing of another's: its
-    mean over the runs is zero, within the spread of the runs there   [Student 1908, Biometrika 6,
-    1]. The first and the last place, where an imperfect start or end shows, count for half of the
-    places asked.
-
-    `rows`: residuals of each run, in order, in a unit in which runs compare.
+    Noise has mean zero over runs at each place, within their spread [Student 1908, Biometrika 6,
+    1]. First and last place, where an imperfect start or end shows, count for half of those asked.
+    `rows`: residuals of each run, in a unit in which runs compare.
     """
     return float(min((probability for _, probability in _places(rows)), default=1.0))
 
@@ -60,10 +56,7 @@ def _places(rows: Sequence[Float[np.ndarray, " _"]]) -> list[tuple[int, float]]:
 
 
 def _standing_out(row: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Return which samples differ from the median around them by far more than their neighbours.
-
-    So neither a smooth misfit nor a loud stretch stands out; the first and the last sample may.
-    """
+    """Return which samples are far off the median around them, ends included."""
     apart = np.abs(row - median_filter(row, _SAME_PLACE_BESIDE, mode="reflect"))
     size = min(_SAME_PLACE_NEIGHBOURHOOD, len(row))
     spread = 1.4826 * median_filter(apart, size, mode="reflect")
@@ -99,35 +92,29 @@ def noise_probability(
     measured: Float[np.ndarray, "runs n"] | None = None,
     further: Sequence[float] = (),
 ) -> float | None:
-    """Return how probable residuals as structured as these are, if they are noise.
+    """Return the probability of residuals as structured as these, if they are noise.
 
-    Under every first-order correlation up to 0.9 the innovations e_t = r_t − ρ r_{t−1} are held
-    against independent ones of any size; the ρ that looks most like noise counts. Of independent
-    symmetric numbers Σ e_t e_{t−k} has mean zero and variance Σ e_t² e_{t−k}², however their size
-    changes   [Lobato, Nankervis & Savin 2001, Int. Econ. Rev. 42, 187]. Seven tests follow:
+    For every first-order correlation up to 0.9 the innovations e_t = r_t − ρ r_{t−1} are held
+    against independent symmetric ones of any size, whose Σ e_t e_{t−k} has mean zero and variance Σ
+    e_t² e_{t−k}² [Lobato, Nankervis & Savin 2001, Int. Econ. Rev. 42, 187]; the ρ most like noise
+    counts. Tests:
 
-    - a portmanteau over 12 lags, of all runs together   [after Ljung & Box 1978, Biometrika 65,
-      297], and one run by run, which finds patterns of their own;
-    - the fast part: third differences of noise with correlation ρ have a variance that is known,
-      20 − 30ρ + 12ρ² − 2ρ³ times the noise's, and a smooth residual has less. Of the innovations
-      it is 20 times;
-    - the sum over runs, sample by sample: noise of one run knows nothing of another's;
-    - where a record repeats itself, the product of innovations a whole number of cycles apart;
-    - whether a smooth misfit beside the noise says more than noise alone, which is what a law that
-      is nearly right leaves; see `smooth_misfit_probability`;
-    - single samples that stand out at the same place of several runs; see `same_place_probability`.
+    - a portmanteau over 12 lags of all runs together [after Ljung & Box 1978, Biometrika 65, 297],
+      and one run by run;
+    - the fast part: third differences of innovations have 20 times their variance, of a smooth
+      residual less;
+    - the sum over runs, sample by sample;
+    - where a record repeats itself, products of innovations whole cycles apart;
+    - a smooth misfit beside the noise (`smooth_misfit_probability`);
+    - single samples that stand out at one place of several runs (`same_place_probability`).
 
-    Runs of fewer than 24 samples have one test together: whether neighbours agree in them, see
-    `separate_probability`. The correlation is that of the longer runs; without any, their noise is
-    taken to have none, for so few samples do not tell correlated noise from a misfit.
+    Runs of fewer than 24 samples have one test together (`separate_probability`), with the
+    correlation of the longer runs, or none. The smallest probability counts as often as there are
+    tests; None if all runs together are too short.
 
-    The smallest probability counts as often as there are tests. None if all runs together are too
-    short.
-
-    `residual`: prediction minus measurement of each run, in any unit, padded. `weight`: positive
-    where there is a sample. `measured`: the measurement, by which cycles are found; without it they
-    are not looked for. `further`: probabilities by other tests of the longer runs, which count as
-    these do.
+    `residual`: of each run, in any unit, padded. `weight`: positive where there is a sample.
+    `measured`: the records, by which cycles are found. `further`: probabilities by other tests of
+    the longer runs.
     """
     arrays = [residual, weight] if measured is None else [residual, weight, measured]
     exact = [np.ascontiguousarray(values, dtype=float) for values in arrays]
@@ -190,15 +177,11 @@ def _probability(
 
 
 def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
-    """Return how probable neighbours that agree as much as these are, if each sample is separate.
+    """Return the probability of neighbours that agree so much, if each sample is separate.
 
-    The points of a flow curve or of a sweep are experiments of their own: their noise has no
-    correlation, however smooth what a law leaves of them is, and few points tell it. Products of
-    the nearest neighbours are held against those of the same numbers with signs drawn by lot, so it
-    holds whatever their size does along the series   [Liu 1988, Ann. Stat. 16, 1696]. Always the
-    same lots are drawn.
-
-    `rows`: residuals of each series in the order of its rates, in any unit.
+    Points of a flow curve or sweep are experiments of their own, without correlated noise. Products
+    of the nearest neighbours against the same numbers with signs drawn with a fixed seed [Liu 1988,
+    Ann. Stat. 16, 1696]. `rows`: residuals of each series in the order of its rates.
     """
     generator = np.random.default_rng(0)
     own, drawn = 0.0, np.zeros(_LOTS)
@@ -212,10 +195,9 @@ def separate_probability(rows: Sequence[Float[np.ndarray, " _"]]) -> float:
 
 
 def cycle(record: Float[np.ndarray, " n"]) -> float | None:
-    """Return after how many samples a record repeats itself; None if it does not.
+    """Return the period of a record in samples; None if it does not repeat itself.
 
-    From the first maximum of its autocorrelation after that has lost its sign; evenly sampled
-    oscillations have one.
+    First maximum of the autocorrelation after its sign is lost.
     """
     n = len(record)
     values = record - np.mean(record)

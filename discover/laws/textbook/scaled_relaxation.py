@@ -1,4 +1,4 @@
-"""Saramito law: an elastic solid that flows beyond a yield stress."""
+"""Maxwell laws whose relaxation a scalar scales: Saramito (yield), White–Metzner (rate)."""
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -30,7 +30,7 @@ class Saramito(AbstractConstitutiveLaw):
         return -jnp.where(yielded, self.yield_strain / size, 1.0) * stress
 
 
-def _written() -> IsotropicFunction:
+def _written_saramito() -> IsotropicFunction:
     import sympy
 
     yielding, size = scalars("yield_strain", "size")
@@ -39,6 +39,27 @@ def _written() -> IsotropicFunction:
     where = {"size": sympy.sqrt(sympy.Max(squared, 1e-24))}
     letters = {"yield_strain": "Y", "size": r"\left|\sigma_\mathrm{d}\right|"}
     return IsotropicFunction({"sigma": -yielding / sympy.Max(yielding, size)}, where, letters)
+
+
+class WhiteMetzner(AbstractConstitutiveLaw):
+    """White–Metzner law: h = [(1 + (kγ̇)²)^{(1−n)/2} − 1] σ   [J. Appl. Polym. Sci. 7, 1867, 1963].
+
+    The relaxation time is Carreau's function of the rate, |γ̇|² = ½ γ̇:γ̇, and the modulus constant.
+    """
+
+    onset: Float[Array, ""] = eqx.field(converter=as_parameter)  # k, over λ
+    exponent: Float[Array, ""] = eqx.field(converter=as_parameter)  # n
+    linear_relaxation: bool = eqx.field(static=True, default=True)
+
+    def extra_term(self, stress: Symmetric, rate: Symmetric) -> Symmetric:
+        """Return h(σ, γ̇) as above."""
+        squared = self.onset**2 * 0.5 * inner(rate, rate)
+        return ((1.0 + squared) ** (0.5 * (1.0 - self.exponent)) - 1.0) * stress
+
+
+def _written_white_metzner() -> IsotropicFunction:
+    k, n, squared = scalars("k", "n", "tr(gammadot.gammadot)")
+    return IsotropicFunction({"sigma": (1 + k**2 * squared / 2) ** ((1 - n) / 2) - 1})
 
 
 NAMED = {
@@ -51,7 +72,19 @@ NAMED = {
             "yield at a tenth to a few"
         },
         source="Saramito 2007, J. Non-Newtonian Fluid Mech. 145, 1",
-        written=_written,
+        written=_written_saramito,
         contains={"ucm": {"yield_strain": 0.0}},
-    )
+    ),
+    "white_metzner": NamedLaw(
+        "White–Metzner",
+        WhiteMetzner,
+        {"k": (0.0, 100.0), "n": (0.0, 1.0)},
+        {
+            "k": "a law whose thinning begins at a hundredth of the rate 1/λ has another λ",
+            "n": "Bird, Armstrong & Hassager 1987, ch. 4: from a stress that rises with rate as a "
+            "Newtonian fluid's (1) to one that does not rise (0)",
+        },
+        source="White & Metzner 1963, J. Appl. Polym. Sci. 7, 1867",
+        written=_written_white_metzner,
+    ),
 }
