@@ -63,6 +63,8 @@ class _Needed(NamedTuple):
 
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
     """Return the test that rows hold, after the one before; InputError names what it lacks."""
+    if found.kind == "none":
+        return Record("none", {}, notes=[found.why])
     needed = _needed(readings, found.kind)
     made = _table(readings, found, needed)
     if "time" in made.table:
