@@ -26,8 +26,7 @@ def _formats_like(incomplete: str) -> list[str]:
 @console.guarded
 def fit(
     law: Annotated[
-        str,
-        typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like),
+        str, typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like)
     ],
     data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
     held_out: Annotated[

@@ -17,11 +17,10 @@ from discover.python_child import python_command
 
 
 def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
-    """Return ``runs.csv``, ``lve.csv`` and one CSV for each start-up, by name.
+    """Return ``runs.csv``, ``lve.csv`` and one CSV for each start-up of RepTate's files, by name.
 
-    Times and rates in the source, RepTate's ``*.shear`` and one ``*.tts``, are shifted to the
-    reference temperature; ``time_factor`` is the measured rate over the shifted one, so that time
-    on the instrument is ``time_s / time_factor``.
+    Times and rates are shifted to the reference temperature; ``time_factor`` is the measured rate
+    over the shifted one.
     """
     rows, files = [], {}
     for name in sorted(content):

@@ -99,7 +99,7 @@ class Block:
         Parameters
         ----------
         columns
-            Unit, empty for a pure number, and values of each column, by its name. All have the same
+            Unit, empty for a pure number, and values of each column, by its name. All have one
             shape (n,); a value that is nan is an empty cell.
         name
             What the file calls the block.
@@ -156,13 +156,10 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 
 
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
-    """Return the blocks of numbers among the lines of a table.
+    """Return the blocks of numbers among the cells of each line, with decimal points.
 
-    Lines that begin with a word are a block of their own for each word, such as the name of an
-    action or the number of a segment.
-
-    `rows`: the cells of each line, numbers with decimal points. `header_row`: line of the names, if
-    the line above the numbers is not it; then only the block below.
+    Lines that begin with a word, such as the number of a segment, are a block for each word.
+    `header_row`: line of the names, where it is not that above the numbers; then one block.
     """
     blocks: list[Block] = []
     header: _Columns | None = None
@@ -213,12 +210,12 @@ def _by_label(
         groups = [("", numbered)]
     name = _name(rows, data)
     for label, lines in groups:
-        if label and label != _DATA_POINT and len(lines) < 2:
+        own = "" if label == _DATA_POINT else label
+        if own and len(lines) < 2:
             continue  # a line about the measurement, such as the number of its points
         # what the instrument itself calls invalid is no number
         valid = [[] if any(map(_INVALID.search, row)) else row for _, row in lines]
-        whole = label if label and label != _DATA_POINT else name
-        yield Block(whole, header, _padded(valid, width), lines[0][0], constants)
+        yield Block(own or name, header, _padded(valid, width), lines[0][0], constants)
 
 
 def _padded(rows: Rows, width: int) -> tuple[tuple[str, ...], ...]:

@@ -161,20 +161,20 @@ def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
 def _power(text: str) -> Unit | None:
     """Return a word with its exponent, such as cm2 or s^-1."""
     match = re.fullmatch(r"((?:[^\W\d_]|[°%])+)\^?(-?[1-9])?", text)
-    if match is None:
-        return None
-    word = _word(match.group(1))
-    return None if word is None else Unit().times(word, int(match.group(2) or 1))
+    word = None if match is None else _word(match[1])
+    return None if match is None or word is None else Unit().times(word, int(match[2] or 1))
 
 
 @cache
 def _word(text: str) -> Unit | None:
     """Return a single word, such as kPa or seconds, from pint."""
-    word = _SPELLINGS.get(text, text)
+    word, parse = _SPELLINGS.get(text, text), _registry().parse_unit_name
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 2 else (word,):
-        parsed = _registry().parse_unit_name(name)
-        if not parsed or _is_short_plural(name):
+        parsed, symbol = parse(name), name.removesuffix("s")
+        # a symbol with an s, as Pas, is no plural of Pa
+        plural = len(name) <= 4 and symbol != name and parsed[:1] == parse(symbol)[:1]
+        if not parsed or plural:
             continue
         unit = _registry().Unit(parsed[0][0] + parsed[0][1])
         size = _registry().Quantity(1.0, unit).to_base_units()
@@ -183,12 +183,6 @@ def _word(text: str) -> Unit | None:
             kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
             return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
     return None
-
-
-def _is_short_plural(name: str) -> bool:
-    """Return whether a name is a symbol with an s, as Pas, which is no plural of Pa."""
-    parse, symbol = _registry().parse_unit_name, name.removesuffix("s")
-    return len(name) <= 4 and symbol != name and parse(name)[:1] == parse(symbol)[:1]
 
 
 @cache
@@ -253,38 +247,31 @@ def heading_factor(column: str, quantity: Quantity) -> float:
 
 def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
     """Say in words how a column becomes SI; empty if it is in SI units already."""
-    if factor == 1.0:
-        if "rad" in quantity.unit and "rad" not in column:
-            return (
-                f"{column} is read as {quantity.stem} in {quantity.unit}; if it counts cycles, "
-                f"name it {quantity.stem}_Hz"
-            )
+    stem, unit = quantity.stem, quantity.unit
+    if factor != 1.0:
+        return f"{column} is read as {stem}, times {factor:.6g}" + (f" to {unit}" if unit else "")
+    if "rad" not in unit or "rad" in column:
         return ""
-    return f"{column} is read as {quantity.stem}, times {factor:.6g}" + (
-        f" to {quantity.unit}" if quantity.unit else ""
-    )
+    return f"{column} is read as {stem} in {unit}; if it counts cycles, name it {stem}_Hz"
 
 
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
     """Column of a quantity and its factor to SI, or None; InputError on two, or a wrong unit."""
-    found = []
+    found = [(name, 1.0) for name in names if name == quantity.column]
     for name in names:
-        if name == quantity.column:
-            found.append((name, 1.0))
-        elif name.startswith(quantity.stem + "_"):
-            suffix = name[len(quantity.stem) + 1 :]
-            if (unit := read_heading(suffix)) is None:
-                continue
-            factor = factor_to(unit, quantity)
-            if factor is None:
-                raise InputError(
-                    f"The column {name} has the unit {suffix.replace('_', '/')}, which is not a "
-                    f"unit of {quantity.stem}. Name the column {quantity.column}, or give another "
-                    f"unit of {quantity.unit or 'a pure number'} after the underscore."
-                )
-            found.append((name, factor))
+        suffix = name.removeprefix(f"{quantity.stem}_")
+        unit = None if name in (suffix, quantity.column) else read_heading(suffix)
+        if unit is None:
+            continue
+        factor = factor_to(unit, quantity)
+        if factor is None:
+            raise InputError(
+                f"The column {name} has the unit {suffix.replace('_', '/')}, which is not a "
+                f"unit of {quantity.stem}. Name the column {quantity.column}, or give another "
+                f"unit of {quantity.unit or 'a pure number'} after the underscore."
+            )
+        found.append((name, factor))
     if len(found) > 1:
-        raise InputError(
-            f"Both {found[0][0]} and {found[1][0]} hold {quantity.stem}. Keep one of them."
-        )
+        first, second = sorted((name for name, _ in found[:2]), key=list(names).index)
+        raise InputError(f"Both {first} and {second} hold {quantity.stem}. Keep one of them.")
     return found[0] if found else None
