@@ -247,13 +247,11 @@ def _smooth_curves(
         return n * np.log(max(square, 1e-300)) + curve.constants * np.log(n)
 
     for cold, warm in zip(colder, warmer, strict=True):
-        both = (
-            _Curve(x[there], cold[there], heavy[there]),
-            _Curve(z[rows], warm[rows], weight[rows]),
-        )
+        fixed = _Curve(x[there], cold[there], heavy[there])
+        moving = _Curve(z[rows], warm[rows], weight[rows])
         splines = []
         for degree, intervals in forms:
             inner = np.linspace(*ends, intervals + 1)
             knots = np.concatenate([[ends[0]] * degree, inner, [ends[1]] * degree])
-            splines.append(_SmoothCurve(*both, pair.along, pair.up, knots, degree))
+            splines.append(_SmoothCurve(fixed, moving, pair.along, pair.up, knots, degree))
         yield min(splines, key=criterion)
