@@ -1,6 +1,7 @@
 """Commands that run studies: demo, compare, close-loop, batch."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,36 +13,43 @@ if TYPE_CHECKING:  # --help needs no studies
     from discover.study.schema import Study
 
 
-@console.guarded
-def compare(
-    study: console.StudyArgument,
-    out: console.OutOption = None,
-    seed: console.SeedOption = None,
-    quiet: console.QuietOption = False,
-    as_json: console.JsonOption = False,
-    overwrite: console.OverwriteOption = False,
-    tolerance: console.ToleranceOption = None,
-) -> None:
-    """Run both learners on the same data and write a comparison report."""
-    from discover.batch.run import run_compare
+def _command(task: str, words: str) -> Callable[..., None]:
+    """Return the command that runs one task of `discover.batch.run` on a study."""
 
-    _run_task(run_compare, study, out, seed, quiet, as_json, overwrite, tolerance)
+    def command(
+        study: console.StudyArgument,
+        out: console.OutOption = None,
+        seed: console.SeedOption = None,
+        quiet: console.QuietOption = False,
+        as_json: console.JsonOption = False,
+        overwrite: console.OverwriteOption = False,
+        tolerance: console.ToleranceOption = None,
+    ) -> None:
+        from discover.batch import run
+
+        folder = out or Path("results") / run.folder_names([study])[0]
+        with console.progress_bar(quiet) as report:
+            execute = getattr(run, task)
+            result = execute(study, folder, seed, overwrite, report, _tell_of_folder, tolerance)
+        if as_json:
+            typer.echo(result.json_file.read_text("utf-8"))
+        elif not quiet:
+            if result.was_complete:
+                console.say(f"{folder} is complete; use --overwrite to start afresh.")
+            console.say(result.text)
+            console.say(f"Report: {result.report.resolve()}")
+
+    command.__doc__ = words
+    return console.guarded(command)
 
 
-@console.guarded
-def close_loop(
-    study: console.StudyArgument,
-    out: console.OutOption = None,
-    seed: console.SeedOption = None,
-    quiet: console.QuietOption = False,
-    as_json: console.JsonOption = False,
-    overwrite: console.OverwriteOption = False,
-    tolerance: console.ToleranceOption = None,
-) -> None:
-    """Fit a model, find what it lacks, add that, and test the result on held-out runs."""
-    from discover.batch.run import run_close_loop
-
-    _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite, tolerance)
+compare = _command(
+    "run_compare", "Run both learners on the same data and write a comparison report."
+)
+close_loop = _command(
+    "run_close_loop",
+    "Fit a model, find what it lacks, add that, and test the result on held-out runs.",
+)
 
 
 @console.guarded
@@ -99,32 +107,6 @@ def demo(
         for title, page in pages.items():
             console.say(f"{title}: {page.resolve()}")
         typer.echo("Open them in a browser.")
-
-
-def _run_task(
-    task,
-    study: Path,
-    out: Path | None,
-    seed: int | None,
-    quiet: bool,
-    as_json: bool,
-    over: bool,
-    tolerance: float | None,
-) -> None:
-    from discover.batch.run import folder_names
-
-    folder = out or Path("results") / folder_names([study])[0]
-    with console.progress_bar(quiet) as report:
-        result = task(study, folder, seed, over, report, _tell_of_folder, tolerance)
-    if as_json:
-        typer.echo(result.json_file.read_text("utf-8"))
-        return
-    if quiet:
-        return
-    if result.was_complete:
-        console.say(f"{folder} is complete; use --overwrite to start afresh.")
-    console.say(result.text)
-    console.say(f"Report: {result.report.resolve()}")
 
 
 def _tell_of_folder(study: "Study") -> None:
