@@ -142,26 +142,19 @@ class Dataset(NotebookView):
     @property
     def thinned(self) -> str:
         """What was thinned, in sentences, one for each way; empty if nothing was."""
-        said: dict[str, list[str]] = {}
-        for run in self.runs:
-            if "thinned" in run.metadata:
-                said.setdefault(str(run.metadata["thinned"]), []).append(run.name)
-        if self.linear_sweep is not None and self.linear_sweep.thinned:
-            said.setdefault(self.linear_sweep.thinned, []).append("the linear sweep")
-        return " ".join(f"{', '.join(names)}: {text}." for text, names in said.items())
+        said = {run.name: str(run.metadata.get("thinned", "")) for run in self.runs}
+        sweep = "" if self.linear_sweep is None else self.linear_sweep.thinned
+        named = _by_text({**said, "the linear sweep": sweep})
+        return " ".join(f"{', '.join(names)}: {text}." for text, names in named.items())
 
     @property
     def left_out(self) -> str:
         """Which runs were set aside and why, in sentences, one for each reason."""
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.set_aside.items():
-            reasons.setdefault(reason, []).append(name)
-        return " ".join(
-            f"{first} and {len(more)} more runs like it are set aside: {reason}."
-            if more
-            else f"{first} is set aside: {reason}."
-            for reason, (first, *more) in reasons.items()
-        )
+        said = []
+        for reason, (first, *more) in _by_text(self.set_aside).items():
+            them = f"{first} and {len(more)} more runs like it are" if more else f"{first} is"
+            said.append(f"{them} set aside: {reason}.")
+        return " ".join(said)
 
     def table(self) -> pd.DataFrame:
         """Return the runs as a table, one line each; units are in the names of the columns."""
@@ -287,6 +280,15 @@ class Dataset(NotebookView):
         )
         table.insert(0, "run", table.pop("run"))
         return table
+
+
+def _by_text(said: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return names by what is said of them, where anything is."""
+    named: dict[str, list[str]] = {}
+    for name, text in said.items():
+        if text:
+            named.setdefault(text, []).append(name)
+    return named
 
 
 def _are_names(names: object) -> bool:

@@ -18,7 +18,7 @@ from discover.dataset.importing.folder_files import (
 )
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
-from discover.dataset.importing.names import name_table
+from discover.dataset.importing.names import alternatives, name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
 from discover.dataset.importing.quantities import (
     UnsaidUnits,
@@ -247,13 +247,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     return found
 
 
-_CALIBRATION = re.compile(
-    r"calibra|kalibri|étalon|taratura|verification|(reference|standard|référence) (oil|fluid)"
-    r"|viscosity standard"
-    r"|\bblank (run|test|measurement)\b|empty (tool|geometry|cup)|leermessung|prüföl|referenzöl"
-    r"|air check|self-?test|校正|校准|標準液|較正|보정|교정",
-    re.IGNORECASE,
-)
+_CALIBRATION = re.compile(alternatives("lines")["calibrations"], re.IGNORECASE)
 _A_CALIBRATION = (
     "a calibration or check of the instrument by its title, no test of the sample; to take it "
     "nevertheless, say what it is, as in --test {}=flow_curve"

@@ -146,6 +146,13 @@ def shipped_names() -> dict[str, tuple[str, ...]]:
     }
 
 
+@cache
+def alternatives(table: str) -> dict[str, str]:
+    """Return the regular expressions of a table of ``words.toml``, one for each key."""
+    content = tomllib.loads((files("discover.dataset.importing") / "words.toml").read_text("utf-8"))
+    return {key: "|".join(words) for key, words in content[table].items()}
+
+
 _table = cache(lambda own: NameTable(dict(own)))
 
 

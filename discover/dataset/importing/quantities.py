@@ -133,8 +133,10 @@ def to_celsius(value: float, unit: str) -> float | None:
     scale = scale.upper().translate({0x421: "C", 0x41A: "K"})  # as a Russian keyboard writes them
     if scale in ("", "-", "1") and "°" not in unit and "deg" not in unit:
         return None if not unit else value  # a program's table says a pure number
-    if scale in ("C", "CELSIUS", "K", "KELVIN"):
-        return value - (273.15 if scale[0] == "K" else 0.0)
+    if scale in ("C", "CELSIUS"):
+        return value
+    if scale in ("K", "KELVIN"):
+        return value - 273.15
     return (value - 32.0) / 1.8 if scale in ("F", "FAHRENHEIT") else None
 
 

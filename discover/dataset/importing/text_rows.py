@@ -81,7 +81,8 @@ def _reading(match: re.Match | None, american: bool, in_hours: bool) -> float:
         date = [match[key] for key in ("year", "month", "day")]
     else:
         year = match["last"] if len(match["last"]) > 2 else f"20{match['last']}"
-        date = [year, *(match[key] for key in ("second", "first")[:: -1 if american else 1])]
+        month, day = ("first", "second") if american else ("second", "first")
+        date = [year, match[month], match[day]]
     try:
         return datetime(*map(int, date), tzinfo=UTC).timestamp() + time
     except ValueError:  # no such day

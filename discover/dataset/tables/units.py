@@ -2,9 +2,11 @@
 
 import math
 import re
+import tomllib
 import unicodedata
 from collections.abc import Sequence
 from functools import cache, reduce
+from importlib.resources import files
 from typing import NamedTuple
 
 from discover.errors import InputError
@@ -14,25 +16,15 @@ from discover.errors import InputError
 # and ``9**9**9`` is not worked out. What a single word means is asked of pint.
 
 _LONGEST = 40  # characters
-_SPELLINGS = {  # what pint does not know under this name
-    "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
-    "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
-    "pa": "Pa", "PA": "Pa", "kpa": "kPa",
-    "KPa": "kPa", "Mpa": "MPa", "cp": "cP", "CP": "cP", "hz": "Hz", "HZ": "Hz",
-    "Sekunden": "s", "Minuten": "min", "Stunden": "hour", "Prozent": "percent",
-    "secondes": "s", "heures": "hour", "segundos": "s", "minutos": "min", "secondi": "s",
-    "seconden": "s", "sekundy": "s", "секунды": "s", "минуты": "min", "проценты": "percent",
-    "Sek": "s", "sek": "s", "seg": "s", "Std": "hour", "Dyn": "dyn",
-    "Па": "Pa", "мПа": "mPa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "П": "P", "сП": "cP",
-    "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "hour", "рад": "rad", "мрад": "mrad",
-    "Гц": "Hz", "град": "degree", "Н": "N", "мН": "mN", "мкН": "uN", "м": "m", "мм": "mm",
-    "мкм": "um", "см": "cm", "дин": "dyn", "об": "turn",
-    "秒": "s", "毫秒": "ms", "分": "min", "分钟": "min", "分鐘": "min", "小时": "hour",
-    "小時": "hour", "時間": "hour", "帕": "Pa", "千帕": "kPa", "毫帕": "mPa", "兆帕": "MPa",
-    "赫兹": "Hz", "赫茲": "Hz", "弧度": "rad", "ラジアン": "rad", "ヘルツ": "Hz", "パスカル": "Pa",
-    "度": "degree", "转": "turn", "轉": "turn", "毫米": "mm", "초": "s", "분": "min",
-    "시간": "hour", "도": "degree", "라디안": "rad", "파스칼": "Pa", "헤르츠": "Hz",
-}  # fmt: skip
+
+
+@cache
+def _spellings() -> dict[str, str]:
+    """Return what pint does not know under this name: the unit of each word of ``units.toml``."""
+    content = tomllib.loads((files("discover.dataset.tables") / "units.toml").read_text("utf-8"))
+    return {word: unit for unit, words in content.items() for word in words}
+
+
 # products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms
 _JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
 _NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
@@ -168,7 +160,7 @@ def _power(text: str) -> Unit | None:
 @cache
 def _word(text: str) -> Unit | None:
     """Return a single word, such as kPa or seconds, from pint."""
-    word, parse = _SPELLINGS.get(text, text), _registry().parse_unit_name
+    word, parse = _spellings().get(text, text), _registry().parse_unit_name
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 2 else (word,):
         parsed, symbol = parse(name), name.removesuffix("s")
