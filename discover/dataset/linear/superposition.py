@@ -145,13 +145,12 @@ class Superposition:
 
     def factors(self, at: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return a_T and b_T at a temperature, each with its 95 % interval."""
+        both = zip((self.log_shift[at], self.log_vertical[at]), self.error[at], strict=True)
         a, b = (
-            10.0 ** (value + _TWO_SIDED * error * np.array([0, -1, 1]))
-            for value, error in zip(
-                (self.log_shift[at], self.log_vertical[at]), self.error[at], strict=True
-            )
+            tuple(float(10.0 ** (value + side * _TWO_SIDED * error)) for side in (0, -1, 1))
+            for value, error in both
         )
-        return tuple(a.tolist()), tuple(b.tolist())
+        return a, b  # pyright: ignore[reportReturnType]
 
     def master(self, kind: str) -> LinearTest | None:
         """Return all moved tests of a kind as one; None where they do not become one."""
