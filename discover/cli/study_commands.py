@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from discover.cli import console
+from discover.cli.console import progress_bar
 
 if TYPE_CHECKING:  # --help needs no studies
     from discover.study.schema import Study
@@ -28,7 +29,7 @@ def _command(task: str, words: str) -> Callable[..., None]:
         from discover.batch import run
 
         folder = out or Path("results") / run.folder_names([study])[0]
-        with console.progress_bar(quiet) as report:
+        with progress_bar(quiet) as report:
             execute = getattr(run, task)
             result = execute(study, folder, seed, overwrite, report, _tell_of_folder, tolerance)
         if as_json:
@@ -75,7 +76,7 @@ def batch(
     from discover.batch.run import run_batch
 
     folder = out or Path("results") / "batch"
-    with console.progress_bar(quiet) as report:
+    with progress_bar(quiet) as report:
         result = run_batch(
             studies, folder, workers, scheduler, seed, overwrite, report, _tell_of_folder
         )
@@ -101,7 +102,7 @@ def demo(
     """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
     from discover.batch.run import run_demo
 
-    with console.progress_bar(quiet) as report:
+    with progress_bar(quiet) as report:
         pages = run_demo(out, seed, overwrite, report)
     if not quiet:
         for title, page in pages.items():

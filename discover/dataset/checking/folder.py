@@ -14,7 +14,7 @@ from discover.dataset.checking import linear_theory, start_up
 from discover.dataset.checking import runs as run_checks
 from discover.dataset.checking.runs import Finding, Findings, Severity, found
 from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
-from discover.dataset.load import SWEEP_FILE
+from discover.dataset.load import SWEEP_FILE, read_index
 from discover.dataset.read_run import INDEX_FILE, read_run, reason_to_set_aside, table_of_run
 from discover.dataset.run import Run, require_signal
 from discover.dataset.run_table import run_line
@@ -56,7 +56,7 @@ def check_folder(
     try:
         root = load.resolve_folder(folder, base)
         place = "runs", INDEX_FILE
-        index = load.read_index(root)
+        index = read_index(root)
         findings += [*_clock(index, clock_factor), *_before(index)]
         place = "start", INDEX_FILE
         before = load.rates_before(index, None)
