@@ -48,74 +48,64 @@ def nothing_to_note(study: Study) -> None:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """Where a task's results lie, and what they say in a few lines.
+    """Where a task's results lie, and what they say in a few lines."""
 
-    `report`, `json_file`: the page and the JSON.
-    """
-
-    report: Path
+    report: Path  # the page
     json_file: Path
     text: str  # the verdict, for a terminal
     was_complete: bool  # whether everything was there already
 
 
-def _begin(
-    task: str,
-    path: Path,
-    out: Path,
-    seed: int | None,
-    overwrite: bool,
-    note: Note,
-    tolerance: float | None,
-) -> tuple[Study, RunFolder, TaskResult | None]:
-    """Read a study and open its folder; the last is what the folder holds if that is complete."""
-    enable_x64()
-    enable_compilation_cache()
-    study = read_study(path)
-    if tolerance is not None:
-        verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
-        study = study.model_copy(update={"verdict": verdict})
-    note(study)
-    folder = RunFolder(out, fingerprint(study, task, seed), overwrite)
-    if not (folder.complete and folder.holds(_PAGE, _JSON_FILES[task])):
-        return study, folder, None
-    text = (folder.load("verdict") or {}).get("text", "")
-    return study, folder, _result(task, folder, text, was_complete=True)
+Work = Callable[[Study, int | None, RunFolder, Progress], Sequence[str]]
+"""Fills a folder with the results of a study; returns the verdict in lines."""
 
 
-def _end(task: str, folder: RunFolder, verdict: Sequence[str]) -> TaskResult:
-    """Keep the verdict beside the report, which was written, and close the folder."""
-    text = "\n".join(verdict)
-    folder.save("verdict", {"text": text})
-    folder.finish()
-    return _result(task, folder, text, was_complete=False)
+class _Task:
+    """Work on a study as a command does it, in a folder that is resumed and closed."""
+
+    def __init__(self, name: str, work: Work):
+        self.name, self.work = name, work
+        self.__doc__ = work.__doc__
+
+    def __call__(
+        self,
+        path: Path,
+        out: Path,
+        seed: int | None,
+        overwrite: bool,
+        progress: Progress,
+        note: Note = nothing_to_note,
+        tolerance: float | None = None,
+    ) -> TaskResult:
+        """Run the task.
+
+        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides
+        the study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and
+        the fraction done. `note`: called with the study once it was read. `tolerance`: overrides
+        the relative discrepancy that the study accepts. Raises InputError if the study, its data or
+        the folder is wrong.
+        """
+        enable_x64()
+        enable_compilation_cache()
+        study = read_study(path)
+        if tolerance is not None:
+            verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
+            study = study.model_copy(update={"verdict": verdict})
+        note(study)
+        folder = RunFolder(out, fingerprint(study, self.name, seed), overwrite)
+        there = folder.complete and folder.holds(_PAGE, _JSON_FILES[self.name])
+        if there:
+            text = (folder.load("verdict") or {}).get("text", "")
+        else:
+            text = "\n".join(self.work(study, seed, folder, FollowedBy(progress, _DRAWING)))
+            folder.save("verdict", {"text": text})
+            folder.finish()
+            progress("done", 1.0)
+        return TaskResult(folder.path / _PAGE, folder.path / _JSON_FILES[self.name], text, there)
 
 
-def _result(task: str, folder: RunFolder, text: str, was_complete: bool) -> TaskResult:
-    return TaskResult(folder.path / _PAGE, folder.path / _JSON_FILES[task], text, was_complete)
-
-
-def run_compare(
-    path: Path,
-    out: Path,
-    seed: int | None,
-    overwrite: bool,
-    progress: Progress,
-    note: Note = nothing_to_note,
-    tolerance: float | None = None,
-) -> TaskResult:
-    """Run both learners of a study and write the comparison report.
-
-    `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides the
-    study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and the
-    fraction done. `note`: called with the study once it was read. `tolerance`: overrides the
-    relative discrepancy that the study calls good enough. Raises InputError if the study, its data
-    or the folder is wrong.
-    """
-    study, folder, there = _begin("compare", path, out, seed, overwrite, note, tolerance)
-    if there is not None:
-        return there
-    part = FollowedBy(progress, _DRAWING)
+def _compare(study: Study, seed: int | None, folder: RunFolder, part: Progress) -> Sequence[str]:
+    """Run both learners of a study and write the comparison report."""
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
     from discover.report.overlay import comparison_overlays, read_overlays
@@ -135,28 +125,11 @@ def run_compare(
         overlays = comparison_overlays(sources, comparison.flows, fluid)
     relaxes = study.model.known_relaxation
     write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
-    ended = _end("compare", folder, comparison.answer.lines)
-    progress("done", 1.0)
-    return ended
+    return comparison.answer.lines
 
 
-def run_close_loop(
-    path: Path,
-    out: Path,
-    seed: int | None,
-    overwrite: bool,
-    progress: Progress,
-    note: Note = nothing_to_note,
-    tolerance: float | None = None,
-) -> TaskResult:
-    """Close the loop on a study and write its report.
-
-    Parameters and errors as in `run_compare`; a seed only changes synthetic noise.
-    """
-    study, folder, there = _begin("close-loop", path, out, seed, overwrite, note, tolerance)
-    if there is not None:
-        return there
-    part = FollowedBy(progress, _DRAWING)
+def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progress) -> Sequence[str]:
+    """Close the loop on a study and write its report; a seed only changes synthetic noise."""
     from discover.dataset.run_table import material_and_temperature
     from discover.loop.loop import run_loop_on
     from discover.report.loop.report import write_loop
@@ -172,37 +145,30 @@ def run_close_loop(
     asked = dict(study.loop)
     result = run_loop_on(data_of_study, declared, part, laws=model.choice, **asked)
     result = replace(result, tolerance=study.verdict.tolerance)
-    each = data_of_study.each
     part("drawing", 1.0)
-    window = "" if study.loop.strain is None else f", strain {study.loop.strain[0]:g} to "
-    window += "" if study.loop.strain is None else f"{study.loop.strain[1]:g}"
+    dataset, window, each = data_of_study.dataset, study.loop.strain, data_of_study.each
+    strain = "" if window is None else f", strain {window[0]:g} to {window[1]:g}"
+    held_out = "each held out in turn" if each else f"{len(data_of_study.held_out)} held out"
+    known = ", ".join(effect.text for effect in model.effects)
+    law = model.described
+    if result.laws:
+        law = f"{result.laws[0].title}, chosen of {len(result.laws)} laws"
     summary = (
-        f"Data: {data_of_study.dataset.name}, {counted(len(data_of_study.fit), 'run')} fitted, "
-        f"{'each' if each else len(data_of_study.held_out)} held out"
-        f"{' in turn' if each else ''}{window}. "
-        f"Declared model: {_chosen(result) or model.described}, {model.modes_in_words}"
-        f"{_beside(model)}. "
-        f"{f'{model.source} ' if model.source else ''}"
-        f"{data_of_study.dataset.left_out} {data_of_study.dataset.thinned}"
+        f"Data: {dataset.name}, {counted(len(data_of_study.fit), 'run')} fitted, {held_out}{strain}"
+        f". Declared model: {law}, {model.modes_in_words}"
+        f"{f'; known effects: {known}' if known else ''}. "
+        f"{f'{model.source} ' if model.source else ''}{dataset.left_out} {dataset.thinned}"
     ).strip()
-    conditions = material_and_temperature(data_of_study.dataset, study.data.material)
-    overlays = loop_overlays(sources, result.records, data_of_study.dataset, model.fluid)
+    conditions = material_and_temperature(dataset, study.data.material)
+    overlays = loop_overlays(sources, result.records, dataset, model.fluid)
     write_loop(
         result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays
     )
-    ended = _end("close-loop", folder, result.answer.lines)
-    progress("done", 1.0)
-    return ended
+    return result.answer.lines
 
 
-def _chosen(result) -> str:
-    """Return the law that the runs asked for, of several."""
-    return f"{result.laws[0].title}, chosen of {len(result.laws)} laws" if result.laws else ""
-
-
-def _beside(model) -> str:
-    """Return the effects of the declared model, in words."""
-    return f"; known effects: {', '.join(e.text for e in model.effects)}" if model.effects else ""
+run_compare, run_close_loop = _Task("compare", _compare), _Task("close-loop", _close_loop)
+_TASKS = {task.name: task for task in (run_compare, run_close_loop)}
 
 
 def run_demo(
@@ -220,9 +186,6 @@ def run_demo(
     return {"Comparison of two learners": first.report, "Closed loop": second.report}
 
 
-_TASKS = {"compare": run_compare, "close-loop": run_close_loop}
-
-
 def run_batch(
     paths: Sequence[Path],
     out: Path,
@@ -236,13 +199,9 @@ def run_batch(
     """Run studies into folders of their own; one that fails does not stop the others.
 
     A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
-    one with both does both.
-
-    `workers`: processes on this machine; with 1, everything happens in this one. `scheduler`:
-    address of a dask scheduler to use instead; see `discover.batch.workers`. `progress`: called
-    with what is going on and the fraction done. `note`: called with every study that can be read,
-    before the first runs. Raises InputError if two studies would write to one folder, or `out`
-    cannot be written to.
+    one with both does both. `workers`: processes on this machine; with 1, everything happens in
+    this one. `scheduler`: address of a dask scheduler to use instead. Raises InputError if two
+    studies would write to one folder, or `out` cannot be written to.
     """
     make_folder(out)
     if not overwrite:
@@ -279,10 +238,8 @@ def run_batch(
 def folder_names(paths: Sequence[Path]) -> list[str]:
     """Return a folder name for every study: its stem, with its folder's name where stems repeat.
 
-    Names that differ by upper and lower case alone are one name: on many disks they are. A study
-    that has the name of one of the batch's own files gets ``study-`` before it.
-
-    Raises InputError if two studies still have one name.
+    Names that differ by capitals alone are one name. A study that has the name of one of the
+    batch's own files gets ``study-`` before it. Raises InputError if two still have one name.
     """
     stems = [path.stem.strip(".") or "study" for path in paths]  # "...toml" is no way out
     times = Counter(stem.casefold() for stem in stems)
@@ -316,18 +273,20 @@ def run_one(
 ) -> StudyStatus:
     """Run one study and say how it ended; never raises for a failure of the study."""
     started = perf_counter()
+
+    def ended(status: str, text: str, input_error: bool = False) -> StudyStatus:
+        return StudyStatus(name, task, status, text, input_error, perf_counter() - started)
+
     try:
         result = _TASKS[task](Path(path), Path(out), seed, overwrite, progress)
     except InputError as error:
-        return StudyStatus(name, task, "failed", str(error), True, perf_counter() - started)
+        return ended("failed", str(error), True)
     except OSError as error:
-        reason = plain_os_error(error)
-        return StudyStatus(name, task, "failed", reason, False, perf_counter() - started)
+        return ended("failed", plain_os_error(error))
     except Exception as error:
-        reason = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
-        return StudyStatus(name, task, "failed", reason, False, perf_counter() - started)
-    status = "complete" if result.was_complete else "done"
-    return StudyStatus(name, task, status, result.text, False, perf_counter() - started)
+        first = (str(error).splitlines() or [""])[0]
+        return ended("failed", f"{type(error).__name__}: {first}")
+    return ended("complete" if result.was_complete else "done", result.text)
 
 
 def _tasks_of(path: Path, name: str, note: Note) -> list[tuple[str, str]]:

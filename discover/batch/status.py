@@ -24,10 +24,7 @@ QUANTITIES = ("sigma12", "N1", "N2")
 
 @dataclass(frozen=True)
 class LearnerRow:
-    """What one learner found in one study.
-
-    `terms`: term, coefficient and inner parameters.
-    """
+    """What one learner found in one study: terms with coefficient and inner parameters."""
 
     terms: tuple[tuple[str, float, Mapping[str, float]], ...]
     errors: Mapping[str, float]  # largest relative error of each quantity in flows that no fit saw
@@ -44,12 +41,7 @@ class LearnerRow:
 
 @dataclass(frozen=True)
 class StudyRow:
-    """One study as the tables of a batch show it; everything empty where it failed.
-
-    `chosen`: terms that each rule for choosing a law takes, by rule.
-    `error_before`, `error_after`: on its held-out runs, or on the fitted ones where none were held
-        out.
-    """
+    """One study as the tables of a batch show it; everything empty where it failed."""
 
     learners: Mapping[str, LearnerRow] = field(default_factory=dict)  # by name
     rivals: int | None = None  # number of laws that its data do not tell from the one found
@@ -57,6 +49,7 @@ class StudyRow:
     chosen: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     effects: tuple[str, ...] = ()  # effects that a closed loop added
     verdict: str = ""  # of the closed loop, or of the comparison
+    # on its held-out runs, or on the fitted ones where none were held out
     error_before: float | None = None
     error_after: float | None = None
 
@@ -139,13 +132,10 @@ def results_table(rows: Sequence[StudyRow]) -> pd.DataFrame:
 
 @dataclass(frozen=True)
 class StudyStatus:
-    """How one study ended.
+    """How one study ended."""
 
-    `name`, `task`: folder under the batch's, and ``compare`` or ``close-loop``.
-    """
-
-    name: str
-    task: str
+    name: str  # its folder under the batch's
+    task: str  # ``compare`` or ``close-loop``
     status: str  # ``waiting``, ``done``, ``complete`` (was there already) or ``failed``
     text: str  # the verdict, or the reason of the failure
     input_error: bool = False  # whether the failure is the user's to mend
@@ -173,8 +163,7 @@ class BatchResult(NotebookView):
     def table(self) -> pd.DataFrame:
         """Return how the studies ended and what they found as a table, one line each.
 
-        Nothing in it depends on when or how often a study was run: how long it took, and whether
-        its result was there already, is in `studies`.
+        Nothing in it depends on when or how often a study was run, as `studies` does.
         """
         states = {
             "study": [study.name for study in self.studies],
@@ -211,10 +200,7 @@ _PAUSE = 1.0  # seconds between two lines of one study that a worker sends
 class BatchProgress:
     """Adds up studies that run side by side or one after the other.
 
-    Studies whose result was there already do not count: time left is estimated from the fraction
-    done, and finding a result takes no time.
-
-    `progress`: called with what is going on and the fraction done.
+    Studies whose result was there already do not count: finding it takes no time.
     """
 
     def __init__(self, names: list[str], progress: Progress):
@@ -267,10 +253,7 @@ _PAGE_PAUSE = 5.0  # seconds for which news are gathered before the page is writ
 
 
 class Summary:
-    """Writes ``index.html``, ``table.csv`` and ``batch.json``.
-
-    `out`: folder of the batch. `jobs`: name and task of every study, in their order.
-    """
+    """Writes ``index.html``, ``table.csv`` and ``batch.json`` of jobs, given as name and task."""
 
     def __init__(self, out: Path, jobs: Sequence[tuple[str, str]]):
         self.out = out

@@ -25,6 +25,8 @@ _log = logging.getLogger(__name__)
 _COMMAND = python_command("-m", "discover.batch.worker")
 _STARTS = 3  # of a worker; what kills it as it starts, such as a short lack of memory, passes
 _DEATHS = 3  # workers that one study may kill
+_DIED = "Several workers died while they ran it; look at their memory and time limits."
+_KEPT = "What was finished is kept; run again to go on."
 
 Job = tuple[str, str, str, str, int | None, bool]
 """Study file, name, task, folder, seed, overwrite: what `discover.batch.run.run_one` takes."""
@@ -39,11 +41,9 @@ def run_in_workers(
 ) -> None:
     """Run jobs side by side.
 
-    A study whose worker dies goes to another, where it continues from its last finished part.
-    Where no worker can be started, the studies run in this process, one after the other.
-
-    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
-    called with the position of a job that has ended, and how.
+    A study whose worker dies goes to another, where it continues from its last finished part. Where
+    no worker can be started, the studies run in this process. `say`: called with the position of a
+    job, what is going on in it, and the fraction done. `end`: with the position, and how it ended.
     """
     team = _Team(run)
     with on_stop(team.stop), ThreadPoolExecutor(workers) as threads:
@@ -91,11 +91,7 @@ class _Team:
                 self._idle.put(worker)
                 return status
             worker.kill()
-        text = (
-            "Several workers died while they ran it; look at their memory and time limits. What "
-            "was finished is kept; run again to go on."
-        )
-        return StudyStatus(name, task, "failed", text)
+        return StudyStatus(name, task, "failed", f"{_DIED} {_KEPT}")
 
     def _worker(self) -> "_Worker | None":
         """Return a worker that waits, or a new one; None if none can be started."""
@@ -168,13 +164,10 @@ def run_on_cluster(
     say: Callable[[int, str, float], None],
     end: Callable[[int, StudyStatus], None],
 ) -> None:
-    """Run jobs side by side.
+    """Run jobs side by side on a dask cluster, whose workers know files by the same paths.
 
-    `run`: what a worker calls with a job, and with a function for its progress. `jobs`: paths in
-    them must mean the same in the workers as here. `scheduler`: address of the scheduler. For
-    ``tls://`` the certificates are those that dask's own settings name, ``distributed.comm.tls``.
-    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
-    called with the position of a job that has ended, and how. Raises InputError if dask is not
+    For ``tls://`` the certificates are those that dask's own settings name,
+    ``distributed.comm.tls``. `say`, `end`: as in `run_in_workers`. Raises InputError if dask is not
     installed, or no scheduler answers at the address.
     """
     try:
@@ -194,11 +187,9 @@ def run_on_cluster(
         topic = f"discover-{uuid4()}"
         client.subscribe_topic(topic, lambda event: say(*event[1]))
         futures = {}
-        for i, (path, name, task, out, seed, overwrite) in enumerate(jobs):
-            arguments = (str(Path(path).resolve()), name, task, str(Path(out).resolve()))
-            future = client.submit(
-                _run_on_worker, run, topic, i, *arguments, seed, overwrite, pure=False
-            )
+        for i, (path, name, task, out, *rest) in enumerate(jobs):
+            places = (str(Path(path).resolve()), name, task, str(Path(out).resolve()))
+            future = client.submit(_run_on_worker, run, topic, i, *places, *rest, pure=False)
             futures[future] = i
         for future in as_completed(futures):
             i = futures[future]
@@ -258,10 +249,8 @@ def _status_of(future: Any, job: Job) -> StudyStatus:
 
         # dask's own words hold keys and addresses, which no two runs share
         reason = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}."
-        if isinstance(error, KilledWorker):
-            reason = "Several workers died while they ran it; look at their memory and time limits."
-        text = f"{reason} What was finished is kept; run again to go on."
-        return StudyStatus(name, task, "failed", text)
+        reason = _DIED if isinstance(error, KilledWorker) else reason
+        return StudyStatus(name, task, "failed", f"{reason} {_KEPT}")
     status: StudyStatus = future.result()
     if status.status != "failed" and not (Path(out) / "report.html").is_file():
         text = (

@@ -150,13 +150,10 @@ _PATIENCE = 4.0  # seconds for last words
 def obeying_interrupts() -> Iterator[None]:
     """End the process within about a second of Ctrl-C, with one line and `INTERRUPTED_CODE`.
 
-    Python alone raises an exception in the main thread between two of its instructions. While a
-    program is compiled there is none for many seconds, pools of threads are waited for, and where
-    the exception meets a library's callback it is lost. So a thread of its own listens here, has
-    the last words said and ends the process. Files are whole or absent at any time, so nothing
-    else has to be put in order.
-
-    Does nothing outside the main thread, and where somebody else handles the signal already.
+    Python alone raises an exception in the main thread between two of its instructions: never while
+    a program is compiled, and it is lost in a library's callback. So a thread of its own listens,
+    has the last words said and ends the process; files are whole or absent at any time. Does
+    nothing outside the main thread, and where somebody else handles the signal already.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -221,19 +218,14 @@ def guarded(command: Callable[..., None]) -> Callable[..., None]:
             _fail(str(error), 2)
         except KeyboardInterrupt:
             _fail(INTERRUPTED, INTERRUPTED_CODE)
-        except OSError as error:
-            if os.environ.get(DEBUG_VARIABLE):
-                raise
-            _fail(plain_os_error(error), 1)
         except Exception as error:
             if os.environ.get(DEBUG_VARIABLE):
                 raise
-            first = (str(error).splitlines() or [""])[0]
-            _fail(
-                f"{type(error).__name__}: {first} (not your input's fault; set {DEBUG_VARIABLE}=1 "
-                "for the traceback)",
-                1,
-            )
+            if isinstance(error, OSError):
+                _fail(plain_os_error(error), 1)
+            said = f"{type(error).__name__}: {(str(error).splitlines() or [''])[0]}"
+            remedy = f"set {DEBUG_VARIABLE}=1 for the traceback"
+            _fail(f"{said} (not your input's fault; {remedy})", 1)
 
     return run
 

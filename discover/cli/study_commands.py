@@ -1,62 +1,59 @@
 """Commands that run studies: demo, compare, close-loop, batch."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from discover.cli.console import (
-    JsonOption,
-    OutOption,
-    OverwriteOption,
-    QuietOption,
-    SeedOption,
-    StudyArgument,
-    ToleranceOption,
-    guarded,
-    progress_bar,
-    say,
-    say_error,
-)
+from discover.cli import console
+from discover.cli.console import progress_bar
 
 if TYPE_CHECKING:  # --help needs no studies
     from discover.study.schema import Study
 
 
-@guarded
-def compare(
-    study: StudyArgument,
-    out: OutOption = None,
-    seed: SeedOption = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-    overwrite: OverwriteOption = False,
-    tolerance: ToleranceOption = None,
-) -> None:
-    """Run both learners on the same data and write a comparison report."""
-    from discover.batch.run import run_compare
+def _command(task: str, words: str) -> Callable[..., None]:
+    """Return the command that runs one task of `discover.batch.run` on a study."""
 
-    _run_task(run_compare, study, out, seed, quiet, as_json, overwrite, tolerance)
+    def command(
+        study: console.StudyArgument,
+        out: console.OutOption = None,
+        seed: console.SeedOption = None,
+        quiet: console.QuietOption = False,
+        as_json: console.JsonOption = False,
+        overwrite: console.OverwriteOption = False,
+        tolerance: console.ToleranceOption = None,
+    ) -> None:
+        from discover.batch import run
 
+        folder = out or Path("results") / run.folder_names([study])[0]
+        with progress_bar(quiet) as report:
+            execute = getattr(run, task)
+            result = execute(study, folder, seed, overwrite, report, _tell_of_folder, tolerance)
+        if as_json:
+            typer.echo(result.json_file.read_text("utf-8"))
+        elif not quiet:
+            if result.was_complete:
+                console.say(f"{folder} is complete; use --overwrite to start afresh.")
+            console.say(result.text)
+            console.say(f"Report: {result.report.resolve()}")
 
-@guarded
-def close_loop(
-    study: StudyArgument,
-    out: OutOption = None,
-    seed: SeedOption = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-    overwrite: OverwriteOption = False,
-    tolerance: ToleranceOption = None,
-) -> None:
-    """Fit a model, find what it lacks, add that, and test the result on held-out runs."""
-    from discover.batch.run import run_close_loop
-
-    _run_task(run_close_loop, study, out, seed, quiet, as_json, overwrite, tolerance)
+    command.__doc__ = words
+    return console.guarded(command)
 
 
-@guarded
+compare = _command(
+    "run_compare", "Run both learners on the same data and write a comparison report."
+)
+close_loop = _command(
+    "run_close_loop",
+    "Fit a model, find what it lacks, add that, and test the result on held-out runs.",
+)
+
+
+@console.guarded
 def batch(
     studies: Annotated[list[Path], typer.Argument(help="Study files.", show_default=False)],
     out: Annotated[
@@ -70,10 +67,10 @@ def batch(
         str | None,
         typer.Option("--scheduler", help="Address of a dask scheduler, tls://host:port."),
     ] = None,
-    seed: SeedOption = None,
-    quiet: QuietOption = False,
-    as_json: JsonOption = False,
-    overwrite: OverwriteOption = False,
+    seed: console.SeedOption = None,
+    quiet: console.QuietOption = False,
+    as_json: console.JsonOption = False,
+    overwrite: console.OverwriteOption = False,
 ) -> None:
     """Run many studies; one that fails is listed with its reason and does not stop the rest."""
     from discover.batch.run import run_batch
@@ -86,21 +83,21 @@ def batch(
     if as_json:
         typer.echo(json.dumps(result.to_json(), indent=2))
     elif not quiet:
-        say(result.text())
+        console.say(result.text())
     for study in result.failed:
-        say_error(f"{study.name} ({study.task}): {study.text}")
+        console.say_error(f"{study.name} ({study.task}): {study.text}")
     if result.failed:
         raise typer.Exit(2 if all(s.input_error for s in result.failed) else 1)
 
 
-@guarded
+@console.guarded
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")] = Path(
         "discover-demo"
     ),
-    seed: SeedOption = None,
-    quiet: QuietOption = False,
-    overwrite: OverwriteOption = False,
+    seed: console.SeedOption = None,
+    quiet: console.QuietOption = False,
+    overwrite: console.OverwriteOption = False,
 ) -> None:
     """Run a small comparison and a closed loop on synthetic data, in about two minutes."""
     from discover.batch.run import run_demo
@@ -109,34 +106,8 @@ def demo(
         pages = run_demo(out, seed, overwrite, report)
     if not quiet:
         for title, page in pages.items():
-            say(f"{title}: {page.resolve()}")
+            console.say(f"{title}: {page.resolve()}")
         typer.echo("Open them in a browser.")
-
-
-def _run_task(
-    task,
-    study: Path,
-    out: Path | None,
-    seed: int | None,
-    quiet: bool,
-    as_json: bool,
-    over: bool,
-    tolerance: float | None,
-) -> None:
-    from discover.batch.run import folder_names
-
-    folder = out or Path("results") / folder_names([study])[0]
-    with progress_bar(quiet) as report:
-        result = task(study, folder, seed, over, report, _tell_of_folder, tolerance)
-    if as_json:
-        typer.echo(result.json_file.read_text("utf-8"))
-        return
-    if quiet:
-        return
-    if result.was_complete:
-        say(f"{folder} is complete; use --overwrite to start afresh.")
-    say(result.text)
-    say(f"Report: {result.report.resolve()}")
 
 
 def _tell_of_folder(study: "Study") -> None:
@@ -153,7 +124,7 @@ def _tell_of_folder(study: "Study") -> None:
         return
     if folder is not None:
         name = "the study" if study.path is None else study.path.name
-        say(
+        console.say(
             f"discover: note: {name} reads its data from {folder}, which is neither "
             "next to it nor under DISCOVER_DATA or the working directory.",
             err=True,

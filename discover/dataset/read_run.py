@@ -55,10 +55,9 @@ class DeclaredTest(NamedTuple):
 
 
 def declared_test(index: Table, row: int, rate_before: float | None) -> DeclaredTest:
-    """Return which test the run on a line of ``runs.csv``, counted from 0, is.
+    """Return which test the run on a line of ``runs.csv``, from 0, is; InputError if it is none.
 
-    `rate_before`: of the steady flow before it, in 1/s, where the study says so. Raises InputError
-    if a column that says what was done holds something that it cannot, or two contradict.
+    `rate_before`: of the steady flow before it, in 1/s, where the study says so.
     """
     flow, control, start = (_word(index, row, column) for column in _VALUES)
     step, time = (_number(index, row, column) for column in ("step_strain", "step_time_s"))
@@ -69,27 +68,23 @@ def declared_test(index: Table, row: int, rate_before: float | None) -> Declared
         )
     if time < 0.0:
         raise InputError(f"{where}: step_time_s is {time:g}. Give a time from 0 on.")
+    both = ""
     if step and (start != "rest" or rate_before):
-        raise InputError(
-            f"{where} declares both a step of strain and a flow before it. Leave one of them out."
-        )
-    if start == "periodic" and rate_before:
-        raise InputError(
-            f"{where} declares both an oscillation and a steady flow before t = 0. Leave one of "
-            "them out."
-        )
+        both = "a step of strain and a flow before it"
+    elif start == "periodic" and rate_before:
+        both = "an oscillation and a steady flow before t = 0"
+    if both:
+        raise InputError(f"{where} declares both {both}. Leave one of them out.")
     _number(index, row, "temperature_C")
     return DeclaredTest(flow, control, start, step, time, rate_before or 0.0)
 
 
 def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None:
     """Why a run cannot be fitted; None if it can, or the rate before it is known."""
-    if declared_test(index, row, None).start == "steady" and not rate_before:
-        return (
-            "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
-            "flow in the study (rate_before)"
-        )
-    return None
+    start = declared_test(index, row, None).start
+    why = "it starts from a steady flow; name the column of runs.csv that holds the rate of that "
+    why += "flow in the study (rate_before)"
+    return why if start == "steady" and not rate_before else None
 
 
 def _word(index: Table, row: int, column: str) -> str:
@@ -245,9 +240,8 @@ def _rate(
 def differentiate(time: Values, values: Values, window: int = DEFAULT_WINDOW) -> Values:
     """Return the time derivative of a noisy record, from a moving cubic fit.
 
-    A cubic is fitted by least squares to the `window` samples nearest in order to each sample, 5 or
-    more, and its slope taken there   [Savitzky & Golay 1964, Anal. Chem. 36, 1627, for any
-    spacing]. Raises InputError if window or record are shorter.
+    The cubic is that of the `window` samples, 5 or more, nearest in order   [Savitzky & Golay 1964,
+    Anal. Chem. 36, 1627, for any spacing]. Raises InputError if window or record are shorter.
     """
     if window < _DEGREE + 2:
         raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")

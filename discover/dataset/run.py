@@ -54,8 +54,8 @@ def sizes_of(values: Float[np.ndarray, " n"], protocol: FlowProtocol) -> Float[n
 class Run(NotebookView):
     """One experiment in shear or in extension.
 
-    In extension the rate is the Hencky rate, the stress the tensile stress σ11 − σ22, and the
-    strain the Hencky strain; biaxial rate and stress are those of one of the two equal directions.
+    In extension rate and strain are Hencky's, and the stress is the tensile stress σ11 − σ22;
+    biaxial rate and stress are those of one of the two equal directions.
 
     Attributes
     ----------
@@ -64,8 +64,7 @@ class Run(NotebookView):
     time
         Sampling times in s, shape (n,), increasing, from the start of the flow at 0.
     protocol
-        The rate as a function of time, commanded or measured, which flow has it, and what came
-        before t = 0.
+        The rate as a function of time, which flow has it, and what came before t = 0.
     rate
         Rate at the sampling times, in 1/s, shape (n,).
     stress
@@ -73,20 +72,18 @@ class Run(NotebookView):
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
     strain
-        Strain at the sampling times, shape (n,), where recorded; computed from the rate otherwise.
-        Of oscillations by their first harmonic the amplitude, as are rate and stress.
+        Strain at the sampling times, shape (n,), where recorded. Of oscillations by their first
+        harmonic the amplitude, as are rate and stress.
     storage_modulus, loss_modulus
         G′ and G″ in Pa of such oscillations, shape (n,).
     rate_steps
         Steps of the rate between two samples whose instants are fitted, or were.
     clock_factor
-        Time on the instrument's clock is ``time / clock_factor``; differs from one for data that
-        were shifted to another temperature.
+        Time on the instrument's clock is ``time / clock_factor``: not one for shifted data.
     rate_is_measured
-        Whether the shear rate was measured, or derived from measured strain, and not commanded.
+        Whether the rate was measured, or derived from measured strain, and not commanded.
     rate_before
-        Rate in 1/s of the steady flow before t = 0, which becomes part of the protocol; zero where
-        there was none.
+        Rate in 1/s of the steady flow before t = 0; zero where there was none.
     strain_before
         Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
     metadata
@@ -137,40 +134,36 @@ class Run(NotebookView):
         # kinds and shapes are checked here, not by annotation: users build runs by hand
         if not isinstance(self.name, str):
             raise InputError(f"The name of a run must be text; got {self.name!r}.")
+        its = f"of the run {self.name!r}"
         if not isinstance(self.protocol, FlowProtocol):
             raise InputError(
-                f"protocol of the run {self.name!r} must be a flow, such as start_up(0.5) or "
+                f"protocol {its} must be a flow, such as start_up(0.5) or "
                 f"measured_rate(times, rates); got a {type(self.protocol).__name__}."
             )
         for label in _COLUMNS:
             values = getattr(self, label)
             if values is None and label not in _NEEDED:
                 continue
-            column = as_column(values, f"{label} of the run {self.name!r}")
+            column = as_column(values, f"{label} {its}")
             object.__setattr__(self, label, column)
             if not len(self.time):
                 raise InputError(f"The run {self.name!r} has no samples; give at least one.")
             if column.shape != self.time.shape:
                 raise InputError(
-                    f"{label} of the run {self.name!r} must have shape {self.time.shape} like its "
-                    f"time; got {column.shape}."
+                    f"{label} {its} must have shape {self.time.shape} like its time; got "
+                    f"{column.shape}."
                 )
         for label in ("clock_factor", "rate_before", "strain_before"):
             value = getattr(self, label)
             if isinstance(value, bool) or not isinstance(value, Real):
-                raise InputError(
-                    f"{label} of the run {self.name!r} must be a number; got {value!r}."
-                )
+                raise InputError(f"{label} {its} must be a number; got {value!r}.")
         if self.time[0] < 0 or np.any(np.diff(self.time) <= 0):
             raise InputError(
-                f"time of the run {self.name!r} must start at or after 0 and increase strictly. "
-                "Sort the samples and remove repeated times."
+                f"time {its} must start at or after 0 and increase strictly. Sort the samples and "
+                "remove repeated times."
             )
         if not 0 < self.clock_factor < math.inf:
-            raise InputError(
-                f"The clock factor of the run {self.name!r} must be positive; got "
-                f"{self.clock_factor}."
-            )
+            raise InputError(f"The clock factor {its} must be positive; got {self.clock_factor}.")
         if not np.isfinite(self.rate_before):
             raise InputError(
                 f"The shear rate before the run {self.name!r} must be finite; got "
@@ -228,13 +221,7 @@ class Run(NotebookView):
 
     @property
     def recorded(self) -> Float[np.ndarray, " n"]:
-        """The values of that quantity, in Pa or dimensionless, shape (n,).
-
-        Raises
-        ------
-        InputError
-            If it was not recorded.
-        """
+        """The values of that quantity, in Pa or dimensionless, shape (n,); InputError if none."""
         values = {
             "N1": self.first_normal_stress_difference,
             "N2": self.second_normal_stress_difference,
@@ -256,12 +243,7 @@ class Run(NotebookView):
         Parameters
         ----------
         quantity
-            N1 or N2 in shear; a modulus of oscillations.
-
-        Raises
-        ------
-        InputError
-            If it was not recorded.
+            N1 or N2 in shear, or a modulus of oscillations; InputError if it was not recorded.
         """
         seen = replace(
             self, name=f"{self.name} ({quantity})", protocol=recording(self.protocol, quantity)
@@ -287,13 +269,7 @@ class Run(NotebookView):
 
     @property
     def angular_frequency(self) -> Float[np.ndarray, " n"]:
-        """ω in rad/s of oscillations by their first harmonic, shape (n,): rate over strain.
-
-        Raises
-        ------
-        InputError
-            If the run has no strain.
-        """
+        """ω in rad/s of oscillations, shape (n,): rate over strain; InputError without a strain."""
         if self.strain is None:
             raise InputError(f"The run {self.name!r} has no strain, so no frequency is known.")
         return self.rate / self.strain

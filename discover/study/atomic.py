@@ -18,14 +18,11 @@ PART_SUFFIX = ".discover-part"
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    r"""Write a text file so that no reader ever sees half of it.
+    r"""Write a text file so that no reader ever sees half of it; a former one keeps its rights.
 
-    The text goes to a temporary file in the same folder, which then takes the name. A file that it
-    replaces hands on who may read it; for a new one the user's umask decides.
-
-    `text`: the content, written as UTF-8; what UTF-8 cannot hold as ``\udcff``. Raises InputError
-    if something that is no plain file has the name, or a file that this command has read. Raises
-    OSError if the disk is full, say; names the file. What the file held before is still there.
+    `text`: written as UTF-8; what UTF-8 cannot hold as ``\udcff``. Raises InputError if something
+    that is no plain file has the name, or a file that this command has read. Raises OSError if the
+    disk is full, say; what the file held before is still there.
     """
     path = Path(path)
     before = replaceable(path)
@@ -83,11 +80,7 @@ def replaceable(path: Path) -> os.stat_result | None:
 
 
 def require_ours(folder: Path, names: Sequence[str], mark: str) -> None:
-    """Refuse a folder that holds files of these names, where nothing shows that they are ours.
-
-    `names`: of results that are about to be written there. `mark`: name of what is always written
-    first, and shows that the rest is ours. Raises InputError if one of them would be written over.
-    """
+    """Refuse a folder that holds files of these names, unless `mark`, written first, is there."""
     if os.path.lexists(folder / mark):
         return
     there = next((name for name in names if os.path.lexists(folder / name)), None)
@@ -130,11 +123,8 @@ _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDiction
 class FolderLock:
     """A lock on a folder, held until `release`, until it is forgotten, or until the process ends.
 
-    The operating system holds the lock and drops it however the process ends, so that a lock left
-    behind by a killed process is no lock. Where a file system knows no locks, the process and host
-    named in the file decide: a process that no longer runs on this host holds nothing.
-
-    No clock is involved: a lock does not age.
+    The operating system drops it however the process ends; it does not age. Where a file system
+    knows no locks, the process and host named in the file decide.
     """
 
     def __init__(self, path: Path, descriptor: int):
@@ -180,25 +170,22 @@ def lock_folder(folder: str | Path) -> FolderLock:
 def _open(path: Path) -> int:
     """Open the lock file; whatever else somebody put in its place is refused, and not written."""
     flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
+    refused = InputError(
+        f"{path} is not a plain file with one name, so the folder cannot be locked. Remove it, or "
+        "use another --out."
+    )
     try:
         descriptor = os.open(path, flags, 0o644)
     except OSError as error:
         if not os.path.lexists(path) or (path.is_file() and not path.is_symlink()):
             raise
-        raise InputError(_no_lock(path)) from error
+        raise refused from error
     found = os.fstat(descriptor)
     # a file of two names is somebody's other file too
     if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
         return descriptor
     os.close(descriptor)
-    raise InputError(_no_lock(path))
-
-
-def _no_lock(path: Path) -> str:
-    return (
-        f"{path} is not a plain file with one name, so the folder cannot be locked. Remove it, or "
-        "use another --out."
-    )
+    raise refused
 
 
 def _take(descriptor: int, owner: dict) -> bool:

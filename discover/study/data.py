@@ -25,10 +25,7 @@ from discover.words import unknown_name
 
 @dataclass(frozen=True)
 class StudyData:
-    """The data of a study, split.
-
-    `fit`, `held_out`: runs that fits may see, and runs that only test.
-    """
+    """The data of a study, split into runs that fits may see and runs that only test."""
 
     dataset: Dataset
     fit: Dataset
@@ -50,25 +47,15 @@ def load_study_data(study: Study, seed: int | None = None) -> StudyData:
     data = study.data
     if data.synthetic is not None:
         made = data.synthetic
+        noise = made.noise, made.seed if seed is None else seed
         dataset: Dataset = synthetic_dataset(
-            made.law,
-            made.parameters,
-            made.protocol,
-            made.noise,
-            made.seed if seed is None else seed,
-            made.samples,
+            made.law, made.parameters, made.protocol, *noise, made.samples
         )
     else:
-        base = None if study.path is None else study.path.parent
-        dataset = load_dataset(
-            str(data.folder),
-            data.clock_factor,
-            base,
-            rate_is_measured=data.rate == "measured",
-            rate_before=data.rate_before,
-            sequence=data.sequence,
-            amplitude_sweep_rad_s=data.amplitude_sweep_rad_s,
-        )
+        options: dict[str, Any] = {"rate_is_measured": data.rate == "measured"}
+        for key in ("clock_factor", "rate_before", "sequence", "amplitude_sweep_rad_s"):
+            options[key] = getattr(data, key)
+        dataset = load_dataset(str(data.folder), base=_base(study), **options)
     each = data.held_out == "each"
     named = () if data.held_out == "each" else data.held_out
     dataset, named, fit = _with_tables(dataset, study, named)
@@ -175,11 +162,7 @@ def _observed(
 
 
 def read_study(path: str | Path) -> Study:
-    """Return the study in a TOML file.
-
-    Raises InputError if the file cannot be read, is not TOML, or holds an unknown key or a wrong
-    value.
-    """
+    """Return the study in a TOML file; InputError names an unknown key or a wrong value."""
     path = Path(path)
     content, text = read_toml(path, "study file", "Write it like those in studies/.")
     study = parse_study(content, str(path))
@@ -188,36 +171,31 @@ def read_study(path: str | Path) -> Study:
 
 
 def parse_study(content: dict, where: str = "the study") -> Study:
-    """Return a study from nested dictionaries, as TOML gives them.
-
-    Raises InputError if a key is unknown or a value is wrong; names the key.
-    """
+    """Return a study from nested dictionaries, as TOML gives them; InputError names a wrong key."""
     return validated(Study, content, where)
+
+
+def _base(study: Study) -> Path | None:
+    return None if study.path is None else study.path.parent
 
 
 def folder_elsewhere(study: Study) -> Path | None:
     """Return the data folder of a study if it lies outside all folders where one would look.
 
-    These are the folder of the study file, the one that DISCOVER_DATA names, and the working
-    directory. A link that leads out of them counts as outside.
-
-    Raises InputError if there is no such folder.
+    A link that leads out of them counts as outside. Raises InputError if there is no such folder.
     """
     if study.data.folder is None:
         return None
-    base = None if study.path is None else study.path.parent
-    folder = resolve_folder(study.data.folder, base).resolve()
-    roots = (root.resolve() for root in folder_roots(base))
+    folder = resolve_folder(study.data.folder, _base(study)).resolve()
+    roots = (root.resolve() for root in folder_roots(_base(study)))
     return None if any(folder.is_relative_to(root) for root in roots) else folder
 
 
 def fingerprint(study: Study, *extra: object) -> str:
     """Return a hash of everything that decides a study's results.
 
-    Used to tell whether a result folder belongs to this study: the study, the measured files it
-    names, the version of this software, and what the caller adds (task, seed).
-
-    Raises InputError if the data folder or a file in it cannot be read.
+    The study, the files it names, the version of this software, and what the caller adds (task,
+    seed). Raises InputError if the data folder or a file in it cannot be read.
     """
     # a page without overlays is what it was before there were any
     left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}
@@ -230,8 +208,7 @@ def fingerprint(study: Study, *extra: object) -> str:
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())
     if study.data.folder is not None:
-        base = None if study.path is None else study.path.parent
-        for path in sorted(resolve_folder(study.data.folder, base).glob("*.csv")):
+        for path in sorted(resolve_folder(study.data.folder, _base(study)).glob("*.csv")):
             digest.update(path.name.encode("utf-8", "surrogateescape"))
             digest.update(read_bytes(path, path.name))
     if study.model.from_ is not None:
@@ -239,6 +216,5 @@ def fingerprint(study: Study, *extra: object) -> str:
         digest.update(read_bytes(earlier, earlier.name))
     for asked in study.report.overlay:
         if asked.file is not None:
-            base = Path() if study.path is None else study.path.parent
-            digest.update(read_bytes(base / asked.file, asked.file))
+            digest.update(read_bytes((_base(study) or Path()) / asked.file, asked.file))
     return digest.hexdigest()[:16]

@@ -38,7 +38,6 @@ class DeclaredModel:
     `law_name`, `parameters`: as declared, with numbers for those to be fitted.
     `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
     `free`: names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
-    `effects`: effects known beside the law, with values or to be fitted.
     `by_mode`: parameters of the law, and effects, that may differ from mode to mode.
     `solid`: what is to be known of an elastic constant among the modes; empty where there is none.
     """
@@ -75,10 +74,7 @@ class DeclaredModel:
 
     @property
     def modulus_covariance(self) -> np.ndarray | None:
-        """Of the moduli in Pa², and of a solvent behind them, as the sweep leaves them.
-
-        None without a sweep.
-        """
+        """Of the moduli in Pa², and of a solvent behind them; None without a sweep."""
         spectrum = self.spectrum
         if spectrum is None or spectrum.modulus_covariance is None:
             return None
@@ -102,10 +98,7 @@ class DeclaredModel:
 
 
 def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
-    """Return the declared law of a study, with its modes.
-
-    Raises InputError if a parameter is wrong, or modes are asked of data without a linear sweep.
-    """
+    """Return the declared law of a study, with its modes; InputError if something is wrong."""
     model = study.model
     effects = known_effects(model.effects, "[model] effects")
     if model.from_ is not None:
@@ -131,13 +124,10 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         modulus, relaxation_time = spectrum.modulus, spectrum.relaxation_time
         solvent, solid = spectrum.solvent_viscosity, spectrum.solid
     else:
-        start = _linear_start(dataset)
+        given, start = (model.modulus_Pa, model.relaxation_time_s), _linear_start(dataset)
         modulus, relaxation_time = (
-            np.atleast_1d(np.asarray(start[key] if value == "fit" else value, dtype=float))
-            for key, value in (
-                ("modulus_Pa", model.modulus_Pa),
-                ("relaxation_time_s", model.relaxation_time_s),
-            )
+            np.atleast_1d(np.asarray(first if value == "fit" else value, dtype=float))
+            for value, first in zip(given, start, strict=True)
         )
         if model.elastic_modulus_Pa:
             still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
@@ -155,20 +145,9 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
         warnings.warn(f"Declared model: {solid}", stacklevel=2)
     # beside a sweep: another loading, or an aged sample; one factor on all moduli, or on all times
     free += [key for key in MODE_CONSTANTS if getattr(model, key) == "fit"]
-    return DeclaredModel(
-        law,
-        name,
-        parameters,
-        modulus,
-        relaxation_time,
-        tuple(free),
-        spectrum,
-        float(solvent or 0.0),
-        effects,
-        by_mode=model.by_mode,
-        choice=model.choice,
-        solid=solid,
-    )
+    modes = modulus, relaxation_time, tuple(free), spectrum, float(solvent or 0.0)
+    also = {"by_mode": model.by_mode, "choice": model.choice, "solid": solid}
+    return DeclaredModel(law, name, parameters, *modes, effects, **also)
 
 
 def forward_model(declared: DeclaredModel) -> ForwardDeclared:
@@ -243,18 +222,9 @@ def _from_earlier(
         law = equation.law()
         if equation.named is not None and not equation.terms:
             name, constants = equation.named.law, dict(equation.named.constants[0])
-    return DeclaredModel(
-        law,
-        name,
-        constants,
-        np.array(equation.modulus),
-        np.array(equation.relaxation_time),
-        (),
-        spectrum,
-        equation.solvent_viscosity,
-        (*kept, *own),
-        found.told(names),
-    )
+    modes = np.array(equation.modulus), np.array(equation.relaxation_time)
+    rest = spectrum, equation.solvent_viscosity, (*kept, *own), found.told(names)
+    return DeclaredModel(law, name, constants, *modes, (), *rest)
 
 
 def _law_of_each_mode(
@@ -323,12 +293,11 @@ def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSwe
     return LinearSweep(omega[keep], sweep.storage_modulus[keep], sweep.loss_modulus[keep])
 
 
-def _linear_start(dataset: Dataset) -> dict[str, float]:
-    """Return a modulus and relaxation time of the right order from the runs themselves.
+def _linear_start(dataset: Dataset) -> tuple[float, float]:
+    """Return a modulus in Pa and a relaxation time in s of the right order from the runs.
 
-    The relaxation time is that of the slowest change a run can show, a tenth of the median
-    duration, or the inverse of a flow curve's middle rate or a sweep's middle frequency; the
-    modulus follows from the largest stress over rate times that.
+    The time is a tenth of the median duration, or the inverse of a flow curve's middle rate or a
+    sweep's middle frequency; the modulus is the largest stress over rate times that.
     """
 
     def slowest(run: Run) -> float:
@@ -338,20 +307,15 @@ def _linear_start(dataset: Dataset) -> dict[str, float]:
             return 1.0 / max(float(np.median(np.abs(run.rate))), SLOWEST_RATE)
         return 0.1 * float(run.time[-1])
 
-    times = [slowest(run) for run in dataset]
-    time = float(np.median(times))
-    viscosities = [
-        np.max(np.abs(run.stress)) / np.max(np.abs(run.rate))
-        for run in dataset
-        if np.max(np.abs(run.rate)) > SLOWEST_RATE and np.any(run.stress)
-    ]
+    time = float(np.median([slowest(run) for run in dataset]))
+    stressed = [(run, np.max(np.abs(run.stress))) for run in dataset if np.any(run.stress)]
+    rates = [(stress, np.max(np.abs(run.rate))) for run, stress in stressed]
+    viscosities = [stress / rate for stress, rate in rates if rate > SLOWEST_RATE]
     moduli = [
         float(np.max(np.abs(run.stress)) / np.max(np.abs(run.strain)))
         for run in dataset
         if run.strain is not None and np.any(run.strain)
     ]
     if viscosities or not moduli:
-        modulus = float(np.median(viscosities or [1.0])) / max(time, 1e-300)
-    else:
-        modulus = float(np.median(moduli))
-    return {"modulus_Pa": modulus, "relaxation_time_s": time}
+        return float(np.median(viscosities or [1.0])) / max(time, 1e-300), time
+    return float(np.median(moduli)), time

@@ -1,7 +1,8 @@
 """A law, its modes and its effects as an earlier result found them."""
 
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -26,10 +27,8 @@ _AGAIN = "Run the command that made it again with --overwrite."
 class EarlierResult:
     """What a study takes over from an earlier result.
 
-    `of_modes`: terms that effects add to the law of each mode, with constants of its own: for every
-        such effect its values in the order of the modes.
-    `intervals`: 95 % intervals that its constants had, by effect, or "" of a term of the law, and
-        name.
+    `of_modes`: for every effect with constants of its own in each mode, its values by mode.
+    `intervals`: 95 % intervals of constants, by effect, or "" of a term of the law, and name.
     """
 
     file: Path  # where it was read
@@ -41,10 +40,7 @@ class EarlierResult:
     doubt: str  # that it did not explain its own data, in words, or empty
 
     def told(self, replaced: Collection[str]) -> str:
-        """Return in words what was taken, and what is not known of it.
-
-        `replaced`: effects that are not taken, for a study has its own.
-        """
+        """Return in words what was taken, but for effects that a study has itself."""
         had = ", ".join(
             f"{name}{f' of {effect}' * bool(effect)} {low:.3g} to {high:.3g}"
             for (effect, name), (low, high) in self.intervals.items()
@@ -58,9 +54,8 @@ class EarlierResult:
 def result_file(written: str, study_file: Path | None) -> Path:
     """Return the file of an earlier result, ``loop.json`` or ``comparison.json``.
 
-    `written`: the folder, relative to the study file or, where it is not there, to the working
-    directory. `study_file`: the study file, if there is one. Raises InputError if there is no such
-    folder, or it holds no finished result.
+    `written`: the folder, relative to the study file or to the working directory. Raises InputError
+    if there is none, or it holds no finished result.
     """
     folders = [Path(written)]
     if study_file is not None:
@@ -89,11 +84,7 @@ def result_file(written: str, study_file: Path | None) -> Path:
 
 
 def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
-    """Return what an earlier result found, to be declared.
-
-    Raises InputError if there is no finished result, it is damaged, or it found nothing that could
-    be taken.
-    """
+    """Return what an earlier result found; InputError if it is damaged, or found nothing."""
     file = result_file(written, study_file)
     content = read_json(file)
     if not isinstance(content, dict):
@@ -146,7 +137,7 @@ def _with_added_modes(
     equation: Equation, rows: list[Any], file: Path
 ) -> tuple[Equation, list[Any]]:
     """Return a law and its effects, modes among these with the law's where they have constants."""
-    try:
+    with _damage(file):
         counts = {
             len(p["modes"]) for row in rows for p in row["parameters"].values() if p.get("degree")
         }
@@ -158,8 +149,6 @@ def _with_added_modes(
             effect.mode(jnp.asarray([float(p["value"]) for p in row["parameters"].values()]))
             for row, effect in adding
         ]
-    except (TypeError, KeyError, ValueError, AttributeError, InputError):
-        raise _damaged(file) from None
     whole = replace(
         equation,
         modulus=(*equation.modulus, *(float(g) for g, _ in pairs)),
@@ -203,13 +192,12 @@ def _of_comparison(content: Mapping[str, Any], file: Path) -> EarlierResult:
 def _of_law_by_mode(law: Mapping[str, Any], instrument: Any, file: Path) -> EarlierResult:
     """Return the law with constants by mode of a comparison, which explained what no other did."""
     equation = equation_from_json(law["known_part"], f"{file.name}: by_mode.known_part")
-    try:
-        added = [
-            {"effect": name, "parameters": {make_effect(name).parameters[0].name: constant}}
-            for name, constant in law["constants"].items()
-        ]
-    except (TypeError, KeyError, AttributeError):
-        raise _damaged(file) from None
+    with _damage(file):
+        constants = [*law["constants"].items()]
+    added = [
+        {"effect": name, "parameters": {make_effect(name).parameters[0].name: constant}}
+        for name, constant in constants
+    ]
     effects, of_modes = _effects([*instrument, *added], file, len(equation.modulus))
     text = _text(file, "the law with constants by mode", equation, effects, of_modes)
     return EarlierResult(file, equation, effects, of_modes, text, _intervals(instrument, file), "")
@@ -221,7 +209,7 @@ def _effects(
     """Return the effects, and those whose constants differ from mode to mode."""
     written: dict[str, dict[str, float]] = {}
     of_modes: dict[str, list[dict[str, float]]] = {}
-    try:
+    with _damage(file):
         for row in rows:
             name, parameters = str(row["effect"]), row["parameters"]
             values = {key: float(p["value"]) for key, p in parameters.items()}
@@ -239,8 +227,6 @@ def _effects(
                 values | {key: column[number] for key, column in differing.items()}
                 for number in range(n_modes)
             ]
-    except (TypeError, KeyError, ValueError, AttributeError):
-        raise _damaged(file) from None
     where = f"[model] from: {file.name}"
     each = ((known_effects({name: one}, where)[0] for one in of) for name, of in of_modes.items())
     return known_effects(written, where), tuple(tuple(of) for of in each)
@@ -249,21 +235,24 @@ def _effects(
 def _intervals(rows: Any, file: Path) -> dict[tuple[str, str], tuple[float, float]]:
     """Return the intervals of effects' constants, but for those with one for each mode."""
     found = {}
-    try:
+    with _damage(file):
         for row in rows:
             for name, constant in row["parameters"].items():
                 if constant.get("ci95") is not None and not constant.get("degree"):
                     low, high = constant["ci95"]
                     found[str(row["effect"]), str(name)] = float(low), float(high)
-    except (TypeError, KeyError, ValueError, AttributeError):
-        raise _damaged(file) from None
     return found
 
 
-def _damaged(file: Path) -> InputError:
-    return InputError(
-        f"[model] from: {file.name} is damaged where it says which effects were found. {_AGAIN}"
-    )
+@contextmanager
+def _damage(file: Path) -> Iterator[None]:
+    """Say of what cannot be read here that the file is damaged."""
+    try:
+        yield
+    except (TypeError, KeyError, ValueError, AttributeError):  # an InputError is a ValueError
+        raise InputError(
+            f"[model] from: {file.name} is damaged where it says which effects were found. {_AGAIN}"
+        ) from None
 
 
 def _text(

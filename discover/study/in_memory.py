@@ -29,11 +29,9 @@ _OF_EACH_MODE = "a law with constants of its own in each mode"
 def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     """Return data divided into runs to fit and runs held out.
 
-    `data`: the runs to fit, and the held-out ones too where they are given by name. Of a data set
-    without runs its tables are fitted, or its linear sweep where there is no other. `held_out`: A
-    data set of runs that only test, names of runs of `data`, or ``"each"``. Raises InputError if
-    no data set is given, a run is both fitted and held out, by name or by its samples, none is left
-    to fit, or those to fit hold no signal.
+    `data`: of a data set without runs its tables are fitted, or its linear sweep where there is no
+    other. `held_out`: a data set, names of runs of `data`, or ``"each"``. Raises InputError if a
+    run is both fitted and held out, none is left to fit, or those to fit hold no signal.
     """
     if not isinstance(data, Dataset):
         raise InputError(
@@ -43,33 +41,23 @@ def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     if not data.runs and (data.material_functions or data.linear_sweep is not None):
         data = data.with_material_functions()  # as a study does where there is nothing else
     if isinstance(held_out, Dataset):
-        whole = joined(data, held_out.runs)
-        divided = StudyData(whole, data, held_out)
-    elif isinstance(held_out, str):
-        if held_out != "each":
-            raise InputError(
-                f"held_out must be a data set, a list of names or 'each'; got {held_out!r}. Write "
-                f"[{held_out!r}] for this run."
-            )
-        divided = StudyData(data, data, data.select([]), each=True)
-    elif not isinstance(held_out, Iterable):
+        divided = StudyData(joined(data, held_out.runs), data, held_out)
+    elif not isinstance(held_out, Iterable) or (isinstance(held_out, str) and held_out != "each"):
+        write = f" Write [{held_out!r}] for this run." if isinstance(held_out, str) else ""
         raise InputError(
-            f"held_out must be a data set, a list of names or 'each'; got {held_out!r}."
+            f"held_out must be a data set, a list of names or 'each'; got {held_out!r}.{write}"
         )
-    elif len(held_out := list(held_out)):
-        divided = StudyData(data, *data.split(held_out))
+    elif held_out == "each" or not len(names := list(held_out)):
+        divided = StudyData(data, data, data.select([]), each=held_out == "each")
     else:
-        divided = StudyData(data, data, data.select([]))
+        divided = StudyData(data, *data.split(names))
     require_signal(divided.fit.runs)
     require_no_copies(divided.fit.runs, divided.held_out.runs)
     return divided
 
 
 def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
-    """Return a data set with further runs, which must have names of their own.
-
-    Raises InputError if a run of the same name is there already.
-    """
+    """Return a data set with further runs; InputError if a run of the same name is there."""
     both = set(data.names) & {run.name for run in more}
     if both:
         raise InputError(
@@ -85,11 +73,9 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
 
 
 def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
-    """Return a fluid as the declared model of a study.
+    """Return a `Fluid` as the declared model of a study; None is Maxwell with G = 1 Pa, λ = 1 s.
 
-    `base`: A `Fluid`; None for upper convected Maxwell with G = 1 Pa and λ = 1 s. `data`: the data;
-    where the modes are those of its linear sweep, the error of the sweep is known. Raises
-    InputError if `base` is no fluid.
+    Where the modes are those of the data's linear sweep, the error of the sweep is known.
     """
     if base is None:
         from discover.laws.textbook.classical import UpperConvectedMaxwell
@@ -103,17 +89,9 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     check_law(base.law)
     own = _OF_EACH_MODE if differs_by_mode(base.law) else type(base.law).__name__
     name, parameters = name_of(base.law) or (own, {})
-    modulus, relaxation_time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
-    return DeclaredModel(
-        base.law,
-        name,
-        parameters,
-        modulus,
-        relaxation_time,
-        (),
-        _spectrum(data, base),
-        float(base.solvent_viscosity),
-    )
+    modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
+    solvent = float(base.solvent_viscosity)
+    return DeclaredModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
 
 
 def with_known(
@@ -124,9 +102,8 @@ def with_known(
 ) -> DeclaredModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
-    `effects`: as ``[model] effects`` in a study; None for none. `by_mode`: which of them, and which
-    effects, may differ from mode to mode. Raises InputError if an effect, a value or a constant is
-    not as it should be.
+    `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
+    InputError if an effect, a value or a constant is not as it should be.
     """
     for option, names in (("free", free), ("by_mode", by_mode)):
         if isinstance(names, str):

@@ -1,6 +1,6 @@
 """Values of a study's keys that several of its sections have."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field
@@ -12,14 +12,16 @@ from discover.words import unknown_name
 from tensor_library.closed_forms import CLOSED_FORMS
 
 
-def _known_law(name: str) -> str:
-    if name not in LAWS:
-        raise ValueError(unknown_name("law", name, LAWS))
-    return name
+def _one_of(kind: str, known: Callable[[], Iterable[str]]) -> Callable[[str], str]:
+    def check(name: str) -> str:
+        if name not in known():
+            raise ValueError(unknown_name(kind, name, known()))
+        return name
+
+    return check
 
 
-def _known_or_learned(name: str) -> str:
-    return name if name == "learned" else _known_law(name)
+_known_law = _one_of("law", lambda: LAWS)
 
 
 def _known_law_or_several(given: Any) -> Any:
@@ -27,23 +29,11 @@ def _known_law_or_several(given: Any) -> Any:
         if len(set(given)) < 2:
             raise ValueError("law as a list names two laws or more to choose from, each once")
         return tuple(_known_law(str(name)) for name in given)
-    return given if given == ANY else _known_or_learned(str(given))
+    return given if given in (ANY, "learned") else _known_law(str(given))
 
 
-def _known_learner(name: str) -> str:
-    if name not in learner_names():
-        raise ValueError(unknown_name("learner", name, learner_names()))
-    return name
-
-
-def _known_form(name: str) -> str:
-    if name not in CLOSED_FORMS:
-        raise ValueError(unknown_name("closed form", name, CLOSED_FORMS))
-    return name
-
-
-ClosedFormName = Annotated[str, AfterValidator(_known_form)]
-LearnerName = Annotated[str, AfterValidator(_known_learner)]
+ClosedFormName = Annotated[str, AfterValidator(_one_of("closed form", lambda: CLOSED_FORMS))]
+LearnerName = Annotated[str, AfterValidator(_one_of("learner", learner_names))]
 SyntheticLaw = Annotated[str, AfterValidator(_known_law)]
 LawNames = Annotated[str | tuple[str, ...], BeforeValidator(_known_law_or_several)]
 Seed = Annotated[int, Field(ge=0, lt=2**32)]  # what every random generator here takes

@@ -5,7 +5,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +23,11 @@ class RunFolder:
     """The folder that a command writes to.
 
     ``state/study.json`` holds the study's fingerprint, whether it is complete, and then the hash of
-    every result; every finished part lies beside it as JSON, so that a run that was stopped goes on
-    where it was. A part carries the fingerprint and a hash: one that was damaged, edited or left by
-    another study is computed again. While the object lives, no other process can open the folder.
+    every result; finished parts, each with fingerprint and hash, lie beside it, so that a run that
+    was stopped goes on where it was. While the object lives, no other process can open the folder.
 
-    `path`: the folder; made if it does not exist. `fingerprint`: from `discover.study.fingerprint`.
-    `overwrite`: forget what is there. Raises InputError if the folder holds another study's results
-    and `overwrite` is not set, cannot be written to, or is in use by another process.
+    `overwrite`: forget what is there. Raises InputError if the folder holds another study's
+    results, cannot be written to, or is in use by another process.
     """
 
     def __init__(self, path: str | Path, fingerprint: str, overwrite: bool = False):
@@ -37,17 +35,24 @@ class RunFolder:
         self.fingerprint = fingerprint
         self._state = self.path / STATE_FOLDER
         self._written: dict[str, str] = {}
-        self._lock = _locked(self.path)
+        with _writable(f"The folder {self.path} cannot be written to", "with"):
+            self._lock = lock_folder(self.path)
         figures = self.path / "figures"
         for folder in (self._state, figures):
-            _refuse_link(folder)
+            if os.path.islink(folder):
+                raise InputError(
+                    f"{folder} is a link, and nothing is written to where a link leads. Remove it, "
+                    "or use another --out."
+                )
         if not overwrite:
             require_ours(self.path, _RESULTS, STATE_FOLDER)
         found = _read_json(self._state / STATE_FILE)
         if overwrite:
             # only what this class writes is removed: the folder may be somebody's home
             if found is not None:
-                _remove(self._state)
+                old = f"The old results in {self._state} cannot be removed"
+                with _writable(old, "folder with"):
+                    shutil.rmtree(self._state)
             found = None
         elif found is not None and found.get("fingerprint") != fingerprint:
             if not found.get("complete") and not self._has_parts():
@@ -59,7 +64,10 @@ class RunFolder:
                 )
         self.complete = bool(found and found.get("complete") is True)
         for folder in (self.path, make_folder(self._state), make_folder(figures)):
-            _sweep_up(folder)
+            # what a killed process was about to write: it is ours, and only we are here
+            for rest in folder.glob(f".*{PART_SUFFIX}"):
+                with contextlib.suppress(OSError):
+                    rest.unlink()
         files = (found or {}).get("files")
         self._files: dict[str, Any] = files if isinstance(files, dict) else {}
         if found is None:
@@ -111,22 +119,13 @@ class RunFolder:
         write_text(self._state / STATE_FILE, json.dumps(content))
 
 
-def _locked(folder: Path):
+@contextlib.contextmanager
+def _writable(what: str, where: str) -> Iterator[None]:
+    """Turn a refusal of the system's into an InputError that says what cannot be done."""
     try:
-        return lock_folder(folder)
+        yield
     except OSError as error:
-        raise InputError(
-            f"The folder {folder} cannot be written to: {error.strerror}. Choose another with "
-            "--out."
-        ) from None
-
-
-def _refuse_link(folder: Path) -> None:
-    if os.path.islink(folder):
-        raise InputError(
-            f"{folder} is a link, and nothing is written to where a link leads. Remove it, or use "
-            "another --out."
-        )
+        raise InputError(f"{what}: {error.strerror}. Choose another {where} --out.") from None
 
 
 def _digest(path: Path) -> str:
@@ -135,23 +134,6 @@ def _digest(path: Path) -> str:
         return hashlib.sha256(read_bytes(path, path.name, is_input=False)).hexdigest()
     except InputError:
         return ""
-
-
-def _remove(folder: Path) -> None:
-    try:
-        shutil.rmtree(folder)
-    except OSError as error:
-        raise InputError(
-            f"The old results in {folder} cannot be removed: {error.strerror}. Choose another "
-            "folder with --out."
-        ) from None
-
-
-def _sweep_up(folder: Path) -> None:
-    """Remove what a killed process was about to write; it is ours, and only we are here."""
-    for rest in folder.glob(f".*{PART_SUFFIX}"):
-        with contextlib.suppress(OSError):
-            rest.unlink()
 
 
 def _read_json(path: Path) -> dict[str, Any] | None:

@@ -81,6 +81,7 @@ def assert_clear(message: str, names):
     assert len(message.split()) >= 4, message
 
 
+NAMES = ["time_s", "time_min", "shear_rate_1_s", "stress_Pa", "stress_kPa", "strain", "N1_Pa", ""]
 cells = st.one_of(
     st.floats().map(str), st.integers().map(str), st.text(max_size=8), st.sampled_from(TOKENS)
 )
@@ -93,22 +94,7 @@ cells = st.one_of(
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(
-    header=st.lists(
-        st.sampled_from(
-            [
-                "time_s",
-                "time_min",
-                "shear_rate_1_s",
-                "stress_Pa",
-                "stress_kPa",
-                "strain",
-                "N1_Pa",
-                "",
-            ]
-        ),
-        min_size=1,
-        max_size=5,
-    ),
+    header=st.lists(st.sampled_from(NAMES), min_size=1, max_size=5),
     rows=st.lists(st.lists(cells, max_size=5), max_size=6),
     separator=st.sampled_from([",", ",", ",", ";", "\t"]),
     end=st.sampled_from(["\n", "\r\n", "\r"]),

@@ -12,21 +12,23 @@ from discover.dataset import check_folder, load_dataset
 from discover.errors import InputError
 from discover.study import parse_study
 from discover.study.data import load_study_data
+from discover.study.declared_model import declared_model
 
 MODULUS, RELAXATION_TIME = 100.0, 2.0
 TIMES = np.concatenate([[0.0], np.geomspace(2e-3, 20.0, 120)])
 
 
-def start_up(rate=1.0, time=TIMES):
-    """Start-up of an upper-convected Maxwell fluid, with its analytic stresses."""
+def start_up(rate=1.0, time=TIMES, **changes):
+    """Start-up of an upper-convected Maxwell fluid, with its analytic stresses, but for changes."""
     x = time / RELAXATION_TIME
     viscosity = MODULUS * RELAXATION_TIME
-    return {
+    table = {
         "time_s": time.copy(),
         "shear_rate_1_s": np.full(len(x), rate),
         "stress_Pa": viscosity * rate * -np.expm1(-x),
         "N1_Pa": 2 * viscosity * RELAXATION_TIME * rate**2 * (1 - np.exp(-x) * (1 + x)),
     }
+    return table | {k: v(table[k]) if callable(v) else v for k, v in changes.items()}
 
 
 def sweep_table():
@@ -59,10 +61,6 @@ def subjects(findings, severity="warning"):
     return {finding.subject for finding in findings if finding.severity == severity}
 
 
-def with_column(run, **columns):
-    return {**run, **columns}
-
-
 def test_nothing_is_said_of_a_maxwell_fluid_with_its_own_sweep(folder):
     assert check_folder(folder(start_up(0.05), start_up(0.5), start_up(2.0))) == ()
 
@@ -79,16 +77,12 @@ def test_nothing_is_said_of_it_with_one_per_cent_noise_either(folder):
 
 
 def spiked():
-    table = start_up()
-    table["stress_Pa"][60] *= 1.5
-    return table
+    return start_up(stress_Pa=lambda stress: stress * np.where(np.arange(121) == 60, 1.5, 1.0))
 
 
 def floored():
-    table = start_up(0.01)
-    generator = np.random.default_rng(0)
-    table["stress_Pa"] = table["stress_Pa"] + 0.5 * generator.standard_normal(len(TIMES))
-    return table
+    noise = 0.5 * np.random.default_rng(0).standard_normal(len(TIMES))
+    return start_up(0.01, stress_Pa=lambda stress: stress + noise)
 
 
 DOUBTS = {
@@ -97,25 +91,13 @@ DOUBTS = {
     "duration": (start_up(time=TIMES / 20), "mean relaxation time is 2 s"),
     "time": (start_up(time=TIMES[1:] + 30.0), "subtract its reading"),
     "rate": (start_up(0.0), "zero throughout"),
-    "linear": (
-        with_column(start_up(), stress_Pa=2 * start_up()["stress_Pa"]),
-        "is 2 times what lve.csv",
-    ),
-    "Cox-Merz": (
-        with_column(start_up(0.05), stress_Pa=0.5 * start_up(0.05)["stress_Pa"]),
-        "0.5 times the complex viscosity",
-    ),
-    "strain": (with_column(start_up(), strain=100 * TIMES), "per cent?"),
+    "linear": (start_up(stress_Pa=lambda stress: 2 * stress), "is 2 times what lve.csv"),
+    "Cox-Merz": (start_up(0.05, stress_Pa=lambda s: 0.5 * s), "0.5 times the complex viscosity"),
+    "strain": (start_up(strain=100 * TIMES), "per cent?"),
     "samples": (start_up(time=TIMES[::20]), "only 7 samples"),
-    "N1": (
-        with_column(start_up(0.05), N1_Pa=start_up(0.05)["N1_Pa"] - 5.0),
-        "negative, above 2 times",
-    ),
+    "N1": (start_up(0.05, N1_Pa=lambda normal: normal - 5.0), "negative, above 2 times"),
     "stress": (floored(), "transducer's floor"),
-    "columns": (
-        {("n1_pa" if k == "N1_Pa" else k): v for k, v in start_up().items()},
-        "rename it to N1_Pa",
-    ),
+    "columns": ({k.replace("N1", "n1"): v for k, v in start_up().items()}, "rename it to N1_Pa"),
 }
 
 
@@ -186,12 +168,12 @@ def test_a_wrong_sign_in_one_oscillation_is_doubted(folder):
 
 
 def test_a_constant_stress_is_doubted(folder):
-    bad = with_column(start_up(), stress_Pa=np.full(len(TIMES), 3.0))
+    bad = start_up(stress_Pa=np.full(len(TIMES), 3.0))
     assert any("the same in every sample" in f.text for f in check_folder(folder(bad)))
 
 
 def test_a_large_normal_force_on_a_slow_run_is_held_against_second_order(folder):
-    bad = with_column(start_up(0.05), N1_Pa=np.full(len(TIMES), 50.0))
+    bad = start_up(0.05, N1_Pa=np.full(len(TIMES), 50.0))
     findings = check_folder(folder(bad))
     # 2 G λ² γ̇² = 2 · 100 · 4 · 0.0025 = 2 Pa
     assert any("between 0 and 2 Pa" in f.text for f in findings)
@@ -222,7 +204,7 @@ def test_a_steady_normal_stress_is_held_against_laun_where_cox_and_merz_hold(
 
 
 def test_a_normal_stress_that_no_fluid_has_is_neither_fitted_nor_judges(folder):
-    sound, bad = start_up(0.05), with_column(start_up(0.1), N1_Pa=np.full(len(TIMES), 50.0))
+    sound, bad = start_up(0.05), start_up(0.1, N1_Pa=np.full(len(TIMES), 50.0))
     path = folder(sound, bad)
     seen = load_dataset(path).quantity_by_quantity()
     assert seen.names == ("r0.csv", "r0.csv (N1)", "r1.csv")
@@ -304,7 +286,7 @@ def test_the_command_exits_with_2_on_errors_only_and_prints_json(folder):
     report = json.loads(check(folder(spiked()), "--json").stdout)
     assert report["errors"] == []
     assert report["warnings"][0]["subject"] == "outliers"
-    wrong = check(folder(with_column(start_up(), stress_Pa=-start_up()["stress_Pa"])))
+    wrong = check(folder(start_up(stress_Pa=np.negative)))
     assert wrong.exit_code == 2
     assert "opposite to the shear rate" in wrong.stderr
 
@@ -328,37 +310,27 @@ def test_the_polyisoprene_folder_is_doubted_where_its_literature_doubts_it(measu
         assert run.quantity != "N1" or 0.05 < run.time[0] * run.rate[0] < 1.01
 
 
-def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(tmp_path):
-    from discover.errors import InputError
-    from discover.study import read_study
-    from discover.study.data import load_study_data
-    from discover.study.declared_model import declared_model
-
+def test_runs_at_rest_or_without_stress_are_refused_before_any_fit(folder):
     times = np.arange(1.0, 13.0)
-
-    def write(name, rate, stress):
-        rows = zip(times.tolist(), rate.tolist(), stress.tolist(), strict=True)
-        text = "\n".join(f"{t!r},{r!r},{s!r}" for t, r, s in rows)
-        (tmp_path / name).write_text("time_s,shear_rate_1_s,stress_Pa\n" + text)
-
-    (tmp_path / "runs.csv").write_text("file\na.csv\nb.csv\n")
-    (tmp_path / "s.toml").write_text(
-        '[data]\nfolder = "."\n[model]\nmodulus_Pa = "fit"\nrelaxation_time_s = "fit"\n'
-    )
-    study = read_study(tmp_path / "s.toml")
     flow, stress = np.ones(12), 1 - np.exp(-times)
+
+    def made(*runs):
+        columns = ("time_s", "shear_rate_1_s", "stress_Pa")
+        tables = (dict(zip(columns, (times, *run), strict=True)) for run in runs)
+        return folder(*tables, sweep=False)
+
+    model = {"modulus_Pa": "fit", "relaxation_time_s": "fit"}
+    study = parse_study({"data": {"folder": str(made((flow, stress)))}, "model": model})
     for rate, force, word in (
         (0 * flow, stress, "shear rate is zero"),
         (1e-300 * flow, stress, "shear rate is zero"),
         (flow, 0 * stress, "stress is zero"),
     ):
-        write("a.csv", rate, force)
-        write("b.csv", rate, force)
+        root = made((rate, force), (rate, force))
         with pytest.raises(InputError, match=word):
             load_study_data(study)
-        assert any(f.severity == "error" and word in f.text for f in check_folder(tmp_path))
+        assert any(word in f.text for f in check_folder(root).of("error"))
     # one run at rest beside one that flows says nothing of the constants to start from
-    write("a.csv", flow, stress)
-    write("b.csv", 0 * flow, 1e-3 * stress)
+    made((flow, stress), (0 * flow, 1e-3 * stress))
     model = declared_model(study, load_study_data(study).dataset)
     assert 0.01 < model.modulus[0] < 100

@@ -78,10 +78,9 @@ def test_the_stress_of_a_sweep_tells_whether_its_strain_is_in_per_cent(tmp_path,
 
 
 def test_the_rate_of_a_run_tells_the_unit_of_its_strain(tmp_path):
-    made = read(tmp_path, start_up(Strain=200.0 * TIME))
-    np.testing.assert_allclose(columns(made.files["a.csv"])["strain"], 2.0 * TIME)
-    made = read(tmp_path, start_up(Strain=2.0 * TIME))
-    np.testing.assert_allclose(columns(made.files["a.csv"])["strain"], 2.0 * TIME)
+    for strain in (200.0 * TIME, 2.0 * TIME):
+        made = read(tmp_path, start_up(Strain=strain))
+        np.testing.assert_allclose(columns(made.files["a.csv"])["strain"], 2.0 * TIME)
 
 
 def test_complex_viscosity_tells_hertz_from_radians(tmp_path):
@@ -129,10 +128,8 @@ def test_a_unit_that_changes_nothing_is_named(tmp_path):
     assert any("--unit viscosity changes nothing" in line for line in made.said)
     # the strain of a sweep may be called by either name
     for key in ("strain", "strain_amplitude"):
-        got = columns(
-            read(tmp_path, sweep("Strain"), units={key: "%"}).files["amplitude_sweep.csv"]
-        )
-        assert got["strain"][-1] == pytest.approx(10.0)
+        made = read(tmp_path, sweep("Strain"), units={key: "%"})
+        assert columns(made.files["amplitude_sweep.csv"])["strain"][-1] == pytest.approx(10.0)
 
 
 def test_units_in_lines_above_the_numbers_are_used_and_the_time_of_day_is_none(tmp_path):

@@ -16,14 +16,10 @@ def folder(path, header, *lines):
     (path / "runs.csv").write_text("\n".join([header, *lines]) + "\n")
     for line in lines:
         name = line.split(",")[0]
-        extension = "uniaxial" in line
-        rows = [
-            "time_s,hencky_rate_1_s,tensile_stress_Pa"
-            if extension
-            else "time_s,shear_rate_1_s,stress_Pa,strain"
-        ]
-        for t in TIME:
-            rows.append(f"{t},0.5,{t}" if extension else f"{t},0.5,{1 - np.exp(-t)},{0.5 * t}")
+        rows = ["time_s,shear_rate_1_s,stress_Pa,strain"]
+        rows += [f"{t},0.5,{1 - np.exp(-t)},{0.5 * t}" for t in TIME]
+        if "uniaxial" in line:
+            rows = ["time_s,hencky_rate_1_s,tensile_stress_Pa", *(f"{t},0.5,{t}" for t in TIME)]
         (path / name).write_text("\n".join(rows) + "\n")
     return path
 
@@ -52,6 +48,9 @@ def test_a_steady_start_without_its_rate_is_not_read_as_a_start_from_rest(tmp_pa
     assert "rate_before" in data.left_out
     with pytest.raises(InputError, match="rate_before"):
         data.select(["b.csv"])
+    # where the study says from which rate, it is used
+    named = folder(tmp_path / "blood", "file,start,before", "a.csv,steady,5")
+    assert load_dataset(named, rate_before="before").names == ("a.csv",)
 
 
 def test_a_steady_start_takes_its_rate_from_the_column_of_that_name(tmp_path):
@@ -122,14 +121,7 @@ def test_what_is_declared_as_it_is_taken_is_used(tmp_path):
     header = "file,flow,control,start,step_strain,temperature_C"
     made = folder(tmp_path / "melt", header, "a.csv,shear,rate,rest,,25", "b.csv,,,,,")
     data = load_dataset(made)
-    assert data.names == ("a.csv", "b.csv")
-    assert not data.set_aside
-    assert data.left_out == ""
-
-
-def test_a_steady_start_is_used_where_the_study_says_from_which_rate(tmp_path):
-    made = folder(tmp_path / "blood", "file,start,before", "a.csv,steady,5")
-    assert load_dataset(made, rate_before="before").names == ("a.csv",)
+    assert (data.names, dict(data.set_aside), data.left_out) == (("a.csv", "b.csv"), {}, "")
 
 
 def test_a_rate_under_imposed_stress_counts_as_measured(tmp_path):

@@ -83,14 +83,9 @@ def test_each_run_is_looked_at_once_however_many_there_are(monkeypatch):
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
 def test_one_run_of_many_in_another_unit_is_still_found(factor):
     time = np.linspace(0.1, 5.0, 12)
+    rise, gains = 100 * -np.expm1(-time), np.where(np.arange(8) == 3, factor, 1.0)
     runs = [
-        Run(
-            f"r{i}.csv",
-            time,
-            start_up(rate),
-            np.full(12, rate),
-            100 * rate * -np.expm1(-time) * (factor if i == 3 else 1.0),
-        )
+        Run(f"r{i}.csv", time, start_up(rate), np.full(12, rate), rise * rate * gains[i])
         for i, rate in enumerate(np.geomspace(0.1, 1.0, 8).tolist())
     ]
     assert {finding.file for finding in doubts_among_runs(runs)} == {"r3.csv"}

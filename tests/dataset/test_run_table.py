@@ -108,14 +108,8 @@ def test_titles_name_what_the_table_names_and_nothing_else(rows, words):
 
 def make_run(**changes):
     time = np.array([0.0, 1.0, 2.0])
-    fields = {
-        "name": "a.csv",
-        "time": time,
-        "protocol": start_up(1.0),
-        "rate": np.ones(3),
-        "stress": time,
-    } | changes
-    return Run(**fields)
+    known = {"time": time, "protocol": start_up(1.0), "rate": np.ones(3), "stress": time}
+    return Run(**{"name": "a.csv", **known, **changes})
 
 
 @pytest.mark.parametrize(

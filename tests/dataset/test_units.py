@@ -27,31 +27,24 @@ NO_UNITS = ("Pa_2", "10Pa", "2", "1", "1e3Pa", "s_2", "Pa_10", "Pa22", "Pa__2", 
             "mkPa", "Pa_", "__", "raw", "9**9")  # fmt: skip
 
 
-@pytest.mark.parametrize(("suffix", "factor"), HEADINGS.items())
-def test_units_in_headings_have_their_factors(suffix, factor):
-    unit = read_heading(suffix)
-    assert unit is not None
-    assert unit.factor == pytest.approx(factor, rel=1e-12)
+NEVER_WORKED_OUT = (
+    "9**9**9**9", "10Pa", "Pa*10", "s^9^9", "(" * 30, "((s))(", "Pa/", "//Pa", "Pa-", "ms11",
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "factor"), WRITTEN.items())
-def test_units_of_exports_have_their_factors(text, factor):
-    unit = read_unit(text)
-    assert unit is not None
-    assert unit.factor == pytest.approx(factor, rel=1e-12)
-
-
-@pytest.mark.parametrize("suffix", NO_UNITS)
-def test_a_heading_with_digits_other_than_exponents_has_no_unit(suffix):
-    assert read_heading(suffix) is None
+@pytest.mark.parametrize(("read", "known"), [(read_heading, HEADINGS), (read_unit, WRITTEN)])
+def test_units_of_headings_and_of_exports_have_their_factors(read, known):
+    for text, factor in known.items():
+        unit = read(text)
+        assert unit is not None, text
+        assert unit.factor == pytest.approx(factor, rel=1e-12), text
 
 
 @pytest.mark.parametrize(
-    "text",
-    ["9**9**9**9", "10Pa", "Pa*10", "s^9^9", "(" * 30, "((s))(", "Pa/", "//Pa", "Pa-", "ms11"],
+    ("read", "texts"), [(read_heading, NO_UNITS), (read_unit, NEVER_WORKED_OUT)]
 )
-def test_a_unit_is_never_worked_out(text):
-    assert read_unit(text) is None
+def test_digits_other_than_exponents_are_no_unit_and_none_is_worked_out(read, texts):
+    assert [text for text in texts if read(text) is not None] == []
 
 
 def write(folder, table, sweep="omega_rad_s,Gp_Pa,Gpp_Pa\n0.1,1,5\n1,10,10\n10,15,5\n"):
@@ -74,17 +67,16 @@ def test_a_second_column_of_the_kind_is_not_taken_for_a_fraction(tmp_path, heade
         load_dataset(write(tmp_path, f"{header}\n{ROWS}"))
 
 
-def test_a_second_column_beside_the_first_is_left_alone_and_said(tmp_path):
-    table = "time_s,shear_rate_1_s,stress_Pa,stress_Pa_2\n0.1,1,1,7\n0.2,1,2,7\n"
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [("stress_Pa_2", "stress_Pa_2 in a.csv is not used"),
+     ("N1_Pa_2", "N1_Pa_2 in a.csv is not read: it ends in no unit of N1")],
+)  # fmt: skip
+def test_a_column_that_is_not_read_for_its_heading_is_left_alone_and_said(tmp_path, column, words):
+    table = f"time_s,shear_rate_1_s,stress_Pa,{column}\n0.1,1,1,7\n0.2,1,2,7\n"
     run = load_dataset(write(tmp_path, table)).runs[0]
     assert run.stress.tolist() == [1.0, 2.0]
-    assert "stress_Pa_2 in a.csv is not used" in " ".join(map(str, check_folder(tmp_path)))
-
-
-def test_a_normal_stress_that_is_not_read_for_its_heading_is_said(tmp_path):
-    table = "time_s,shear_rate_1_s,stress_Pa,N1_Pa_2\n0.1,1,1,7\n0.2,1,2,7\n"
-    said = [str(f) for f in check_folder(write(tmp_path, table)).of("warning")]
-    assert any("N1_Pa_2" in text and "no unit of N1" in text for text in said)
+    assert words in " ".join(map(str, check_folder(tmp_path)))
 
 
 def test_every_conversion_is_said(tmp_path):

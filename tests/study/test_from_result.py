@@ -124,22 +124,17 @@ def test_a_law_with_a_name_is_taken_with_its_constants_and_the_terms_beside_it(t
     assert forward_model(found).free_positions == []
 
 
-def test_an_effect_of_the_study_stands_in_place_of_the_one_that_was_found(tmp_path):
-    model = 'from = "earlier"\neffects = { stress_gain = "fit" }'
-    found = declared(write(tmp_path, "loop.json", LOOP, model))
-    assert found.free_constants == ("stress_gain.gain_error",)
-
-
 def test_constants_are_said_to_count_as_exact_with_the_intervals_that_they_had(tmp_path):
     said = declared(write(tmp_path, "loop.json", LOOP)).source
     assert "count as exact" in said
     assert "gain_error of stress_gain -0.12 to -0.08, epsilon of ptt_linear 0.1 to 0.3" in said
 
 
-def test_of_an_effect_that_is_fitted_again_no_interval_is_said_to_be_lost(tmp_path):
+def test_an_effect_of_the_study_replaces_that_which_was_found_with_its_interval(tmp_path):
     model = 'from = "earlier"\neffects = { ptt_linear = "fit" }'
-    said = declared(write(tmp_path, "loop.json", LOOP, model)).source
-    assert "epsilon of ptt_linear" not in said
+    found = declared(write(tmp_path, "loop.json", LOOP, model))
+    assert found.free_constants == ("ptt_linear.epsilon",)
+    assert "epsilon of ptt_linear" not in found.source
 
 
 def test_what_is_unexplained_is_taken_with_the_doubt_said(tmp_path):
@@ -257,6 +252,7 @@ def test_of_a_comparison_the_law_by_mode_is_taken_where_it_alone_explains(tmp_pa
     assert "sparse" in declared(write(tmp_path, "comparison.json", content)).source
 
 
+_BY_MODE = {"law": None, "effects": [], "by_mode": ["alpha"]}
 _NOTHING = {**LOOP, "verdict": "unexplained", "stages": []}
 _NO_TERM = {
     **COMPARISON,
@@ -271,16 +267,8 @@ _NO_TERM = {
         ("loop.json", None, "holds neither loop.json nor comparison.json"),
         ("loop.json", {"verdict": "no_signal"}, "hold no signal"),
         ("loop.json", {"verdict": "effects_added"}, "written by an earlier version"),
-        (
-            "loop.json",
-            {**LOOP, "declared": {"law": None, "effects": [], "by_mode": ["alpha"]}},
-            "alpha differs from one relaxation mode to the next",
-        ),
-        (
-            "loop.json",
-            {**LOOP, "stages": [{**MOBILITY_BY_MODE, "parameters": _OF_THREE}]},
-            "damaged",
-        ),
+        ("loop.json", {**LOOP, "declared": _BY_MODE}, "alpha differs from one relaxation mode"),
+        ("loop.json", {**LOOP, "stages": [_OF_THREE]}, "damaged"),
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),
         ("loop.json", _NOTHING, "there is nothing to take"),

@@ -7,14 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
-from discover.dataset.checking.runs import (
-    Finding,
-    is_start_up,
-    note,
-    steady_stress,
-    stress_noise,
-    warning,
-)
+from discover.dataset.checking.runs import Finding, found, is_start_up, steady_stress, stress_noise
 from discover.dataset.linear.mode_search import BEYOND, relative_moduli, solved
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.load import SWEEP_FILE
@@ -61,89 +54,64 @@ def doubts_of_amplitude_sweep(run: Run, linear: LinearSweep | None) -> Iterator[
         return
     low, high = float(np.min(strain)), float(np.max(strain))
     if low > _LARGEST_FIRST and high > _LARGEST_STRAIN:
-        text = (
-            f"The strain in {run.name} goes from {low:.3g} to {high:.3g}. If that is in per cent, "
-            "rename the column to strain_percent."
-        )
-        yield warning("units", run.name, text)
+        yield found("strain_in_percent", run.name, low=low, high=high)
     for name, values in (("G′", storage), ("G″", loss)):
-        if np.any(values <= 0.0):
-            text = (
-                f"{np.count_nonzero(values <= 0.0)} values of {name} in {run.name} are not "
-                "positive, as those of a passive fluid are: they are noise, or the phase is wrong."
-            )
-            yield warning("sign", run.name, text)
+        if count := np.count_nonzero(values <= 0.0):
+            yield found("not_positive", run.name, count=count, name=name)
     if linear is None:
         return
     omega, known = run.angular_frequency, linear.angular_frequency
     small = (omega >= known[0]) & (omega <= known[-1]) & (strain <= _SMALL)
-    if not np.any(small):
-        return
-    expected = magnitude_at(linear, omega[small])
-    factor = float(np.median(np.hypot(storage[small], loss[small]) / expected))
-    if abs(np.log(factor)) > _APART:
-        text = (
-            f"At strains up to {_SMALL:g} the modulus in {run.name} is {factor:.2g} times that of "
-            "lve.csv at the same frequency: another loading, another unit, or no linear range."
-        )
-        yield warning("sweep", run.name, text)
+    if np.any(small):
+        expected = magnitude_at(linear, omega[small])
+        factor = float(np.median(np.hypot(storage[small], loss[small]) / expected))
+        if abs(np.log(factor)) > _APART:
+            yield found("other_modulus", run.name, strain=_SMALL, factor=factor)
 
 
 def magnitude_at(sweep: LinearSweep, frequency):
     """Return |G*| in Pa at frequencies in rad/s, on straight lines between those of a sweep."""
-    known, size = np.log(sweep.angular_frequency), np.hypot(sweep.storage_modulus,
-                                                            sweep.loss_modulus)  # fmt: skip
-    return np.exp(np.interp(np.log(frequency), known, np.log(size)))
+    size = np.log(np.hypot(sweep.storage_modulus, sweep.loss_modulus))
+    return np.exp(np.interp(np.log(frequency), np.log(sweep.angular_frequency), size))
 
 
 def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterator[Finding]:
     """Doubts about a linear sweep; that modes fit G′ and G″ stands for Kramers–Kronig."""
-    inertia = _inertia(sweep)
-    repeated = len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency)
     if spectrum.best_error > _SWEEP_TOLERANCE:
-        text = (
-            f"No sum of Maxwell modes, a solvent and an elastic constant fits {SWEEP_FILE} better "
-            f"than {100 * spectrum.best_error:.0f} %: G' and G'' contradict each other. Inertia of "
-            "the instrument at high frequency, a shift of one column, or too large an amplitude do "
-            "that."
-        )
-        yield warning("sweep", SWEEP_FILE, text)
+        yield found("contradiction", SWEEP_FILE, percent=100 * spectrum.best_error)
     if sweep.thinned:
-        yield note("samples", SWEEP_FILE, f"{SWEEP_FILE}: {sweep.thinned}.")
-    if inertia:
-        yield warning("sweep", SWEEP_FILE, inertia)
+        yield found("thinned", SWEEP_FILE, how=sweep.thinned)
+    yield from _inertia(sweep)
     if spectrum.solid:
-        yield note("sweep", SWEEP_FILE, f"{SWEEP_FILE}: {spectrum.solid}")
-    if repeated:
-        text = f"{SWEEP_FILE} holds some frequencies more than once."
-        yield note("sweep", SWEEP_FILE, text)
+        yield found("solid", SWEEP_FILE, what=spectrum.solid)
+    if len(np.unique(sweep.angular_frequency)) < len(sweep.angular_frequency):
+        yield found("repeated", SWEEP_FILE)
 
 
-def _inertia(sweep: LinearSweep) -> str:
-    """Say where G' bends at high frequency as only a wrong inertia correction makes it."""
+def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
+    """Yield that G' bends at high frequency as only a wrong inertia correction makes it."""
     omega, size = sweep.angular_frequency, np.hypot(sweep.storage_modulus, sweep.loss_modulus)
     if len(omega) < _FEWEST_FOR_INERTIA:
-        return ""
-    found = sweep_inertia(sweep)
-    share = np.abs(found.inertia) * omega**2 / size
-    seen = found.evidence >= _STRONG_EVIDENCE and found.error_before >= _VISIBLE_MISFIT
+        return
+    term = sweep_inertia(sweep)
+    share = np.abs(term.inertia) * omega**2 / size
+    seen = term.evidence >= _STRONG_EVIDENCE and term.error_before >= _VISIBLE_MISFIT
     if not seen or np.max(share) < _SWEEP_TOLERANCE:
-        return ""
-    usable = omega[share < _INERTIA_SHARE]
-    remedy = (
-        f'Give the study [model] modes = "lve" and sweep_rad_s = [{omega[0]:.4g}, '
-        f"{np.max(usable):.4g}], or correct the inertia."
-        if usable.size
-        else "Correct the inertia."
-    )
-    return (
-        f"G' in {SWEEP_FILE} holds {-found.inertia:.3g} Pa s2 "
-        f"(± {HALF_BAND * found.deviation:.2g}) "
-        "times frequency squared, which no fluid has: a tool's inertia, or a correction for it "
-        f"that is off. It makes {100 * np.max(share):.0f} % of the modulus at the highest "
-        f"frequency; modes, solvent and elastic constant alone miss by "
-        f"{percent_of(found.error_before)}, with it by "
-        f"{percent_of(found.error_after)}. {remedy}"
+        return
+    usable, remedy = omega[share < _INERTIA_SHARE], "Correct the inertia."
+    if usable.size:
+        window = f"[{omega[0]:.4g}, {np.max(usable):.4g}]"
+        remedy = f'Give the study [model] modes = "lve" and sweep_rad_s = {window}, or correct the '
+        remedy += "inertia."
+    yield found(
+        "inertia",
+        SWEEP_FILE,
+        inertia=-term.inertia,
+        half=HALF_BAND * term.deviation,
+        percent=100 * np.max(share),
+        before=percent_of(term.error_before),
+        after=percent_of(term.error_after),
+        remedy=remedy,
     )
 
 
@@ -161,8 +129,7 @@ def sweep_inertia(sweep: LinearSweep) -> SweepInertia:
     """Return how much of G′, as recorded, is inertia, with Maxwell modes, solvent and constant.
 
     The torque on tool and sample is G* − I ω² times the strain   [Krieger 1990, J. Rheol. 34, 471].
-    Modes with positive moduli only rise in G′, so a G′ that falls with ω² is no material's; a
-    solvent raises G″ alone, and an elastic constant raises G′ at every frequency alike.
+    Positive moduli only rise in G′, so a G′ that falls with ω² is no material's.
     """
     omega = np.asarray(sweep.angular_frequency, dtype=float)
     size = np.hypot(sweep.storage_modulus, sweep.loss_modulus)
@@ -195,13 +162,9 @@ def against_linear_theory(
     if sweep is None or spectrum is None:
         return
     mean_time = spectrum.mean_relaxation_time  # weighted by what modes add to the viscosity
-    if runs and not spectrum.elastic_modulus and fastest * mean_time < 0.1:
-        text = (
-            f"The largest shear rate times the mean relaxation time ({mean_time:.3g} s) is "
-            f"{fastest * mean_time:.2g}: every run is linear, and nothing nonlinear can be "
-            "learned. Add faster runs."
-        )
-        yield warning("rate", "", text)
+    number = fastest * mean_time
+    if runs and not spectrum.elastic_modulus and number < 0.1:
+        yield found("all_linear", time=mean_time, number=number)
     linear = {run.name: _linear_part(run, sweep, spectrum) for run in runs if run.flows}
     yield from _shared_gain(runs, linear, sweep, spectrum)
     for run in runs:
@@ -216,33 +179,16 @@ def _of_start_up(
     rate, frequency = abs(run.rate[0]), sweep.angular_frequency
     # strongly sheared melts are steady after some strain, however slow they relax
     if run.time[-1] < mean_time and (strain := rate * run.time[-1]) < 5.0:
-        text = (
-            f"{run.name} lasts {run.time[-1]:.3g} s and strains by {strain:.2g}; the mean "
-            f"relaxation time is {mean_time:.3g} s. It does not reach its steady state, and slow "
-            "modes hardly show. Run longer, or do not expect it to tell."
-        )
-        yield warning("duration", run.name, text)
+        yield found("too_short", run.name, lasts=run.time[-1], strain=strain, time=mean_time)
     ratio = float(np.median(stress / linear)) if len(stress) >= _FEWEST_RATIOS else 1.0
     if abs(ratio - 1.0) > _STRESS_TOLERANCE:
-        text = (
-            f"At strains below {_LINEAR_STRAIN:g} the stress in {run.name} is {ratio:.2g} times "
-            f"what {SWEEP_FILE} predicts. Units, temperature, sample loading, a slow start or a "
-            "soft instrument do that; the closed loop can distinguish some of them."
-        )
-        yield warning("linear", run.name, text)
+        yield found("off_linear_theory", run.name, strain=_LINEAR_STRAIN, factor=ratio)
     level = steady_stress(run)
-    if rate * mean_time > _COX_MERZ_RATE or level is None:
-        return
-    if not frequency[0] <= rate <= frequency[-1]:
-        return
-    ratio = level / float(magnitude_at(sweep, rate))
-    if not 1 / _COX_MERZ_FACTOR < ratio < _COX_MERZ_FACTOR:
-        text = (
-            f"The steady viscosity in {run.name} is {ratio:.2g} times the complex viscosity of "
-            f"{SWEEP_FILE} at the same rate (Cox–Merz rule). Slip, edge fracture, units or "
-            "another sample do that; so do structured fluids."
-        )
-        yield warning("Cox-Merz", run.name, text)
+    inside = frequency[0] <= rate <= frequency[-1]
+    if rate * mean_time <= _COX_MERZ_RATE and level is not None and inside:
+        ratio = level / float(magnitude_at(sweep, rate))
+        if not 1 / _COX_MERZ_FACTOR < ratio < _COX_MERZ_FACTOR:
+            yield found("cox_merz", run.name, factor=ratio)
 
 
 def _linear_stress(
@@ -304,10 +250,10 @@ def _shared_gain(
 ) -> Iterator[Finding]:
     """Yield by which factor all runs differ from the sweep, if it is one for all."""
     flowing = [run for run in runs if run.name in linear]
-    found = [gain for run in flowing if (gain := _gain(run, *linear[run.name])) is not None]
-    if not found:
+    found_gains = [gain for run in flowing if (gain := _gain(run, *linear[run.name])) is not None]
+    if not found_gains:
         return
-    gains, errors = np.array(found).T
+    gains, errors = np.array(found_gains).T
     count, several = len(gains), len(gains) >= _FEWEST_GAINS
     if several:
         yield from _unlike_gains(gains, np.hypot(errors, _STILL_LINEAR))
@@ -321,20 +267,10 @@ def _shared_gain(
         doubt = max(scatter, float(np.max(errors)), spectrum.relative_error)
     if abs(shared) < 3.0 * doubt or np.min(gains) < 0 < np.max(gains):
         return
-    if not warned and (abs(shared) < np.log1p(_NOTED_GAIN) or not several):
-        return
-    which = {1: "the one run that tells", 2: "both runs that tell"}
-    why = (
-        "a gain, such as another gap, radius, temperature or filling than in the sweep"
-        if warned
-        else "within the usual error of gap and filling"
-    )
-    text = (
-        f"In {which.get(count, f'all {count} runs that tell')} it, the stress at small strain is "
-        f"{np.exp(shared):.3g} times what {SWEEP_FILE} predicts: {why}. Correct it, or let the "
-        'study fit it: [model] modes = "lve" with modulus_Pa = "fit".'
-    )
-    yield (warning if warned else note)("gain", "", text)
+    if warned or (abs(shared) >= np.log1p(_NOTED_GAIN) and several):
+        few = {1: "the one run that tells", 2: "both runs that tell"}
+        which = few.get(count, f"all {count} runs that tell")
+        yield found("gain" if warned else "small_gain", runs=which, factor=np.exp(shared))
 
 
 def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
@@ -344,11 +280,5 @@ def _unlike_gains(gains: Values, errors: Values) -> Iterator[Finding]:
     spread = float(np.sqrt(max(np.var(gains, ddof=1) - np.mean(errors**2), 0.0)))
     if chi2.sf(float(off @ off), len(gains) - 1) > _UNLIKELY or spread > LARGEST:
         return
-    low, high = np.exp(np.min(gains)), np.exp(np.max(gains))
-    text = (
-        f"At small strain the runs stand at {low:.3g} to {high:.3g} times what {SWEEP_FILE} "
-        f"predicts, so they differ among themselves by {percent_of(spread)}, standard deviation, "
-        "as fillings of one sample do. If each run is a loading of its own, say so in the study: "
-        f"loading = {spread:.1g} in [loop] and in [compare]."
-    )
-    yield note("loading", "", text)
+    ends = {"low": np.exp(np.min(gains)), "high": np.exp(np.max(gains))}
+    yield found("loadings", **ends, percent=percent_of(spread), spread=spread)

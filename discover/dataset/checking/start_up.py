@@ -8,19 +8,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.integrate import cumulative_trapezoid
 
-from discover.dataset.checking.runs import (
-    Finding,
-    is_start_up,
-    local_noise,
-    steady_stress,
-    stress_noise,
-    warning,
-)
-from discover.dataset.linear_viscoelasticity import (
-    LinearSweep,
-    RelaxationSpectrum,
-    relaxation_spectrum,
-)
+from discover.dataset import linear_viscoelasticity as linear
+from discover.dataset.checking import runs as run_checks
+from discover.dataset.checking.runs import Finding, found
+from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
 from discover.dataset.run_table import oscillation
 from discover.errors import InputError
@@ -64,7 +55,7 @@ def doubts_of_normal_stress(
 ) -> Iterator[Finding]:
     """Doubts about the N1 of a start-up of shear; nothing of any other run."""
     for fault in _faults(run, sweep, spectrum):
-        yield warning("N1", run.name, f"N1 in {run.name} {fault.why}")
+        yield found("normal_stress", run.name, why=fault.why)
 
 
 class _Fault(NamedTuple):
@@ -82,7 +73,7 @@ def sound_normal_stress(
     spectrum = None
     if there and sweep is not None:
         with suppress(InputError):  # the check of the folder says why
-            spectrum = relaxation_spectrum(sweep)
+            spectrum = linear.relaxation_spectrum(sweep)
     late: dict[str, float] = {}
     never: dict[str, str] = {}
     for run in there:
@@ -100,7 +91,7 @@ def _faults(
 ) -> Iterator[_Fault]:
     normal = run.first_normal_stress_difference
     in_shear = run.protocol.control == "rate" and run.flow == "shear" and run.from_rest
-    if normal is None or not (in_shear and is_start_up(run)):
+    if normal is None or not (in_shear and run_checks.is_start_up(run)):
         return
     if (early := _early(run, normal)) is not None:
         yield early
@@ -142,7 +133,8 @@ def _early(run: Run, normal: Values) -> _Fault | None:
         early & (memory >= _MOSTLY_ELASTIC * most), memory / _ELASTIC_FACTOR, -0.5 * most
     )
     # of the noise of N1, and of the stress in what it predicts
-    error = np.hypot(local_noise(run.time, normal), local_noise(run.time, stress) * strain)
+    noise = run_checks.local_noise(run.time, normal), run_checks.local_noise(run.time, stress)
+    error = np.hypot(noise[0], noise[1] * strain)
     width = min(_AVERAGED, int(np.sum(early)))
     excess = np.maximum(
         _averaged(normal - _ELASTIC_FACTOR * most, width), _averaged(least - normal, width)
@@ -156,16 +148,13 @@ def _early(run: Run, normal: Values) -> _Fault | None:
     last += int(np.argmin(np.append(bad[last:], False))) - 1
     until = float(run.time[last])
     lasts = len(run) - last - 1 < _FEWEST_LEFT
+    rest = "Nothing is left of it."
+    rest = rest if lasts else "These samples are neither fitted nor used as a test."
     return _Fault(
         f"cannot be right early, up to {until:.4g} s (strain {strain[last]:.2g}): by more than "
         f"its noise it is negative, above {_ELASTIC_FACTOR:g} times stress × strain, the elastic "
         "limit, or below half of what the stress predicts. The normal force lags, gives way or "
-        "has a baseline. "
-        + (
-            "Nothing is left of it."
-            if lasts
-            else "These samples are neither fitted nor used as a test."
-        ),
+        f"has a baseline. {rest}",
         np.inf if lasts else until,
     )
 
@@ -188,7 +177,7 @@ def _laun(run: Run, rate: float, end: float, sweep: LinearSweep) -> Iterator[_Fa
 
     N1 = 2G′(1 + (G′/G″)²)^0.7 and σ12 = |G*| at ω = γ̇   [Laun 1986, J. Rheol. 30, 459].
     """
-    omega, steady = sweep.angular_frequency, steady_stress(run)
+    omega, steady = sweep.angular_frequency, run_checks.steady_stress(run)
     if steady is None or not omega[0] <= rate <= omega[-1]:
         return
     storage, loss = (
@@ -210,17 +199,16 @@ def doubts_of_start(
 ) -> Iterator[Finding]:
     """Yield why a run that is taken as starting from rest cannot have started so, or does not show.
 
-    From rest a fluid has no stress but what the flow until the first sample made: that of a
-    viscosity at once, that of elasticity with the strain. A record is doubted if its first stress
-    is large and (1) it is the largest, and falls whatever the rate does, as after a step of strain;
-    or (2) the run is an oscillation of a fluid that is partly elastic, and its first cycle is
-    already like the later ones; or (3) a linear sweep does not allow so much; or (4) the strain
-    that was recorded with it says that the rate had been another before. Without a spectrum, which
-    would say how fast the stress grows, nothing may show it where the run began late.
+    From rest a fluid has no stress but what the flow until the first sample made. A first stress
+    that is large is doubted if (1) it is the largest, and falls whatever the rate does; or (2) the
+    run is an oscillation of a fluid that is partly elastic, and its first cycle is like the later
+    ones; or (3) a linear sweep does not allow so much; or (4) the strain that was recorded says
+    that the rate had been another before.
     """
     size, first = float(np.max(np.abs(run.stress))), abs(float(run.stress[0]))
     of_rest = run.protocol.control == "rate" and run.from_rest and len(run) > 4
-    if not of_rest or first < max(_FAR_FROM_REST * size, 1e-300, 5.0 * stress_noise(run)):
+    noise = run_checks.stress_noise(run) if of_rest else 0.0
+    if not of_rest or first < max(_FAR_FROM_REST * size, 1e-300, 5.0 * noise):
         return
     why = ""
     if _only_falls(run):
@@ -229,30 +217,18 @@ def doubts_of_start(
         why = "its first cycle is like the later ones, as in the periodic steady state"
     elif sweep is not None and spectrum is not None and _more_than_linear(run, sweep, spectrum):
         why = "the linear sweep allows less than half of that so early"
-    elif run.strain is not None and not run.rate_is_measured and (
-        abs(run.strain[0] - run.rate[0] * run.time[0]) > _NOT_MADE * np.max(np.abs(run.strain))
-    ):  # fmt: skip
-        why = "the strain recorded there is not what its rate had made by then"
+    elif run.strain is not None and not run.rate_is_measured:
+        off = abs(run.strain[0] - run.rate[0] * run.time[0])
+        if off > _NOT_MADE * np.max(np.abs(run.strain)):
+            why = "the strain recorded there is not what its rate had made by then"
     # of an oscillation that was recorded from its start on, the cycles have told
     told = run.time[0] == 0.0 and oscillation(run) is not None
     if why:
-        text = (
-            f"{run.name} is taken as starting from rest, but its first stress is {first:.3g} Pa, "
-            f"{100 * first / size:.0f} % of the largest, and {why}. What came before it will look "
-            "like a missing effect. Give the record from rest on, or say in runs.csv what came "
-            "before (start, step_strain, rate_before); otherwise leave the run out."
-        )
+        yield found("not_from_rest", run.name, first=first, percent=100 * first / size, why=why)
+    # without a spectrum, which would say how fast the stress grows, nothing may show it
     elif spectrum is None and first >= _RISE_OVER * size and not told and not _no_memory(run):
-        text = (
-            f"{run.name} is taken as starting from rest, but does not show it: its first stress, "
-            f"at {run.time[0]:.3g} s, is {100 * first / size:.0f} % of the largest, and nothing "
-            "before it was recorded. Sample the start, or say in runs.csv what came before (start, "
-            "rate_before), which would look like a missing effect. A solvent's viscosity makes "
-            "stress at once: where it is most of the fluid's, nothing is wrong."
-        )
-    else:
-        return
-    yield warning("start", run.name, text)
+        percent = 100 * first / size
+        yield found("start_not_shown", run.name, time=run.time[0], percent=percent)
 
 
 def _no_memory(run: Run) -> bool:
@@ -309,4 +285,4 @@ def _more_than_linear(run: Run, sweep: LinearSweep, spectrum: RelaxationSpectrum
     linear = fast + float(-np.expm1(-float(run.time[0]) / spectrum.relaxation_time) @ modes)
     trouton = float(kinematics_of(run.flow).viscous)
     allowed = _LINEAR_FACTOR * trouton * abs(float(run.rate[0])) * linear
-    return abs(float(run.stress[0])) > allowed + 5.0 * stress_noise(run)
+    return abs(float(run.stress[0])) > allowed + 5.0 * run_checks.stress_noise(run)

@@ -18,7 +18,7 @@ from discover.dataset.importing.folder_files import (
 )
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
-from discover.dataset.importing.names import name_table
+from discover.dataset.importing.names import alternatives, name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
 from discover.dataset.importing.quantities import (
     UnsaidUnits,
@@ -75,7 +75,7 @@ class ImportedFolder:
 
 @dataclass
 class _Found:
-    """What has been found so far, in one file or over all."""
+    """Records and messages, of one file or of all."""
 
     records: list[NamedRecord] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
@@ -101,8 +101,8 @@ class _Found:
         """Add what another file holds."""
         self.records += other.records
         self.said += other.said
-        self.unread += other.unread
         self.tests |= other.tests
+        self.unread += other.unread
         self.named |= other.named
         self.asked_for |= other.asked_for
         self.units = {**other.units, **self.units}
@@ -115,17 +115,14 @@ class _Found:
 def import_files(
     paths: Sequence[Path], mapping: Mapping, sweep: Path | None = None
 ) -> ImportedFolder:
-    """Return the data folder that exports hold.
+    """Return the data folder that exports hold, in SI units.
 
-    Every block of numbers is taken for the test that its quantities and their course make it:
-    records in time become runs, sweeps and flow curves the tables beside them. Values are converted
-    to SI units and written with all their digits. Rows in which a needed cell is empty or no number
-    are dropped, and counted in `said`. A file that cannot be understood does not keep the others
-    from being read; it is named in `unread`.
+    A block of numbers is taken for the test that its quantities and their course make it: records
+    in time become runs, sweeps and flow curves the tables beside them. Rows without a needed number
+    are dropped and counted. A file that cannot be understood is named in `unread`.
 
-    `mapping`: what is known about them; what it leaves open is found from names, units and numbers.
-    `sweep`: file of which the first frequency sweep becomes ``lve.csv``, if any. Raises InputError
-    if no file can be understood; says which columns it has.
+    `mapping`: what is known; the rest is found from names, units and numbers. `sweep`: file whose
+    first frequency sweep becomes ``lve.csv``. Raises InputError if no file can be understood.
     """
     all_, sources = _Found(), []
     for path in paths:
@@ -164,18 +161,18 @@ def import_files(
             f'--column {unused[0]}="its name", or leave the unit out.'
         )
     require_units(all_.units)
-    idle = [
+    idle = (
         f"warning: --unit {key} changes nothing: no test that was read needs {key}."
         for key in sorted(of_units - all_.asked_for - _WAVES)
-    ]
+    )
     files, notes = files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
     same = {key: next(iter(names)) for key, names in all_.seen.items() if len(names) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
-    unread = unread_columns(all_.columns)
-    said = [*units_taken_as_si(all_.units), *idle, *all_.said, *unread, *notes]
+    units, unread = units_taken_as_si(all_.units), unread_columns(all_.columns)
+    said = [*units, *idle, *all_.said, *unread, *notes]
     return ImportedFolder(files, mapping.model_copy(update=used), said, all_.unread)
 
 
@@ -208,24 +205,20 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             if recovered is not None:
                 found.records[-1] = replace(found.records[-1], record=recovered)
                 found.tests[key] = "creep"
-                found.said.append(
-                    f"{where}: the recovery after the creep before it, added to that run."
-                )
+                words = "the recovery after the creep before it, added to that run."
+                found.said.append(f"{where}: {words}")
                 continue
         try:
             one = _taken(readings, chosen, key)
-            made = None if one.kind == "none" else record(readings, one, previous)
+            made = record(readings, one, previous)
         except InputError as error:
             if chosen is not None or mapping.blocks is not None:
                 raise
             found.unread.append(f"{where}: {error}")
         else:
-            why = one.why
-            if made is not None and made.kind == "none":
-                why = made.notes[0]
-            elif made is not None:
-                why = _not_at(made, readings, one, mapping) if chosen is None else ""
-            if made is None or made.kind == "none" or why:
+            none = made.kind == "none"
+            why = made.notes[0] if none else _not_at(made, readings, one, mapping, chosen)
+            if none or why:
                 reasons += [f"block {number} is {why}"] if why else []
                 found.said.append(left_out(where, block, why))
             else:
@@ -244,8 +237,8 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             of_wave = Readings.of(wave, Mapping(), file)
             one = recognise(of_wave)
             made = record(of_wave, one, None)
-            point = wave.name.rpartition(" ")[2]
-            found.records.append(NamedRecord(f"{name}-point-{point}", made, file, wave.name))
+            own = f"{name}-point-{wave.name.rpartition(' ')[2]}"
+            found.records.append(NamedRecord(own, made, file, wave.name))
             found.said.append(_summary(f"{file}, {wave.name}", of_wave, one, made))
     if unread := [shown(name) for name in there if name not in read]:
         found.columns[", ".join(unread)] = [file]
@@ -254,13 +247,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     return found
 
 
-_CALIBRATION = re.compile(
-    r"calibra|kalibri|étalon|taratura|verification|(reference|standard|référence) (oil|fluid)"
-    r"|viscosity standard"
-    r"|\bblank (run|test|measurement)\b|empty (tool|geometry|cup)|leermessung|prüföl|referenzöl"
-    r"|air check|self-?test|校正|校准|標準液|較正|보정|교정",
-    re.IGNORECASE,
-)
+_CALIBRATION = re.compile(alternatives("lines")["calibrations"], re.IGNORECASE)
 _A_CALIBRATION = (
     "a calibration or check of the instrument by its title, no test of the sample; to take it "
     "nevertheless, say what it is, as in --test {}=flow_curve"
@@ -268,22 +255,23 @@ _A_CALIBRATION = (
 _ISOTHERMAL = 5.0  # °C, width of the middle nine tenths of a test at one temperature
 
 
-def _not_at(made: Record, readings: Readings, one: Recognised, mapping: Mapping) -> str:
-    """Return why a test is at no temperature, or not at that which the user wants; else nothing."""
+def _not_at(
+    made: Record, readings: Readings, one: Recognised, mapping: Mapping, chosen: TestName | None
+) -> str:
+    """Say why a test is at no temperature, or not at the one asked for; empty if it is."""
+    if chosen is not None:
+        return ""
     temperature = readings.get("temperature")
     if temperature is not None and np.isfinite(temperature[one.rows]).any():
         low, high = np.nanpercentile(temperature[one.rows], [5.0, 95.0])
         if high - low > _ISOTHERMAL:
             return f"at no one temperature, but from {low:.4g} to {high:.4g} °C"
     wanted = mapping.temperature_C
-    if wanted is None:
-        return ""
-    if made.temperature is None:
+    if wanted is not None and made.temperature is None:
         made.temperature = wanted
-        made.notes.append(
-            f"nothing says its temperature: taken to be at the {wanted:g} °C asked for"
-        )
-    if abs(made.temperature - wanted) <= 1.0:
+        words = f"nothing says its temperature: taken to be at the {wanted:g} °C asked for"
+        made.notes.append(words)
+    if wanted is None or made.temperature is None or abs(made.temperature - wanted) <= 1.0:
         return ""
     return f"at {made.temperature:g} °C, not the temperature asked for"
 
@@ -320,6 +308,7 @@ def _read_sweep(path: Path, mapping: Mapping, found: _Found) -> None:
 
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
 # these are read only where they have to stand for another
+# these are read only where they have to stand for another
 _THROUGH = {
     "viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
     "stress_amplitude", "temperature", "extensional_viscosity", "psi1", "psi2",
@@ -338,17 +327,14 @@ def _summary(
     where: str, readings: Readings, one: Recognised, made: Record, said: list[str] | None = None
 ) -> str:
     """Say what a block was taken for and its columns, unless the columns have been said before."""
-    understood = ", ".join(
-        f"{key} = {words}" for key, words in readings.used.items() if _is_part(key, made)
-    )
+    used = (f"{key} = {words}" for key, words in readings.used.items() if _is_part(key, made))
+    understood = ", ".join(used)
     if said is not None:
-        if understood in said:
-            understood = "columns as before"
+        understood = "columns as before" if understood in said else understood
         said.append(understood)
     rows = len(next(iter(made.table.values())))
     text = f"{where}: taken for {_WORDS[made.kind]} ({one.why}); {understood}; {rows} rows"
-    if made.dropped:
-        text += f", {made.dropped} without all these numbers left out"
+    text += f", {made.dropped} without all these numbers left out" if made.dropped else ""
     return "; ".join([text, *made.notes]) + "."
 
 

@@ -1,11 +1,13 @@
 """Readers of files that are no plain table: spreadsheets, RepTate's, a user's own."""
 
+import contextlib
 import io
 import re
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from discover.dataset.importing.text_export import Block, blocks_of_rows, require_blocks
 from discover.dataset.importing.text_rows import (
@@ -44,9 +46,8 @@ def read_spreadsheet(path: Path) -> list[Block]:
             f"{path.name} is no .xlsx workbook, or one with a password. Save it as .xlsx without a "
             "password, or each sheet as CSV."
         ) from None
-    blocks = []
-    left = MOST_CELLS
-    try:
+    blocks, left = [], MOST_CELLS
+    with contextlib.closing(book):
         for sheet in book.worksheets:
             sheet.reset_dimensions()  # a file may claim any size
             rows = []
@@ -61,8 +62,6 @@ def read_spreadsheet(path: Path) -> list[Block]:
             for block in blocks_of_rows(with_points(rows, path.name)):
                 names = filter(None, (str(sheet.title), block.name))
                 blocks.append(replace(block, name=", ".join(dict.fromkeys(names))))
-    finally:
-        book.close()
     return require_blocks(blocks, path.name)
 
 
@@ -90,17 +89,14 @@ def _rows(sheet, name: str) -> Iterator[tuple]:
     """Yield the rows of a sheet as wide as they are filled, a gap of many rows as one."""
     empty = 0
     for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
-        if number > _MOST_ROWS:
-            raise InputError(
-                f"{name}, sheet {sheet.title}, has a cell below row {_MOST_ROWS}. Delete what "
-                "stands far below the measurement."
-            )
+        far = f"a cell below row {_MOST_ROWS}. Delete what stands far below the measurement."
         if len(row) > _MOST_COLUMNS:
-            raise InputError(
-                f"{name}, sheet {sheet.title}, has a cell in column {len(row)} of row {number}; "
-                f"the limit is {_MOST_COLUMNS} columns. Delete what stands far to the right of the "
-                "measurement."
+            far = (
+                f"a cell in column {len(row)} of row {number}; the limit is {_MOST_COLUMNS} "
+                "columns. Delete what stands far to the right of the measurement."
             )
+        if number > _MOST_ROWS or len(row) > _MOST_COLUMNS:
+            raise InputError(f"{name}, sheet {sheet.title}, has {far}")
         empty = 0 if row else empty + 1
         if empty < _GAP:
             yield row
@@ -136,11 +132,11 @@ _TEMPERATURE = ("temperature", "°C")
 def read_reptate(path: Path) -> list[Block]:
     """Return the block of a file of RepTate; InputError where it lacks columns or a parameter."""
     suffix = path.suffix.lower()
+    wanted, parameters = COLUMNS[suffix], _PARAMETERS.get(suffix, {})
+    width = len(wanted)
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT)
     lines = re.split(r"\r\n|\r|\n", content.decode("cp1252", "replace"))
     table = [line.lstrip("#").replace(",", " ").split() for line in lines]
-    wanted = COLUMNS[suffix]
-    width = len(wanted)
     data = [i for i, row in enumerate(table) if len(row) >= width and all(map(is_number, row))]
     if len(data) < 2:
         raise InputError(
@@ -159,24 +155,23 @@ def read_reptate(path: Path) -> list[Block]:
     cells = tuple(tuple((table[i] + [""] * whole)[:whole]) for i in data)
     first = [] if data[0] == 0 else [[lines[0]]]
     given = {constant.name: constant.value for constant in constants_of(first)}
-    known = {**_PARAMETERS.get(suffix, {}), "T": _TEMPERATURE}
+    known = {**parameters, "T": _TEMPERATURE}
     constants = tuple(
         Constant(name, given[key], unit) for key, (name, unit) in known.items() if key in given
     )
-    needed = [key for key in _PARAMETERS.get(suffix, {}) if key != "edot"]
-    if needed and len({c.name for c in constants} - {_TEMPERATURE[0]}) == 0:
+    if parameters and not {c.name for c in constants} - {_TEMPERATURE[0]}:
+        needed = next(iter(parameters))
         raise InputError(
-            f"{path.name} does not say its {needed[0]} on the first line, as a {suffix} file of "
-            f"RepTate does. Write {needed[0]}=…; there."
+            f"{path.name} does not say its {needed} on the first line, as a {suffix} file of "
+            f"RepTate does. Write {needed}=…; there."
         )
     # of a creep file `rec` says that the strain is the recovered one
     name = "recovery" if float(given.get("rec", 0)) else suffix[1:]
     return [Block(name, (*wanted, *further), cells, data[0] + 1, constants)]
 
 
-@dataclass(frozen=True)
-class Importer:
-    """A reader of one kind of file, whose blocks are understood as those of a text export are."""
+class Importer(NamedTuple):
+    """Reader of one kind of file, whose blocks are understood as those of a text export are."""
 
     read: Callable[[Path], Sequence[Block]]
     suffixes: tuple[str, ...] = ()  # of the names of such files, which need no --format
@@ -219,8 +214,7 @@ def register_importer(
     require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
     endings = tuple(str(suffix).lower() for suffix in suffixes)
     for other, known in IMPORTERS.present.items():
-        both = set(endings) & set(known.suffixes)
-        if both:
+        if both := set(endings) & set(known.suffixes):
             raise InputError(
                 f"Files that end in {sorted(both)[0]} are read by the importer {other!r} already. "
                 "Leave that suffix out, and use --format."

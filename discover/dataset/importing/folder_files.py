@@ -64,8 +64,27 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     for kind, table in TABLES.items():
         records = [one for one in found if one.record.kind == kind and not one.record.is_run]
         records.sort(key=lambda one: not one.chosen)
-        records = _merged(records) if kind == "amplitude_sweep" else records
-        _tables(table, records, of_runs, files, by_temperature, notes)
+        groups: list[list[NamedRecord]] = []  # by temperature
+        for one in _merged(records) if kind == "amplitude_sweep" else records:
+            group = next((g for g in groups if g[0].near(one.record.temperature)), None)
+            if group is None:
+                groups.append(group := [])
+            group.append(one)
+        for group in groups:
+            at = f"{group[0].record.temperature:g}" if len(groups) > 1 else ""
+            main = not at or group[0].chosen
+            base = table if main else f"{table}_{at}C"
+            if not main:
+                by_temperature.append((f"{base}.csv", table, at))
+            files[f"{base}.csv"] = _csv(group[0].record)
+            for number, one in enumerate(group[1:], start=2):
+                files[f"{base}-{number}.csv"] = _csv(one.record)
+                notes.append(_not_used(f"{base}-{number}.csv", table, one))
+        if len(groups) > 1 and not groups[0][0].chosen:
+            at_runs = [g[0] for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
+            if len(at_runs) == 1:
+                files[f"{table}.csv"] = _csv(at_runs[0].record)
+            notes.append(_of_temperatures(table, groups, len(at_runs) == 1))
     if by_temperature:
         files[TESTS_FILE] = _text([("file", "test", "temperature_C"), *by_temperature])
     if runs:
@@ -73,51 +92,24 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
     return files, notes
 
 
-def _tables(
-    table: str,
-    records: Sequence[NamedRecord],
-    of_runs: set[float | None],
-    files: dict[str, str],
-    by_temperature: list[tuple[str, str, str]],
-    notes: list[str],
-) -> None:
-    """Add the tables of one kind: one of them, or one for each temperature."""
-    groups: list[list[NamedRecord]] = []
-    for one in records:
-        group = next((g for g in groups if g[0].near(one.record.temperature)), None)
-        if group is None:
-            groups.append(group := [])
-        group.append(one)
-    for group in groups:
-        at = f"{group[0].record.temperature:g}" if len(groups) > 1 else ""
-        main = not at or group[0].chosen
-        base = table if main else f"{table}_{at}C"
-        if not main:
-            by_temperature.append((f"{base}.csv", table, at))
-        for number, one in enumerate(group, start=1):
-            name = f"{base}.csv" if number == 1 else f"{base}-{number}.csv"
-            files[name] = _csv(one.record)
-            if number > 1:
-                known = one.record.temperature is not None
-                same = "at the same temperature, " if known else ""
-                notes.append(
-                    f"{name} is another {table.replace('_', ' ')}, {same}from "
-                    f"{f'{one.source} {one.block}'.strip()}: nothing reads it. "
-                    + ("To exchange the two, rename them." if known else _NO_TEMPERATURE)
-                )
-    if len(groups) > 1 and not groups[0][0].chosen:
-        at_runs = [g for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
-        first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))
-        text = f"{table}: {len(groups)} temperatures, {first} to {last} °C, a file each, listed in "
-        text += f"{TESTS_FILE}"
-        if len(at_runs) == 1:
-            files[f"{table}.csv"] = _csv(at_runs[0][0].record)
-            text += f"; {table}.csv is that at the temperature of the runs"
-        else:
-            text += f"; a fit takes one of them: import again with --temperature {first}"
-            if table == "lve":
-                text += ", or make one of all with discover data shift"
-        notes.append(text + ".")
+def _not_used(name: str, table: str, one: NamedRecord) -> str:
+    known = one.record.temperature is not None
+    same = "at the same temperature, " if known else ""
+    remedy = "To exchange the two, rename them." if known else _NO_TEMPERATURE
+    return (
+        f"{name} is another {table.replace('_', ' ')}, {same}from "
+        f"{f'{one.source} {one.block}'.strip()}: nothing reads it. {remedy}"
+    )
+
+
+def _of_temperatures(table: str, groups: list[list[NamedRecord]], at_runs: bool) -> str:
+    first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))
+    text = f"{table}: {len(groups)} temperatures, {first} to {last} °C, a file each, listed in "
+    text += f"{TESTS_FILE}; "
+    if at_runs:
+        return f"{text}{table}.csv is that at the temperature of the runs."
+    text += f"a fit takes one of them: import again with --temperature {first}"
+    return f"{text}, or make one of all with discover data shift." if table == "lve" else f"{text}."
 
 
 def _merged(records: Sequence[NamedRecord]) -> list[NamedRecord]:
@@ -142,6 +134,7 @@ def _merged(records: Sequence[NamedRecord]) -> list[NamedRecord]:
 
 def _index(runs: Sequence[NamedRecord]) -> str:
     used = [key for key in _CONDITIONS if any(key in one.record.conditions for one in runs)]
+    warm = any(one.record.temperature is not None for one in runs)
     warm = any(one.record.temperature is not None for one in runs)
     rows = [("file", "source_file", "source_block", *used, *(["temperature_C"] if warm else []))]
     for one in runs:

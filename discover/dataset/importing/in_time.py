@@ -366,8 +366,8 @@ def _recovers(held: Sequence[float], before: np.ndarray, after: np.ndarray) -> b
     first, second, third = held
     if not (first and second and third) or min(first / third, first / second) <= 0.0:
         return False
-    again, other = first / third, first / second
-    if max(again, 1.0 / again) > _SAME_RATE or max(other, 1.0 / other) < _ANOTHER_RATE:
+    again, other = abs(np.log(first / third)), abs(np.log(first / second))
+    if again > np.log(_SAME_RATE) or other < np.log(_ANOTHER_RATE):
         return False
     both = min(len(before), len(after))
     apart = np.median(np.abs(before[:both] - after[:both]))

@@ -1,8 +1,7 @@
 """What exports call each quantity: names in many languages, and a user's own.
 
-Names are compared word by word, without regard to capitals (``ShearRate``), accents, separators,
-forms of primes and Greek letters that are spelled or written with a look-alike. A name may be
-followed by its symbol, and words may be cut short.
+Names are compared word by word, whatever their capitals, accents, separators and Greek letters. A
+name may be followed by its symbol, and words may be cut short.
 """
 
 import re
@@ -66,9 +65,8 @@ def words_of(name: str) -> tuple[str, ...]:
 
 def _is_border(a: str, b: str) -> bool:
     """Return whether a new word begins between two letters: ShearRate, 粘度η."""
-    if a.islower() and b.isupper():
-        return True
-    return a.isalpha() and b.isalpha() and (a > "\u2e80") != (b > "\u2e80")
+    of_scripts = a.isalpha() and b.isalpha() and (a > "\u2e80") != (b > "\u2e80")
+    return (a.islower() and b.isupper()) or of_scripts
 
 
 def plain(name: str) -> str:
@@ -94,8 +92,7 @@ class NameTable:
 
     def rank(self, key: str, name: str) -> int | None:
         """Return how good a name of a quantity this is, 0 the best; None if it is none."""
-        ranks = self.find(name)
-        before = 0
+        ranks, before = self.find(name), 0
         for section in _PARTS.get(key, (key,)):
             if section in ranks:
                 return before + ranks[section]
@@ -110,27 +107,26 @@ class NameTable:
 
     def _find(self, words: tuple[str, ...]) -> dict[str, int]:
         bare = [word.rstrip(".") for word in words]
-        found = self._exact("".join(bare))
-        if found:
-            return found
+
+        def exact(parts: list[str]) -> dict[str, int]:
+            name = "".join(parts)
+            return {key: ranks[name] for key, ranks in self._rank.items() if name in ranks}
+
+        if known := exact(bare):
+            return known
         for i in range(1, len(bare)):  # a name and its symbol
-            first, second = self._exact("".join(bare[:i])), self._exact("".join(bare[i:]))
-            both = {key: min(rank, second[key]) for key, rank in first.items() if key in second}
-            if both:
+            first, second = exact(bare[:i]), exact(bare[i:])
+            if both := {key: min(first[key], second[key]) for key in first if key in second}:
                 return both
         cut: dict[str, str] = {}
-        alike = self._words.get((len(words), words[0][0]), ()) if words else ()
         # a word alone is no shorter form of a compound: Interval is not Intervallzeit
-        alone = len(words) == 1 and not words[0].endswith(".")
-        for section, whole in () if alone else alike:
+        alone = not words or (len(words) == 1 and not words[0].endswith("."))
+        for section, whole in () if alone else self._words.get((len(words), words[0][0]), ()):
             if all(map(_stands_for, words, whole)):
                 cut[section] = min("".join(whole), cut.get(section, _LONG), key=len)
         least = min(map(len, cut.values()), default=0)
         best = {key: self._rank[key][name] for key, name in cut.items() if len(name) == least}
         return best if len(best) == 1 else {}  # Shear str. may be either
-
-    def _exact(self, joined: str) -> dict[str, int]:
-        return {key: ranks[joined] for key, ranks in self._rank.items() if joined in ranks}
 
 
 def _stands_for(word: str, whole: str) -> bool:
@@ -150,6 +146,13 @@ def shipped_names() -> dict[str, tuple[str, ...]]:
     }
 
 
+@cache
+def alternatives(table: str) -> dict[str, str]:
+    """Return the regular expressions of a table of ``words.toml``, one for each key."""
+    content = tomllib.loads((files("discover.dataset.importing") / "words.toml").read_text("utf-8"))
+    return {key: "|".join(words) for key, words in content[table].items()}
+
+
 _table = cache(lambda own: NameTable(dict(own)))
 
 
@@ -163,11 +166,9 @@ def read_names(path: Path) -> dict[str, tuple[str, ...]]:
     example = 'Write lines such as stress = ["Sigma corr."].'
     content, _ = read_toml(path, "file of names", example)
     parts = {k: [*v.values()] if isinstance(v, dict) else [v] for k, v in content.items()}
-    wrong = next((k for k, lists in parts.items() for p in lists if not isinstance(p, list)), "")
-    if wrong:
-        raise InputError(
-            f'{path.name}: {wrong[:40]} must be a list of names, as in {wrong[:40]} = ["its name"].'
-        )
+    if wrong := [k for k, lists in parts.items() for p in lists if not isinstance(p, list)]:
+        key = wrong[0][:40]
+        raise InputError(f'{path.name}: {key} must be a list of names, as in {key} = ["its name"].')
     names = {key: tuple(name for part in lists for name in part) for key, lists in parts.items()}
     check_names(names, path.name)
     return names

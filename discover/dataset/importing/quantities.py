@@ -37,14 +37,14 @@ _QUANTITIES: dict[str, Quantity | str] = {
 }  # fmt: skip
 
 
-def _quantity(key: str, unit: str) -> Quantity:
-    suffix = re.sub(r"[*/]", "_", unit).replace("^", "")
-    return Quantity(key, "_".join(filter(None, (key, suffix))), unit)
+def _quantity(key: str, given: Quantity | str) -> Quantity:
+    if isinstance(given, Quantity):
+        return given
+    suffix = re.sub(r"[*/]", "_", given).replace("^", "")
+    return Quantity(key, "_".join(filter(None, (key, suffix))), given)
 
 
-QUANTITIES: dict[str, Quantity] = {
-    key: _quantity(key, one) if isinstance(one, str) else one for key, one in _QUANTITIES.items()
-}
+QUANTITIES = {key: _quantity(key, one) for key, one in _QUANTITIES.items()}
 """What a column may hold: quantities of data folders, and in SI units those of exports alone."""
 
 SAME_TEMPERATURE = 1.5  # °C up to which two temperatures are one
@@ -58,10 +58,6 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
     Raises InputError if one stands above two columns.
     """
     names = [name for name, _ in block.columns]
-    clocks = [
-        i for i in range(len(names))
-        if i not in block.filled and any(is_clock(row[i]) for row in block.cells)
-    ]  # fmt: skip
     found: dict[str, int] = {}
     for key in QUANTITIES:
         if key in given:
@@ -76,9 +72,11 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
             ranks = {i: name_rank(key, *column, table) for i, column in enumerate(block.columns)}
             places = {i: rank for i, rank in ranks.items() if rank is not None}
             at = sorted(places, key=places.__getitem__)
-        at = [i for i in at if i in block.filled] + [i for i in at if i in clocks and key == "time"]
-        if at:
-            found[key] = at[0]
+        numbers = [i for i in at if i in block.filled]
+        if key == "time" and not numbers:
+            numbers = [i for i in at if any(is_clock(row[i]) for row in block.cells)]
+        if numbers:
+            found[key] = numbers[0]
     return found
 
 
@@ -124,9 +122,8 @@ def fits(key: str, name: str, unit: str) -> bool:
         return True
     if key != "temperature" and (not unit or read_unit(unit) is None):
         # without a unit G' is a modulus, and t is a time; D and n may be anything
-        return name in ("t", "w", "f", "j") or not (
-            (name == "gp" and key == "shear_rate") or (len(name) == 1 and name.isascii())
-        )
+        unsure = (name == "gp" and key == "shear_rate") or (len(name) == 1 and name.isascii())
+        return name in ("t", "w", "f", "j") or not unsure
     return _is_unit_of(key, unit)
 
 
@@ -261,18 +258,17 @@ def _unsaid(found: UnsaidUnits, how: str) -> tuple[list[tuple[str, UnsaidUnit]],
 def require_units(found: UnsaidUnits) -> None:
     """Raise InputError if there are units that only the user knows; asks for all of them."""
     pairs, files = _unsaid(found, "asked")
-    if not (asked := dict(pairs)):
-        return
-    options = "; ".join(
-        f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
-        for key, one in asked.items()
-    )
-    what = "a unit" if len(asked) == 1 else "the units"
-    names = listed([shown(one.column) for one in asked.values()])
-    raise InputError(
-        f"{files} does not give {what} of {names}, and the numbers do not tell. "
-        f"Say which: {options}."
-    )
+    if asked := dict(pairs):
+        options = "; ".join(
+            f"{shown(one.column)}: " + " or ".join(f"--unit {key}={u}" for u in _CHOICES[key])
+            for key, one in asked.items()
+        )
+        what = "a unit" if len(asked) == 1 else "the units"
+        names = listed([shown(one.column) for one in asked.values()])
+        raise InputError(
+            f"{files} does not give {what} of {names}, and the numbers do not tell. "
+            f"Say which: {options}."
+        )
 
 
 def units_taken_as_si(found: UnsaidUnits) -> list[str]:

@@ -8,18 +8,10 @@ from pathlib import PurePath
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Geometry, Mapping, key_of
 from discover.dataset.importing.names import NameTable, name_table
-from discover.dataset.importing.quantities import (
-    QUANTITIES,
-    UnsaidUnit,
-    factor_to_si,
-    guess_columns,
-    name_rank,
-    split_name,
-    to_celsius,
-    unsaid_unit,
-)
+from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_rank, to_celsius
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
 from discover.dataset.tables.table import shown
@@ -55,7 +47,7 @@ class Readings:
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return readings of a block; InputError if a given name stands above two columns."""
         given = {str(key): column for key, column in mapping.columns.items()}
-        columns = guess_columns(block, given, name_table(mapping.names))
+        columns = quantities.guess_columns(block, given, name_table(mapping.names))
         found = cls(block, columns, mapping, name, mapping.geometry)
         if found.geometry is None:
             found.geometry = found._geometry()
@@ -70,8 +62,7 @@ class Readings:
             return self._temperature()
         if key in self.columns:
             return self._column(key)
-        made = self._made(key)
-        if made is not None:
+        if (made := self._made(key)) is not None:
             return made
         constant = self._constant(key)
         return None if constant is None else np.full(len(self), constant)
@@ -88,7 +79,7 @@ class Readings:
         """Return the rows that have a number in each of these quantities."""
         values = (self.get(key) for key in keys)
         kept = [np.zeros(len(self), bool) if v is None else np.isfinite(v) for v in values]
-        return np.logical_and.reduce([np.ones(len(self), bool), *kept])
+        return np.all([np.ones(len(self), bool), *kept], axis=0)
 
     @property
     def names(self) -> NameTable:
@@ -161,7 +152,7 @@ class Readings:
             return seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
         raw = self.block.numbers[at]
         if not (unit := self._unit_given(key) or unit):
-            split = split_name(key, column, self.names)
+            split = quantities.split_name(key, column, self.names)
             unit = "" if split is None else split[1]
         if key == "temperature":
             kelvin = to_celsius(0.0, unit or "°C")
@@ -177,7 +168,7 @@ class Readings:
             lines = (c for c in self.block.constants if not c.value)
             said = (c.unit for c in lines if self.names.rank(key, c.name) is not None)
             unit = next(said, "") or self._unsaid(key, column, raw)
-        factor = factor_to_si(key, unit, column, self.name)
+        factor = quantities.factor_to_si(key, unit, column, self.name)
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
         if key in self.unsaid and self.unsaid[key].how == "told":
             self.used[key] += f", since {self.unsaid[key].why},"
@@ -193,7 +184,7 @@ class Readings:
         if key not in self.unsaid:
             used, unsaid = dict(self.used), dict(self.unsaid)
             others = self.columns.keys() - {key}
-            found = unsaid_unit(
+            found = quantities.unsaid_unit(
                 key, column, raw, lambda k: self._column(k) if k in others else None, self.names
             )
             # what tells a unit is not thereby part of the test
@@ -232,28 +223,28 @@ class Readings:
         angle = self.alone("phase_angle")
         if angle is None and (factor := self.alone("loss_factor")) is not None:
             angle = np.arctan(factor)
-        if angle is None:
-            return None, None
-        size = self.alone("complex_modulus")
-        if size is None and "complex_viscosity" in self.columns:
+        size = None if angle is None else self.alone("complex_modulus")
+        if angle is not None and size is None and "complex_viscosity" in self.columns:
             omega = self.get("omega")
             size = None if omega is None else self._column("complex_viscosity") * omega
-        return (None, None) if size is None else (size * np.cos(angle), size * np.sin(angle))
+        if angle is None or size is None:
+            return None, None
+        return size * np.cos(angle), size * np.sin(angle)
 
     def _constant(self, key: str) -> float | None:
         """Return what the header says of the whole block, in SI units; None if nothing."""
-        found = self._find_constant(key)
-        if found is None:
+        if (found := self._find_constant(key)) is None:
             return None
-        if not math.isfinite(float(found.value)):
+        value, name = float(found.value), shown(found.name)
+        if not math.isfinite(value):
             raise InputError(
-                f"{self.name}: the header says {shown(found.name)} {shown(found.value)}, more than "
-                "a number can be. Correct that line."
+                f"{self.name}: the header says {name} {shown(found.value)}, more than a number can "
+                "be. Correct that line."
             )
         unit = self._unit_given(key) or found.unit
-        unit = unit or self._unsaid(key, found.name, np.array([float(found.value)]))
-        self.used[key] = f"{shown(found.name)} {found.value} {shown(unit)} of the header"
-        return float(found.value) * factor_to_si(key, unit, found.name, self.name)
+        unit = unit or self._unsaid(key, found.name, np.array([value]))
+        self.used[key] = f"{name} {found.value} {shown(unit)} of the header"
+        return value * quantities.factor_to_si(key, unit, found.name, self.name)
 
     def _find_constant(self, key: str) -> Constant | None:
         if key in ("time", "wave_time", "point"):  # the time of the day, the number of points
@@ -268,21 +259,17 @@ class Readings:
 
     def _geometry(self) -> Geometry | None:
         """Return the tool that the header describes; None if it does not, wholly."""
+        keys = ("radius", "diameter", "gap", "cone_angle")
         try:
-            keys = ("radius", "diameter", "gap", "cone_angle")
             radius, diameter, gap, angle = ((self._constant(key) or 0.0) for key in keys)
-            if any(key in self.unsaid for key in keys):
+            size = {"radius_mm": 1e3 * (radius or 0.5 * diameter)}
+            if any(key in self.unsaid for key in keys) or not size["radius_mm"] > 0.0:
                 return None
-            radius = radius or 0.5 * diameter
-            if radius > 0.0 and angle > 0.0:
-                return Geometry(
-                    type="cone_plate", radius_mm=1e3 * radius, angle_deg=math.degrees(angle)
-                )
-            if radius > 0.0 and gap > 0.0:
-                return Geometry(type="plate_plate", radius_mm=1e3 * radius, gap_mm=1e3 * gap)
+            if angle > 0.0:
+                return Geometry(type="cone_plate", **size, angle_deg=math.degrees(angle))
+            return Geometry(type="plate_plate", **size, gap_mm=1e3 * gap) if gap > 0.0 else None
         except (InputError, ValueError):
-            pass  # not a number of a tool; torque then needs --geometry
-        return None
+            return None  # not a number of a tool; torque then needs --geometry
 
 
 def _is_temperature(degrees):

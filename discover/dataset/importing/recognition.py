@@ -42,30 +42,27 @@ def recognise(readings: Readings) -> Recognised:
     _find_time(readings)
     _as_extension(readings, said)
     rows = np.ones(len(readings), bool)
-    in_time = "time" in readings.columns
-    if readings.has("omega", "Gp", "Gpp"):
+    in_time, has = "time" in readings.columns, readings.has
+    kind, why = "none", ""
+    if has("omega", "Gp", "Gpp"):
         # samples of a waveform have no frequency, and are no points that lack something; before
         # the tool moves instruments write zeros
         rows = _of(readings, "omega", rows) > 0.0
         kind, why = _oscillatory(readings, rows & readings.whole("omega", "Gp", "Gpp"))
-    elif in_time and readings.has("tensile_stress"):
+    elif in_time and has("tensile_stress"):
         flow = said.test if said is not None and said.test in ("planar", "biaxial") else "uniaxial"
         kind, why = "run", f"an extension, {flow}: a tensile stress over time"
-    elif readings.has("Gp", "Gpp") and not readings.has("omega") and "strain" in readings.columns:
+    elif has("Gp", "Gpp") and not has("omega") and "strain" in readings.columns:
         kind, why = "amplitude_sweep", "moduli against strain, without a frequency"
-    elif in_time and readings.has("stress") and (
-        readings.has("shear_rate") or readings.has("strain")
-    ):  # fmt: skip
+    elif in_time and has("stress") and (has("shear_rate") or has("strain")):
         # rows that lack a number are counted when the rest is taken
         kind, why = _in_time(readings, said)
-    elif in_time and readings.has("relaxation_modulus"):
+    elif in_time and has("relaxation_modulus"):
         kind, why = "relaxation", "it has a relaxation modulus over time"
-    elif in_time and readings.has("compliance"):
+    elif in_time and has("compliance"):
         kind, why = "creep", "it has a compliance over time"
-    elif readings.has("stress", "shear_rate"):
+    elif has("stress", "shear_rate"):
         kind, why = _without_time(readings)
-    else:
-        kind, why = "none", ""
     return Recognised(kind, rows, why)
 
 
@@ -80,8 +77,7 @@ def _oscillatory(readings: Readings, rows: Rows) -> tuple[TestName, str]:
     if _ratio(omega) > _SAME_FREQUENCY:
         different = len(np.unique(np.round(np.log(omega) / np.log(_SAME_FREQUENCY))))
         if several and 2 * different <= len(omega):
-            why = f"the strain goes from row to row, at {different} frequencies"
-            return "amplitude_sweep", why
+            return "amplitude_sweep", f"the strain goes from row to row, at {different} frequencies"
         why = f"{different} frequencies, {omega.min():.3g} to {omega.max():.3g} rad/s"
         if several:
             why += f"; the strain is not one but {low} to {high}, taken as small"
@@ -142,12 +138,10 @@ def _without_time(readings: Readings) -> tuple[TestName, str]:
         return found
     known, columns = readings.columns.values(), readings.block.columns
     unread = [shown(name) for i, (name, _) in enumerate(columns) if name and i not in known]
-    why += ", and no column is known as its time. "
+    remedy = "Export it with its time, or add a column of it"
     if unread:
-        why += f'Name it, as in --column time="{unread[0]}"; not read: {", ".join(unread[:8])}'
-    else:
-        why += "Export it with its time, or add a column of it"
-    return "none", why
+        remedy = f'Name it, as in --column time="{unread[0]}"; not read: {", ".join(unread[:8])}'
+    return "none", f"{why}, and no column is known as its time. {remedy}"
 
 
 def _waits(rate: Float[np.ndarray, " n"], stress: Float[np.ndarray, " n"]) -> bool:

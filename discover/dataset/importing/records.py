@@ -63,6 +63,8 @@ class _Needed(NamedTuple):
 
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
     """Return the test that rows hold, after the one before; InputError names what it lacks."""
+    if found.kind == "none":
+        return Record("none", {}, notes=[found.why])
     needed = _needed(readings, found.kind)
     made = _table(readings, found, needed)
     if "time" in made.table:
@@ -97,31 +99,27 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
 
 
 def _needed(readings: Readings, kind: TestName) -> _Needed:
-    normal = ("N1", "N2")
+    normal, has = ("N1", "N2"), readings.has
+    sweep = ("omega", "Gp", "Gpp") if has("omega") else ("Gp", "Gpp")
+    moved = "strain" if has("strain") else "shear_rate"
     if kind == "frequency_sweep":
         keys = ("omega", "Gp", "Gpp")
         why = "a modulus that is not positive, beyond the reach of the instrument"
         return _Needed(keys, (), keys, why)
     if kind == "amplitude_sweep":
-        omega = ("omega",) if readings.has("omega") else ()
-        keys = ("strain_amplitude", *omega, "Gp", "Gpp")
-        return _Needed(keys, (), ("strain_amplitude",), "no strain")
+        return _Needed(("strain_amplitude", *sweep), (), ("strain_amplitude",), "no strain")
     if kind == "flow_curve":
         both = ("shear_rate", "stress")
         return _Needed(both, normal, both, "no steady flow")
-    if kind == "run" and readings.has("tensile_stress"):
-        how = "hencky_rate" if readings.has("hencky_rate") else "hencky_strain"
+    if kind == "run" and has("tensile_stress"):
+        how = "hencky_rate" if has("hencky_rate") else "hencky_strain"
         return _Needed(("time", "tensile_stress", how))
-    if kind == "run" and readings.has("shear_rate"):
+    if kind == "run" and has("shear_rate"):
         return _Needed(("time", "shear_rate", "stress"), (*normal, "strain"))
-    if kind == "run":
+    if kind == "run" or (kind == "relaxation" and has("stress", "strain")):
         return _Needed(("time", "strain", "stress"), normal)
-    if kind == "relaxation" and readings.has("stress", "strain"):
-        return _Needed(("time", "stress", "strain"), normal)
-    if kind == "creep":
-        moved = "strain" if readings.has("strain") else "shear_rate"
-        if readings.has("stress", moved):
-            return _Needed(("time", "stress", moved))
+    if kind == "creep" and has("stress", moved):
+        return _Needed(("time", "stress", moved))
     # as the instrument's software computed it
     what = "compliance" if kind == "creep" else "relaxation_modulus"
     return _Needed(("time", what), (), ("time", what), f"no {what.rpartition('_')[2]}")
@@ -170,17 +168,12 @@ def _as_forward(made: Record) -> None:
 def _note_steadiness(made: Record, time: Values | None) -> None:
     """Note how far the ways up and down are apart, and points held for a small strain."""
     rate = made.table["shear_rate"]
-    ways = up_and_down(rate, made.table["stress"])
-    if ways is not None:
+    if (ways := up_and_down(rate, made.table["stress"])) is not None:
         made.notes.append(f"the ways up and down in rate are {ways.described}")
-    if time is None or len(time) < 2:
-        return
-    few = int(np.sum(np.abs(rate) * np.median(np.abs(np.diff(time))) < 2.0))
-    if few:
-        made.notes.append(
-            f"{few} of {len(rate)} points were held for a strain below 2, where flow may "
-            "not be steady"
-        )
+    held = 0.0 if time is None or len(time) < 2 else np.median(np.abs(np.diff(time)))
+    if held and (few := int(np.sum(np.abs(rate) * held < 2.0))):
+        words = f"{few} of {len(rate)} points were held for a strain below 2"
+        made.notes.append(f"{words}, where flow may not be steady")
 
 
 def _note_alternation(made: Record) -> None:
@@ -241,17 +234,14 @@ def _after(made: Record, before: Record) -> Record:
         if made.kind == "run" and fastest < AT_REST * abs(float(declared)):
             made.kind, made.notes = "none", ["a rest, which continues the relaxation before it"]
         return made
-    if before.conditions or rate_before is None or not np.median(rate_before):
-        return made
-    if spread(rate_before) >= CONSTANT:
+    if before.conditions or rate_before is None or spread(rate_before) >= CONSTANT:
         return made
     level = float(np.median(rate_before))
+    time, stress = made.table["time"], made.table["stress"]
     if fastest >= AT_REST * abs(level):
-        made.notes.append(
-            f"taken as starting from rest, though a flow at {level:.3g} 1/s stands before it"
-        )
-    elif 0.3 < made.table["stress"][0] / before.table["stress"][-1] < 1.2:
-        time, stress = made.table["time"], made.table["stress"]
+        words = f"taken as starting from rest, though a flow at {level:.3g} 1/s stands before it"
+        made.notes.append(words)
+    elif 0.3 < stress[0] / before.table["stress"][-1] < 1.2:
         made.kind = "run"
         made.table = {"time": time, "shear_rate": np.zeros(len(time)), "stress": stress}
         made.conditions = {"start": "steady", "rate_before_1_s": repr(level)}

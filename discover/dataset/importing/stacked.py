@@ -13,15 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Int
 
+from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Mapping
 from discover.dataset.importing.names import name_table, plain
-from discover.dataset.importing.quantities import (
-    QUANTITIES,
-    SAME_TEMPERATURE,
-    guess_columns,
-    name_rank,
-    to_celsius,
-)
+from discover.dataset.importing.quantities import QUANTITIES, guess_columns, name_rank
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
 from discover.dataset.importing.text_rows import Constant, is_number
@@ -167,7 +162,7 @@ def _constant(label: str, known: set[str]) -> Constant | None:
 
 
 def _name_of(unit: str) -> str | None:
-    if to_celsius(0.0, unit) is not None:
+    if quantities.to_celsius(0.0, unit) is not None:
         return "temperature"
     read = read_unit(unit)
     if read is None or unit.strip() in ("", "-", "1"):
@@ -218,20 +213,16 @@ def tests_in_rows(block: Block, mapping: Mapping, name: str) -> list[Block]:
     parts = []
     for piece in pieces:
         told = tuple(dict.fromkeys((*piece.told_by, *told_by)))
-        first = block.cells[int(piece.rows[0])]
-        line = block.line + int(piece.rows[0])
+        start = int(piece.rows[0])
+        first, line = block.cells[start], block.line + start
         named = ((first[i], *block.columns[i]) for i in told[:2])
         said = (f"{name} {cell} {unit}".strip() if is_number(cell) else cell
                 for cell, name, unit in named)  # fmt: skip
         label = ", ".join(said) or f"from line {line} on"
-        part = replace(
-            block.rows(piece.rows),
-            name=", ".join(filter(None, (block.name, label))),
-            line=line,
-            apart=piece.apart,
-            told_by=tuple(block.columns[i][0] for i in told),
-        )
-        parts.append(part)
+        own = ", ".join(filter(None, (block.name, label)))
+        names = tuple(block.columns[i][0] for i in told)
+        part = block.rows(piece.rows)
+        parts.append(replace(part, name=own, line=line, apart=piece.apart, told_by=names))
     return parts
 
 
@@ -257,7 +248,8 @@ def _by_temperature(readings: Readings, piece: _Piece) -> list[_Piece]:
     if time is not None and np.all(np.diff(time) > 0.0) and not _sweeps(readings, piece):
         return [piece]
     order = np.sort(degrees[known])
-    cuts = order[1:][np.diff(order) > SAME_TEMPERATURE] - 0.5 * SAME_TEMPERATURE
+    cuts = order[1:][np.diff(order) > quantities.SAME_TEMPERATURE]
+    cuts = cuts - 0.5 * quantities.SAME_TEMPERATURE
     group = np.searchsorted(cuts, degrees)
     # a row without a reading is at the temperature of that before it
     group = group[np.maximum.accumulate(np.where(known, np.arange(len(known)), 0))]

@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
+from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.text_rows import (
     MOST_CELLS,
     Constant,
@@ -33,24 +34,16 @@ _Columns = tuple[tuple[str, str], ...]
 
 _BRACKETED = re.compile(r"[\[(](.*)[\])]")
 _STEP_LINE = re.compile(r"\[step\]", re.IGNORECASE)
-_WORDS_FOR_NAME = (
-    "result:", "ergebnis:", "résultat:", "interval and data points:", "intervall und messpunkte:",
-    "intervalle et points de données:", "step name", "test:",
-)  # fmt: skip
 _POINT_OF_SEGMENT = re.compile(r"([0-9]+)\|[0-9]+")
 # a line of one cell that is neither a name with its value nor a number
 _TITLE = re.compile(r"[^:=;]*[^\W\d_]{3}[^:=;]*")
 _DATA_POINT = "data point"
 _FEWEST = 3
 
-_OF_SAMPLES = (
-    "sample|specimen|material|batch|fluid|run|test|experiment|series|replicate|repeat|curve|"
-    "data ?set|probe|charge|messung|versuch|messreihe|échantillon|essai|mesure|muestra|ensayo|"
-    "campione|prova|amostra|样品|试样|批次|試料|サンプル|시료|샘플"
-)
-_OF_STEPS = "step|segment|seg ?index|interval|abschnitt|intervall|intervalle"
+_LINES = alternatives("lines")
 OF_TESTS = re.compile(
-    rf"((?P<sample>{_OF_SAMPLES})|{_OF_STEPS})s?( (name|id|no|nr|number|index|label))?#?"
+    rf"((?P<sample>{_LINES['samples']})|{_LINES['steps']})s?"
+    r"( (name|id|no|nr|number|index|label))?#?"
 )
 """Names of columns that say which sample or step a row is of, as `plain_words` gives them."""
 _INVALID = re.compile(r"\((invalid|invalide|ungültig)\)", re.IGNORECASE)
@@ -99,7 +92,7 @@ class Block:
         Parameters
         ----------
         columns
-            Unit, empty for a pure number, and values of each column, by its name. All have the same
+            Unit, empty for a pure number, and values of each column, by its name. All have one
             shape (n,); a value that is nan is an empty cell.
         name
             What the file calls the block.
@@ -156,13 +149,10 @@ def require_blocks(blocks: list[Block], name: str) -> list[Block]:
 
 
 def blocks_of_rows(rows: Rows, header_row: int | None = None) -> list[Block]:
-    """Return the blocks of numbers among the lines of a table.
+    """Return the blocks of numbers among the cells of each line, with decimal points.
 
-    Lines that begin with a word are a block of their own for each word, such as the name of an
-    action or the number of a segment.
-
-    `rows`: the cells of each line, numbers with decimal points. `header_row`: line of the names, if
-    the line above the numbers is not it; then only the block below.
+    Lines that begin with a word, such as the number of a segment, are a block for each word.
+    `header_row`: line of the names, where it is not that above the numbers; then one block.
     """
     blocks: list[Block] = []
     header: _Columns | None = None
@@ -213,12 +203,12 @@ def _by_label(
         groups = [("", numbered)]
     name = _name(rows, data)
     for label, lines in groups:
-        if label and label != _DATA_POINT and len(lines) < 2:
+        own = "" if label == _DATA_POINT else label
+        if own and len(lines) < 2:
             continue  # a line about the measurement, such as the number of its points
         # what the instrument itself calls invalid is no number
         valid = [[] if any(map(_INVALID.search, row)) else row for _, row in lines]
-        whole = label if label and label != _DATA_POINT else name
-        yield Block(whole, header, _padded(valid, width), lines[0][0], constants)
+        yield Block(own or name, header, _padded(valid, width), lines[0][0], constants)
 
 
 def _padded(rows: Rows, width: int) -> tuple[tuple[str, ...], ...]:
@@ -299,7 +289,7 @@ def _name(rows: Rows, data: int) -> str:
     for i in range(data - 1, max(-1, data - 12), -1):
         row = rows[i]
         first = row[0] if row else ""
-        words = first.lower().startswith(_WORDS_FOR_NAME) and len(row) > 1
+        words = _BEFORE_NAME.match(first) is not None and len(row) > 1
         if _is_numbers(row) and not words:
             break
         if _STEP_LINE.fullmatch(first):
@@ -312,47 +302,20 @@ def _name(rows: Rows, data: int) -> str:
     return ", ".join(dict.fromkeys(word for word in reversed(found) if word)) or title
 
 
-# which test words say that it is
-_WORDS = {
-    "creep": r"creep|kriech|fluage|retardation|retardaci|fluencia|scorrimento viscoso|クリープ|蠕变"
-    r"|蠕變|크리프",
-    "recovery": r"recover[ey]|recoil|rückstell|kriecherholung|rückkriech|recouvrance|recuperaci"
-    r"|recupero|回復|回复|恢复|회복",
-    # a relaxation time, modulus or spectrum is a quantity, not a test
-    "relaxation": r"relaxation(?!s?[ _-]?(time|zeit|modul|spe[ck]tr))|relajaci|rilassamento"
-    r"|step[ _-]strain|dehnsprung|緩和|松弛|鬆弛|완화",
-    "start_up": r"start[ _-]?up|stress growth|peak hold|step[ _-](shear[ _-])?rate|anlaufversuch"
-    r"|spannversuch|démarrage|arranque|avviamento|スタートアップ",
-    "ramp": r"ramp",  # rampe in German and French, rampa in Spanish and Italian
-    "loop": r"hysteresis|hystérésis|histéresis|isteresi|thixotrop\w* loop|flow loop"
-    r"|up[ _-]?(and|&)?[ _-]?down|ヒステリシス|滞回|滯回",
-    "intervals": r"3[ _-]?itt|three[ _-]interval|drei[ _-]?intervall|trois intervalles"
-    r"|tres intervalos|tre intervalli|step[ _-]thixotrop",
-    "flow_curve": r"flow[ _-](sweep|curve)|viscosity curve|fließkurve|viskositätskurve|courbe"
-    r"|curva (de|di) (flu|visc)|steady[ _-](state[ _-])?(shear|flow|sweep)|流動曲線|流动曲线"
-    r"|유동 곡선",
-    "oscillation": r"laos|oscillat|oszill|oscilac|oscillaz|amplitude sweep|frequency sweep|waveform"
-    r"|振動|振荡|진동",
-    "uniaxial": r"uniax\w*|(?<!file )\bextensi(on|onal|ometr\w*)\b|tensile|elongation\w*|hencky"
-    r"|dehnrheo\w*|dehnström\w*|zugversuch|(?<!surface )\btension\b|\bfser\b|sentmanat"
-    r"|élongation\w*|elongaci|allungament|伸長|拉伸|인장",
-    "planar": r"planar (ext|elong)\w*",
-    "biaxial": r"(equi)?biax\w*",
-}  # fmt: skip
-_PATTERNS = {test: re.compile(words, re.IGNORECASE) for test, words in _WORDS.items()}
-_SAY_THE_TEST = re.compile(
-    r"test|type|mode|experiment|method|procedure|measurement|title|name|step|segment|action"
-    r"|result|versuch|messung|art|essai|ensayo|prova|interval+e?|task|試験|测试|測定",
-    re.IGNORECASE,
+_PATTERNS = {
+    test: re.compile(words, re.IGNORECASE) for test, words in alternatives("tests").items()
+}
+_BEFORE_NAME, _SAY_THE_TEST, _OTHERS_NAME = (
+    re.compile(_LINES[key], re.IGNORECASE)
+    for key in ("lines_of_a_name", "lines_of_a_test", "no_lines_of_a_test")
 )
-_OTHERS_NAME = re.compile(r"(file|sample|user|company|geometry|instrument|operator)", re.IGNORECASE)
 _LONGEST = 8  # words of a line beyond which it is prose, of which nothing is taken
 
 
 class Said(NamedTuple):
     """What words say of a test."""
 
-    test: str  # of `_WORDS`
+    test: str  # of ``words.toml``
     words: str  # as the file has them
     by_file_name: bool = False  # nothing else says so, and the numbers overrule it
 

@@ -40,10 +40,8 @@ def is_clock(cell: str) -> bool:
 def seconds(cells: Sequence[str], unit: str = "") -> Float[np.ndarray, " n"]:
     """Return readings of a clock in s, nan where a cell is none.
 
-    Durations are as they stand. Clocks of the day and time stamps count from the first, since they
-    are later than the whole record is long; past midnight they go on.
-
-    `unit`: as the export writes it; ``hh:mm`` says that the first of two numbers is hours.
+    Clocks of the day and time stamps count from the first, since they are later than the whole
+    record is long; past midnight they go on. `unit`: as the export writes it, such as ``hh:mm``.
     """
     matches = [_CLOCK.fullmatch(cell) if ":" in cell else None for cell in cells]
     # 5/1 is the fifth of January unless some second number is no month; with slashes, AM and PM it
@@ -79,11 +77,12 @@ def _reading(match: re.Match | None, american: bool, in_hours: bool) -> float:
     time = 3600.0 * hours + 60.0 * minutes + rest + _DAY * int(match["days"] or 0)
     if not (match["year"] or match["last"]):
         return time
-    date = [match[key] for key in ("year", "month", "day")]
-    if not match["year"]:
+    if match["year"]:
+        date = [match[key] for key in ("year", "month", "day")]
+    else:
+        year = match["last"] if len(match["last"]) > 2 else f"20{match['last']}"
         month, day = ("first", "second") if american else ("second", "first")
-        date = [match["last"] if len(match["last"]) > 2 else f"20{match['last']}"]
-        date += [match[month], match[day]]
+        date = [year, match[month], match[day]]
     try:
         return datetime(*map(int, date), tzinfo=UTC).timestamp() + time
     except ValueError:  # no such day
@@ -107,8 +106,8 @@ def read_rows(
 ) -> list[list[str]]:
     """Return the cells of every line of a text file, numbers with decimal points.
 
-    `delimiter` (a name of `DELIMITERS`), `decimal`, `encoding`: found from the file if None. Raises
-    InputError if the file cannot be read, or a decimal comma may be of thousands.
+    What is None is found from the file. Raises InputError if it cannot be read, or a decimal comma
+    may be of thousands.
     """
     content = read_bytes(path, path.name, largest=LARGEST_EXPORT, too_large=_FEWER)
     lines = _decode(content, path.name, encoding).splitlines()
@@ -135,11 +134,7 @@ def read_rows(
 def with_points(
     rows: list[list[str]], name: str, decimal: Decimal | None = None
 ) -> list[list[str]]:
-    """Return rows of cells without spaces around them, numbers with decimal points.
-
-    `decimal`: decimal sign; found from the cells if None. Raises InputError if it may be the
-    separator of thousands.
-    """
+    """Return rows of stripped cells, numbers with decimal points; InputError on 1,234 alone."""
     rows = [[_tidy(cell.strip()) for cell in row] for row in rows]
     sign = decimal or _decimal(rows, name)
     thousands = "," if sign == "." else "."
@@ -281,18 +276,17 @@ _KELVIN_FROM = 200.0  # K; below it a melt or a solution is frozen
 
 def temperature_in(text: str) -> Constant | None:
     """Temperature that a title or file name says, in K only near a melt's; None if several."""
-    found = {}
+    found = set()
     text = text.replace("_", " ")
     for match in _DEGREES.finditer(text):
-        value = match[1].replace(",", ".")
-        unit = "°C" if match[2][0].upper() == "C" else "K"
+        value, unit = match[1].replace(",", "."), "°C" if match[2][0].upper() == "C" else "K"
         if _TO.search(text[: match.start()]):
             return None  # a ramp
         if unit == "°C" or _KELVIN_FROM <= float(value) <= 700.0:
-            signed = f"-{value}" if match[0].startswith("-") else value
-            found[signed, unit] = Constant("temperature", signed, unit)
+            sign = "-" if match[0].startswith("-") else ""
+            found.add(Constant("temperature", sign + value, unit))
     if not found and (match := _AS_SYMBOL.search(text)):
         value = match[1].replace(",", ".")
         if abs(float(value)) < _KELVIN_FROM:  # from there on it may be in kelvin
             return Constant("temperature", value, "°C")
-    return next(iter(found.values())) if len(found) == 1 else None
+    return found.pop() if len(found) == 1 else None

@@ -1,6 +1,7 @@
 """Linear tests at several temperatures, the spectrum of one, and whether it predicts the others."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -115,10 +116,9 @@ def of_sweep(sweep: LinearSweep) -> LinearTest:
 
 
 def over_time(kind: str, time: Values, values: Values) -> LinearTest:
-    """Return a table over time as a linear test: averages, evenly spaced in log time.
+    """Return a table over time, in Pa or 1/Pa, as a linear test of averages, even in log time.
 
-    log J or log G, of values in Pa or 1/Pa, is averaged over log time, about the straight line
-    through the samples of an interval; what they scatter about it by is the error of the average.
+    Their error is that of the scatter about the straight line through the logs of an interval.
     """
     x, y = np.log10(time), np.log10(values)
     interval = np.floor(PER_DECADE * (x - x[0])).astype(int)
@@ -148,7 +148,7 @@ def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
     problems.require_none(TESTS_FILE)
     degrees, seen = table.numbers("temperature_C"), set()
     names, tests = table.columns["file"], table.columns["test"]
-    for celsius, name, test in zip(map(float, degrees), names, tests, strict=True):
+    for celsius, name, test in zip(degrees.tolist(), names, tests, strict=True):
         kind = test.strip()
         if kind not in NAMES:
             continue
@@ -242,9 +242,8 @@ def relaxation_modulus(spectrum: RelaxationSpectrum, time: Values) -> Values:
 def creep_compliance(spectrum: RelaxationSpectrum, time: Values) -> Values:
     """Return J(t) in 1/Pa at times in s: the creep of Maxwell elements side by side.
 
-    Under a unit stress the stresses of the elements obey s_k' = −s_k/λ_k + g_k Σ s_j/λ_j, where
-    g_k = G_k/ΣG; scaled by (g_k λ_k)^½ the matrix is symmetric, and its modes are those of
-    retardation, one of them steady flow   [Ferry 1980, Viscoelastic Properties of Polymers, ch. 3].
+    Under a unit stress s_k' = −s_k/λ_k + g_k Σ s_j/λ_j, g_k = G_k/ΣG; scaled by (g_k λ_k)^½ the
+    matrix is symmetric, and its modes are those of retardation   [Ferry 1980, ch. 3].
     """
     total = float(np.sum(spectrum.modulus))
     share = np.sqrt(spectrum.modulus / total / spectrum.relaxation_time)
@@ -260,10 +259,8 @@ def modes_of_retardation(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return moduli in Pa and relaxation times in s of J(t) = J_g + Σ J_k (1 − exp(−t/τ_k)) + t/η.
 
-    At a constant strain the strains of the retarded elements obey e_k' = J_k σ/τ_k − e_k/τ_k, that
-    of the dashpot e' = σ/η, and σ is what J_g leaves of the strain; scaled by the roots of J_k/τ_k
-    and 1/η the matrix is symmetric, and its modes are those of relaxation: the inverse of
-    `creep_compliance`. `instant`, `compliance` in 1/Pa, `fluidity` in 1/(Pa s), times in s.
+    The inverse of `creep_compliance`: at a constant strain e_k' = J_k σ/τ_k − e_k/τ_k and e' = σ/η,
+    where σ is what J_g leaves of it. `instant`, `compliance` in 1/Pa, `fluidity` in 1/(Pa s).
     """
     there = compliance > 0.0
     rates = 1.0 / retardation_time[there]
@@ -304,23 +301,22 @@ def linear_agreements(tests: Tests) -> list[Agreement]:
     spectra: dict[tuple[str, float], RelaxationSpectrum | None] = {}
     found = []
     slack = 1.0 + 1e-9  # of 1/ω
-    for source, test in ((a, b) for a in tests for b in tests if a != b):
-        for celsius in sorted(set(tests[source]) & set(tests[test])):
-            one, other = tests[source][celsius], tests[test][celsius]
-            reached, times = one.times, other.times
-            inside = times >= reached.min() / slack
-            inside &= times <= reached.max() * slack
-            if np.sum(inside) < _FEWEST:
-                continue
-            if (source, celsius) not in spectra:
-                try:
-                    spectra[source, celsius] = spectrum_of(one)
-                except InputError:  # too few samples, or moduli that no modes have
-                    spectra[source, celsius] = None
-            if (spectrum := spectra[source, celsius]) is None:
-                continue
-            made = predicted(spectrum, test, other.argument[inside])
-            error, seen = made / other.values[:, inside] - 1.0, times[inside]
-            ends = float(seen.min()), float(seen.max())
-            found.append(Agreement(source, test, celsius, rms(error), float(np.mean(error)), ends))
+    pairs = [(a, b) for a in tests for b in tests if a != b]
+    both = ((a, b, t) for a, b in pairs for t in sorted(set(tests[a]) & set(tests[b])))
+    for source, test, celsius in both:
+        one, other = tests[source][celsius], tests[test][celsius]
+        reached, times = one.times, other.times
+        inside = (times >= reached.min() / slack) & (times <= reached.max() * slack)
+        if np.sum(inside) < _FEWEST:
+            continue
+        if (source, celsius) not in spectra:
+            spectra[source, celsius] = None
+            with suppress(InputError):  # too few samples, or moduli that no modes have
+                spectra[source, celsius] = spectrum_of(one)
+        if (spectrum := spectra[source, celsius]) is None:
+            continue
+        made = predicted(spectrum, test, other.argument[inside])
+        error, seen = made / other.values[:, inside] - 1.0, times[inside]
+        ends = float(seen.min()), float(seen.max())
+        found.append(Agreement(source, test, celsius, rms(error), float(np.mean(error)), ends))
     return found

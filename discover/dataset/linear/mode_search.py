@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any, Literal
 
 import numpy as np
@@ -110,9 +111,8 @@ class ModeSearch:
             (True,) if value == "fit" else (False, True) if value is None else (False,)
             for value in self._asked
         ]
-        for solvent in choices[0]:
-            for elastic in choices[1]:
-                yield from self._path(solvent, elastic, fewest)
+        for solvent, elastic in product(*choices):
+            yield from self._path(solvent, elastic, fewest)
 
     def closely(self, fit: ModeFit) -> ModeFit:
         """Return a fit carried on until nothing changes."""
@@ -228,9 +228,8 @@ class ModeSearch:
     def _criterion(self, fit: ModeFit) -> float:
         """Return twice the negative log evidence   [Schwarz 1978, Ann. Stat. 6, 461].
 
-        Solvent and elastic constant have a prior that is even from zero to the most that the sweep
-        leaves room for, the smallest G″/ω and G′; where they are told well, the share of it that
-        their errors fill counts against them. So a fluid is no solid by one low G′.
+        Solvent and elastic constant have an even prior from zero to the most that the sweep leaves
+        room for, the smallest G″/ω and G′. So a fluid is no solid by one low G′.
         """
         count = self.measured.size
         variance = self._variance(fit)

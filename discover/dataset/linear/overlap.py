@@ -1,6 +1,6 @@
 """Two neighbouring tests laid over each other: shift factors of the overlap, with their error."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -157,13 +157,13 @@ def _overlapping(pairs: list[_Pair], shift: float) -> _Used:
 
 def _stacked(used: _Used, shift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return differences, weights and the signs with which log b_T adds to the differences."""
-    off = [pair.off(shift, rows) for pair, rows in used]
-    weight, sign = [], []
-    for one, (pair, rows) in zip(off, used, strict=True):
-        weight.append(np.broadcast_to(pair.moving.weight[rows], one.shape).ravel())
-        sign.append(np.full(one.size, -float(pair.up)))
-    every = np.concatenate([one.ravel() for one in off])
-    return every, np.concatenate(weight), np.concatenate(sign)
+    parts = []
+    for pair, rows in used:
+        off = pair.off(shift, rows)
+        weight = np.broadcast_to(pair.moving.weight[rows], off.shape)
+        parts.append((off.ravel(), weight.ravel(), np.full(off.size, -float(pair.up))))
+    off, weight, sign = map(np.concatenate, zip(*parts, strict=True))
+    return off, weight, sign
 
 
 def _refine(used: _Used, start: float, vertical: bool) -> Overlap:
@@ -174,7 +174,7 @@ def _refine(used: _Used, start: float, vertical: bool) -> Overlap:
     """
     off, weight, sign = _stacked(used, start)
     up = float(np.average(sign * off, weights=weight**2)) if vertical else 0.0
-    curves = [curve for pair, rows in used for curve in _both(pair, rows, start, up)]
+    curves = [curve for pair, rows in used for curve in _smooth_curves(pair, rows, start, up)]
 
     def left(shift: np.ndarray) -> list[np.ndarray]:
         return [curve.left(shift[0], shift[1] if vertical else 0.0) for curve in curves]
@@ -226,8 +226,10 @@ class _SmoothCurve:
         return values - basis @ np.linalg.lstsq(basis, values)[0]
 
 
-def _both(pair: _Pair, rows: np.ndarray, shift: float, up: float) -> list[_SmoothCurve]:
-    """Return the curves of a pair where it overlaps, each as smooth as its samples allow."""
+def _smooth_curves(
+    pair: _Pair, rows: np.ndarray, shift: float, up: float
+) -> Iterator[_SmoothCurve]:
+    """Yield the curves of a pair where it overlaps, each as smooth as its samples allow."""
     (x, colder, heavy), (z, warmer, weight) = pair.fixed, pair.moving
     moved = z[rows] + pair.along * shift
     # the samples of the colder on both sides of the end ones are needed to lie between them
@@ -244,7 +246,6 @@ def _both(pair: _Pair, rows: np.ndarray, shift: float, up: float) -> list[_Smoot
         square = float(np.sum(curve.left(shift, up) ** 2))
         return n * np.log(max(square, 1e-300)) + curve.constants * np.log(n)
 
-    found = []
     for cold, warm in zip(colder, warmer, strict=True):
         fixed = _Curve(x[there], cold[there], heavy[there])
         moving = _Curve(z[rows], warm[rows], weight[rows])
@@ -253,5 +254,4 @@ def _both(pair: _Pair, rows: np.ndarray, shift: float, up: float) -> list[_Smoot
             inner = np.linspace(*ends, intervals + 1)
             knots = np.concatenate([[ends[0]] * degree, inner, [ends[1]] * degree])
             splines.append(_SmoothCurve(fixed, moving, pair.along, pair.up, knots, degree))
-        found.append(min(splines, key=criterion))
-    return found
+        yield min(splines, key=criterion)

@@ -1,13 +1,12 @@
 """Time–temperature superposition: tests at several temperatures as one, and how well that holds.
 
 Neighbouring tests are laid over each other by log a_T, and log b_T if asked for, that make the logs
-of their values agree best where they overlap; shifts add up from the reference temperature [Ferry
-1980, Viscoelastic Properties of Polymers, ch. 11]. b_T divides moduli and multiplies compliances,
-a_T multiplies frequencies and divides times. Sweeps lead where there are sweeps: they see the
-temperature in two curves, and a table over time in one.
+of their values agree best; shifts add up from the reference temperature [Ferry 1980, ch. 11].
+Sweeps lead where there are sweeps: they see the temperature in two curves.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -46,14 +45,6 @@ class ShiftLaw:
     ) -> Float[np.ndarray, " n"]:
         """Return log10 a_T at temperatures in °C."""
         return _LAWS[self.name][0](celsius, reference, *self.values.values())
-
-
-def fit_shift_laws(
-    celsius: Float[np.ndarray, " n"], log_shift: Float[np.ndarray, " n"], at: int
-) -> tuple[ShiftLaw, ...]:
-    """WLF and Arrhenius fitted to log10 a_T, `at` the reference; fewer if temperatures are few."""
-    fitted = (_fit_law(name, celsius, log_shift, at) for name in _LAWS)
-    return tuple(law for law in fitted if law is not None)
 
 
 def _wlf(celsius, reference, c1, c2):
@@ -149,9 +140,8 @@ class Superposition:
     @property
     def verdict(self) -> str:
         """The worst verdict of the kinds that the shifts were found from."""
-        found = {self.verdict_of(kind) for kind in self.leading}
         ranked = ("not_superposed", "doubtful", "superposed")
-        return next(one for one in ranked if one in found)
+        return min((self.verdict_of(kind) for kind in self.leading), key=ranked.index)
 
     def factors(self, at: int) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """Return a_T and b_T at a temperature, each with its 95 % interval."""
@@ -203,11 +193,12 @@ def superpose(
     shifts = np.array([found[t][0] for t in celsius])
     errors = np.sqrt([np.diag(found[t][1]) for t in celsius])
     at = int(np.flatnonzero(celsius == reference)[0])
-    laws = fit_shift_laws(celsius, shifts[:, 0], at)
+    at = int(np.flatnonzero(celsius == reference)[0])
+    fitted = (_fit_law(name, celsius, shifts[:, 0], at) for name in _LAWS)
+    laws = tuple(law for law in fitted if law is not None)
     apart = tuple(t for t in every if t not in found)
-    return Superposition(
-        reference, celsius, known, leading, shifts[:, 0], shifts[:, 1], errors, laws, apart
-    )
+    log_a, log_b = shifts.T
+    return Superposition(reference, celsius, known, leading, log_a, log_b, errors, laws, apart)
 
 
 def _walk(several: Tests, reference: float, vertical: bool):
@@ -277,9 +268,7 @@ def move_tests(
         there = {t: at[t] for t in at if t in found.celsius}
         if kind == SWEEP or kind in found.leading or found.reference not in there:
             continue
-        try:
+        with suppress(InputError):  # too few, or apart: the sweeps' shifts are all there is
             own[kind] = superpose({kind: there}, found.reference, vertical)
-        except InputError:  # too few, or apart: the sweeps' shifts are all there is
-            continue
     files = {f"{kind}.csv": found.master(kind) for kind in tests}
     return MovedTests(found, own, linear_agreements(tests), files)

@@ -39,10 +39,9 @@ class Repeats(NamedTuple):
 
 
 def repeats_among(runs: Sequence[Run]) -> Repeats | None:
-    """Return which runs repeat one another and by how much they differ; None where none does.
+    """Return which runs of one test (`repeated_tests`) repeat one another; None where none does.
 
-    Of runs of one test (`repeated_tests`) those tell their error that cover half of each other, and
-    differ by no more than loadings do.
+    Counted are those that cover half of each other and differ by no more than loadings do.
     """
     named = {run.name: run for run in runs}
     groups, squares = [], []
@@ -60,23 +59,18 @@ def repeats_among(runs: Sequence[Run]) -> Repeats | None:
 def repeated_tests(runs: Sequence[Run]) -> tuple[tuple[str, ...], ...]:
     """Return the names of the runs of each test that was repeated.
 
-    Two runs are one test if their rates agree, and so does every number that the source gives of
-    their conditions. The rates have to agree over all of the longer run, where the shorter would go
-    on as it was told, or over the time that both cover if that is half of it. States and runs at a
-    given stress are passed over.
+    Two runs are one test if their rates agree, and every number that the source gives of their
+    conditions: over all of the longer run, or over the time that both cover if that is half of it.
+    States and runs at a given stress are passed over.
     """
-    timed = [
-        run
-        for run in runs
-        if run.protocol.control not in (*STATES, "stress") and len(run) >= _FEWEST_SAMPLES
-    ]
     groups: list[list[Run]] = []
-    for run in timed:
+    for run in runs:
+        if run.protocol.control in (*STATES, "stress") or len(run) < _FEWEST_SAMPLES:
+            continue
         group = next((group for group in groups if _same_test(group[0], run)), None)
         if group is None:
-            groups.append([run])
-        else:
-            group.append(run)
+            groups.append(group := [])
+        group.append(run)
     return tuple(tuple(run.name for run in group) for group in groups if len(group) > 1)
 
 

@@ -29,10 +29,8 @@ def thin(
 ) -> tuple[Bool[np.ndarray, " n"], str]:
     """Return which samples to keep, and a word on what was kept.
 
-    Kept are the first and the last sample; samples evenly spaced in log time, since a start-up has
-    its information per decade; samples evenly spaced in time, since an oscillation has it per
-    cycle; and the largest and smallest stress and rate. Values are the recorded ones, and all but
-    those four are chosen by their time alone, so that noise keeps its size and distribution.
+    Kept are samples evenly spaced in log time, since a start-up has its information per decade, and
+    in time, since an oscillation has it per cycle; the ends; and the extremes of stress and rate.
     """
     n = len(time)
     keep = np.zeros(n, dtype=bool)
@@ -60,11 +58,7 @@ def thin(
 
 
 def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndarray, " n"], str]:
-    """Return which frequencies of a sweep to keep, and a word on what was kept; none if all were.
-
-    Kept are those nearest to frequencies evenly spaced in log frequency, with their moduli as they
-    were recorded; some may be repeated.
-    """
+    """Return which frequencies to keep, evenly in log frequency, and a word on it if not all."""
     n = len(angular_frequency)
     if n <= MOST_FREQUENCIES:
         return np.ones(n, dtype=bool), ""
@@ -114,10 +108,9 @@ def followed_rate(
 ) -> tuple[Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
     """Return times and rates of fewer knots, whose straight lines follow a rate read in samples.
 
-    A linear spline that fits all samples by least squares keeps the strain far better than the rate
-    at some of them does. Its knots are the samples to `keep`, the first and the last among them;
-    intervals are halved until the strain is right to 0.1 % of its range everywhere, and the rate to
-    5 % of its largest.
+    The lines are a spline fitted by least squares to all samples, whose knots are the samples to
+    `keep` and more, until the strain is right to 0.1 % of its range and the rate to 5 % of its
+    largest.
     """
     weights = np.sqrt(np.gradient(time))
     strain = cumulative_trapezoid(shear_rate, time, initial=0.0)

@@ -150,8 +150,7 @@ def read_bytes(
 ) -> bytes:
     """Return the content of a regular file of reasonable size; InputError if it is none.
 
-    `largest`, `too_large`: bytes that it may have, and the remedy where it has more. `is_input`:
-    whether a command that reads it must not write over it; see `discover.validation`.
+    `largest` in bytes. `is_input`: whether a command that reads it must not write over it.
     """
     try:
         # what was opened is what is asked; opening must not wait for the other end of a pipe
@@ -194,12 +193,10 @@ def read_bytes(
 
 def _file_in(folder: Path) -> str:
     """Return which study to name in place of a folder; which file, if it holds none."""
-    studies = sorted(folder.glob("*.toml"))
-    if studies:
+    if studies := sorted(folder.glob("*.toml")):
         return f" Did you mean {str(studies[0])!r}?"
     data = any(folder.glob("*.csv"))
-    remedy = "Give a study file (TOML) whose [data] folder it is." if data else "Name a file in it."
-    return f" {remedy}"
+    return " Give a study file (TOML) whose [data] folder it is." if data else " Name a file in it."
 
 
 def did_you_mean_file(path: Path) -> str:
@@ -214,8 +211,8 @@ def did_you_mean_file(path: Path) -> str:
 def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.") -> Table:
     """Return a CSV file with a header line as text; InputError if it is missing, empty or none.
 
-    A byte order mark, Windows line ends and blank lines are accepted; other separators, decimal
-    commas and other encodings are recognised and refused, since guessing at numbers is no help.
+    Other separators, decimal commas and other encodings are recognised and refused, since guessing
+    at numbers is no help.
     """
     name = path.name if name is None else name
     text = _decode(read_bytes(path, name, if_missing), name)
@@ -232,24 +229,21 @@ def read_table(path: Path, name: str | None = None, if_missing: str = "Add it.")
             if not header:
                 header = _header(cells, first, name)
                 continue
-            if len(cells) != len(header):
-                of_numbers = all(is_number(cell.strip()) for cell in cells)
-                remedy = "Correct that line."
-                if len(cells) > len(header) and of_numbers:
-                    remedy = "Decimal commas look so too: write decimal points."
-                why = why or (
-                    f"{name} is not a comma-separated table: line {first} has {len(cells)} cells, "
-                    f"the header {len(header)}. {remedy}"
-                )
-                ragged.append(first)
             rows.append(cells)
             lines.append(first)
+            if len(cells) != len(header):
+                ragged.append(first)
+                of_numbers = all(is_number(cell.strip()) for cell in cells)
+                commas = len(cells) > len(header) and of_numbers
+                why = why or (
+                    f"line {first} has {len(cells)} cells, the header {len(header)}. "
+                    + ("Decimal commas look so too: write decimal points." if commas
+                       else "Correct that line.")
+                )  # fmt: skip
     except csv.Error as error:
-        raise InputError(
-            f"{name} is not a comma-separated table: line {start} ({error}). Fix the quotes there."
-        ) from None
+        ragged, why = [start], f"line {start} ({error}). Fix the quotes there."
     if ragged:
-        raise InputError(why + _like_it(ragged))
+        raise InputError(f"{name} is not a comma-separated table: {why}{_like_it(ragged)}")
     if not header:
         raise InputError(f"{name} is empty; it must hold a header and rows. Add them.")
     if not rows:
@@ -307,9 +301,7 @@ def _like_it(lines: Sequence[int]) -> str:
     others = [str(line) for line in lines[1:]]
     if len(others) > _MOST_LINES:
         others = [*others[:_MOST_LINES], f"{len(others) - _MOST_LINES} more"]
-    if not others:
-        return ""
-    return f" (Line{'s' * (len(others) > 1)} {listed(others)} too.)"
+    return f" (Line{'s' * (len(others) > 1)} {listed(others)} too.)" if others else ""
 
 
 def _remedy(cell: str, row: int) -> str:
@@ -327,22 +319,19 @@ def _remedy(cell: str, row: int) -> str:
 
 def _rename(quantity: Quantity, columns: Mapping[str, Sequence[str]]) -> str:
     """Point to the column that was probably meant."""
-    stem = quantity.stem.lower()
+    stem, wanted = quantity.stem.lower(), quantity.column
     for column in columns:
         plain = column.lower()
-        if plain == quantity.column.lower():
-            return f"Names are case-sensitive: rename {column} to {quantity.column}."
+        if plain == wanted.lower():
+            return f"Names are case-sensitive: rename {column} to {wanted}."
         if plain == stem or re.match(rf"{re.escape(stem)}\W", plain):
-            return f"Rename {shown(column)} to {quantity.column}, if that is its unit."
+            return f"Rename {shown(column)} to {wanted}, if that is its unit."
         if plain.startswith(stem + "_"):
-            return (
-                f"{shown(column)} ends in no unit that is known; rename it to {quantity.column}, "
-                "or put another unit after the underscore."
-            )
-    near = nearest(quantity.column, columns)
-    if near is not None:
-        return f"Is {shown(near)} meant? Then rename it."
-    return "Add it, or rename the column that holds it."
+            words = "ends in no unit that is known; rename it to"
+            return f"{shown(column)} {words} {wanted}, or put another unit after the underscore."
+    near = nearest(wanted, columns)
+    remedy = "Add it, or rename the column that holds it."
+    return remedy if near is None else f"Is {shown(near)} meant? Then rename it."
 
 
 def shown(cell: str) -> str:
@@ -354,10 +343,8 @@ def shown(cell: str) -> str:
 def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
     """Finite plain numbers as an array of shape (n,); InputError where they are none."""
     if hasattr(values, "magnitude"):
-        raise InputError(
-            f"{label} carries a unit; got a {type(values).__name__}. Give plain "
-            "numbers in SI units."
-        )
+        got = type(values).__name__
+        raise InputError(f"{label} carries a unit; got a {got}. Give plain numbers in SI units.")
     try:
         given = np.asarray(values)
         # pandas marks what is missing in columns of objects
@@ -371,9 +358,8 @@ def as_column(values: object, label: str) -> Float[np.ndarray, " n"]:
         raise InputError(f"{label} must be a list or an array of numbers; got {got}.")
     if not np.all(np.isfinite(numbers)):
         row = int(np.argmin(np.isfinite(numbers)))
-        raise InputError(
-            f"{label} must be finite; sample {row} holds {numbers[row]}. Remove that sample."
-        )
+        where = f"sample {row} holds {numbers[row]}"
+        raise InputError(f"{label} must be finite; {where}. Remove that sample.")
     return numbers
 
 
@@ -395,10 +381,9 @@ _TOKEN = re.compile(
 
 
 def read_toml(path: Path, kind: str, example: str) -> tuple[dict[str, Any], str]:
-    """Return the content of a TOML file, and its text; InputError says on which line it is none.
+    """Return the content and the text of a TOML file; InputError says on which line it is none.
 
-    `kind`: what it should be, such as "study file". `example`: what to do where it is of another
-    kind, as a sentence.
+    `kind`: what it should be, such as "study file". `example`: the remedy, as a sentence.
     """
     raw = read_bytes(
         path, str(path), f"Check the path of the {kind}.", largest=LARGEST_TEXT, too_large=example

@@ -2,9 +2,11 @@
 
 import math
 import re
+import tomllib
 import unicodedata
 from collections.abc import Sequence
 from functools import cache, reduce
+from importlib.resources import files
 from typing import NamedTuple
 
 from discover.errors import InputError
@@ -14,25 +16,15 @@ from discover.errors import InputError
 # and ``9**9**9`` is not worked out. What a single word means is asked of pint.
 
 _LONGEST = 40  # characters
-_SPELLINGS = {  # what pint does not know under this name
-    "%": "percent", "pct": "percent", "°": "degree", "rev": "turn", "Grad": "degree",
-    "S": "s", "secs": "s", "Min": "min", "MIN": "min", "mins": "min", "hrs": "hour",
-    "pa": "Pa", "PA": "Pa", "kpa": "kPa",
-    "KPa": "kPa", "Mpa": "MPa", "cp": "cP", "CP": "cP", "hz": "Hz", "HZ": "Hz",
-    "Sekunden": "s", "Minuten": "min", "Stunden": "hour", "Prozent": "percent",
-    "secondes": "s", "heures": "hour", "segundos": "s", "minutos": "min", "secondi": "s",
-    "seconden": "s", "sekundy": "s", "секунды": "s", "минуты": "min", "проценты": "percent",
-    "Sek": "s", "sek": "s", "seg": "s", "Std": "hour", "Dyn": "dyn",
-    "Па": "Pa", "мПа": "mPa", "кПа": "kPa", "МПа": "MPa", "ГПа": "GPa", "П": "P", "сП": "cP",
-    "с": "s", "сек": "s", "мс": "ms", "мин": "min", "ч": "hour", "рад": "rad", "мрад": "mrad",
-    "Гц": "Hz", "град": "degree", "Н": "N", "мН": "mN", "мкН": "uN", "м": "m", "мм": "mm",
-    "мкм": "um", "см": "cm", "дин": "dyn", "об": "turn",
-    "秒": "s", "毫秒": "ms", "分": "min", "分钟": "min", "分鐘": "min", "小时": "hour",
-    "小時": "hour", "時間": "hour", "帕": "Pa", "千帕": "kPa", "毫帕": "mPa", "兆帕": "MPa",
-    "赫兹": "Hz", "赫茲": "Hz", "弧度": "rad", "ラジアン": "rad", "ヘルツ": "Hz", "パスカル": "Pa",
-    "度": "degree", "转": "turn", "轉": "turn", "毫米": "mm", "초": "s", "분": "min",
-    "시간": "hour", "도": "degree", "라디안": "rad", "파스칼": "Pa", "헤르츠": "Hz",
-}  # fmt: skip
+
+
+@cache
+def _spellings() -> dict[str, str]:
+    """Return what pint does not know under this name: the unit of each word of ``units.toml``."""
+    content = tomllib.loads((files("discover.dataset.tables") / "units.toml").read_text("utf-8"))
+    return {word: unit for unit, words in content.items() for word in words}
+
+
 # products that are written without a sign: mNm, Pas. A millisecond is no such thing: ms
 _JOINED = re.compile(r"\b([mkMGuµ]?(?:N|Pa))(m|s)\b")
 _NUMBERS_PER_MINUTE = re.compile(r"\b(U|tr|rev|r|obr|ot|giri|omw)\.?/min\b")
@@ -161,20 +153,20 @@ def _product(tokens: list[str]) -> tuple[Unit | None, list[str]]:
 def _power(text: str) -> Unit | None:
     """Return a word with its exponent, such as cm2 or s^-1."""
     match = re.fullmatch(r"((?:[^\W\d_]|[°%])+)\^?(-?[1-9])?", text)
-    if match is None:
-        return None
-    word = _word(match.group(1))
-    return None if word is None else Unit().times(word, int(match.group(2) or 1))
+    word = None if match is None else _word(match[1])
+    return None if match is None or word is None else Unit().times(word, int(match[2] or 1))
 
 
 @cache
 def _word(text: str) -> Unit | None:
     """Return a single word, such as kPa or seconds, from pint."""
-    word = _SPELLINGS.get(text, text)
+    word, parse = _spellings().get(text, text), _registry().parse_unit_name
     # whole words may begin with a capital; of short symbols the case has a meaning
     for name in (word, word.lower()) if len(word) > 2 else (word,):
-        parsed = _registry().parse_unit_name(name)
-        if not parsed or _is_short_plural(name):
+        parsed, symbol = parse(name), name.removesuffix("s")
+        # a symbol with an s, as Pas, is no plural of Pa
+        plural = len(name) <= 4 and symbol != name and parsed[:1] == parse(symbol)[:1]
+        if not parsed or plural:
             continue
         unit = _registry().Unit(parsed[0][0] + parsed[0][1])
         size = _registry().Quantity(1.0, unit).to_base_units()
@@ -183,12 +175,6 @@ def _word(text: str) -> Unit | None:
             kg, m, s = (round(float(str(found.get(key, 0)))) for key in _DIMENSIONS)
             return Unit(float(size.magnitude), (kg, m, s), "hertz" in str(unit))
     return None
-
-
-def _is_short_plural(name: str) -> bool:
-    """Return whether a name is a symbol with an s, as Pas, which is no plural of Pa."""
-    parse, symbol = _registry().parse_unit_name, name.removesuffix("s")
-    return len(name) <= 4 and symbol != name and parse(name)[:1] == parse(symbol)[:1]
 
 
 @cache
@@ -253,38 +239,31 @@ def heading_factor(column: str, quantity: Quantity) -> float:
 
 def conversion_note(column: str, factor: float, quantity: Quantity) -> str:
     """Say in words how a column becomes SI; empty if it is in SI units already."""
-    if factor == 1.0:
-        if "rad" in quantity.unit and "rad" not in column:
-            return (
-                f"{column} is read as {quantity.stem} in {quantity.unit}; if it counts cycles, "
-                f"name it {quantity.stem}_Hz"
-            )
+    stem, unit = quantity.stem, quantity.unit
+    if factor != 1.0:
+        return f"{column} is read as {stem}, times {factor:.6g}" + (f" to {unit}" if unit else "")
+    if "rad" not in unit or "rad" in column:
         return ""
-    return f"{column} is read as {quantity.stem}, times {factor:.6g}" + (
-        f" to {quantity.unit}" if quantity.unit else ""
-    )
+    return f"{column} is read as {stem} in {unit}; if it counts cycles, name it {stem}_Hz"
 
 
 def find_column(names: Sequence[str], quantity: Quantity) -> tuple[str, float] | None:
     """Column of a quantity and its factor to SI, or None; InputError on two, or a wrong unit."""
-    found = []
+    found = [(name, 1.0) for name in names if name == quantity.column]
     for name in names:
-        if name == quantity.column:
-            found.append((name, 1.0))
-        elif name.startswith(quantity.stem + "_"):
-            suffix = name[len(quantity.stem) + 1 :]
-            if (unit := read_heading(suffix)) is None:
-                continue
-            factor = factor_to(unit, quantity)
-            if factor is None:
-                raise InputError(
-                    f"The column {name} has the unit {suffix.replace('_', '/')}, which is not a "
-                    f"unit of {quantity.stem}. Name the column {quantity.column}, or give another "
-                    f"unit of {quantity.unit or 'a pure number'} after the underscore."
-                )
-            found.append((name, factor))
+        suffix = name.removeprefix(f"{quantity.stem}_")
+        unit = None if name in (suffix, quantity.column) else read_heading(suffix)
+        if unit is None:
+            continue
+        factor = factor_to(unit, quantity)
+        if factor is None:
+            raise InputError(
+                f"The column {name} has the unit {suffix.replace('_', '/')}, which is not a "
+                f"unit of {quantity.stem}. Name the column {quantity.column}, or give another "
+                f"unit of {quantity.unit or 'a pure number'} after the underscore."
+            )
+        found.append((name, factor))
     if len(found) > 1:
-        raise InputError(
-            f"Both {found[0][0]} and {found[1][0]} hold {quantity.stem}. Keep one of them."
-        )
+        first, second = sorted((name for name, _ in found[:2]), key=list(names).index)
+        raise InputError(f"Both {first} and {second} hold {quantity.stem}. Keep one of them.")
     return found[0] if found else None
