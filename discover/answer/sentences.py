@@ -135,7 +135,9 @@ def linear_part(answer: Any) -> str:
         modulus = f"G = {significant(answer.modes[0].modulus_Pa, 3)} Pa"
         found = [modulus, f"λ = {significant(times[0], 3)} s"]
     else:
-        found = ["G", f"λ = {span((min(times), max(times)))} s"] if times else []
+        moduli = [mode.modulus_Pa for mode in answer.modes]
+        found = [f"G = {span((min(moduli), max(moduli)))} Pa"] if times else []
+        found += [f"λ = {span((min(times), max(times)))} s"] if times else []
     if answer.solvent_viscosity_Pa_s:
         found.append(f"η_s = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
     return ", ".join(found)
@@ -185,22 +187,20 @@ def expected(one: Any, place: str) -> str:
     """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
-        return percent_of(value)
+        return percent_of(value) if value else "within noise"
     return "–" if one.is_known else one.missing
 
 
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
-    several = [one.text for one in answer.suspects[:_MOST_CONSTANTS]]
-    if more := len(answer.suspects) - len(several):
-        several.append(f"{more} more")
-    if not several:
+    if not answer.suspects:
         return ""
-    apart = len(several) == 1 or all(one.is_separate for one in answer.suspects)
-    if apart:
-        return f"Suspect {listed(several)}."
+    if len(answer.suspects) == 1:
+        return f"Suspect: {answer.suspects[0].text}."
     names = [effect_title(one.effect) for one in answer.suspects[:_MOST_CONSTANTS]]
-    return f"Suspects, not separable: {listed(names + several[_MOST_CONSTANTS:])}."
+    names += [f"{more} more"] if (more := len(answer.suspects) - len(names)) else []
+    separate = all(one.is_separate for one in answer.suspects)
+    return f"Suspects{'' if separate else ', not separable'}: {listed(names)}."
 
 
 def further(answer: Any) -> list[str]:
@@ -217,10 +217,11 @@ def lines(answer: Any) -> list[str]:
         parts = []
         for name, symbol in SYMBOLS.items():
             one = answer.expected(name)
-            text = f"{symbol} {expected(one, 'inside')}"
+            text = f"{symbol} {expected(one, 'inside')}{f' ({one.note})' if one.note else ''}"
             if one.beyond is not None:
-                text += f", {percent_of(one.beyond)} beyond"
-            parts.append(f"{text} ({one.note})" if one.note else text)
+                at = f" ({one.beyond_at})" if one.beyond_at else ""
+                text += f", beyond the range {percent_of(one.beyond)}{at}"
+            parts.append(text)
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
     found += further(answer)
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")

@@ -5,12 +5,13 @@ import os
 import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
 from urllib.parse import quote
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
@@ -110,6 +111,7 @@ def _environment() -> Environment:
         estimate=estimate,
         readable=readable,
         subscripts=_subscripts,
+        explained=_explained,
         safe_svg=Markup,
         as_link=_as_link,
     )
@@ -172,7 +174,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "level": "95 % CI" if answer.adequate and answer.fits_to_the_noise else "95 %, statistical",
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": "",
+        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": 0.0,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -199,17 +201,18 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 "symbol": symbol,
                 "inside": expected(one, "inside"),
                 "beyond": expected(one, "beyond"),
+                "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
                 "known": one.is_known,
                 "note": _unbroken(one.note),
             }
             for symbol, one in rows
         ],
         "modes": [
-            (significant(mode.modulus_Pa), significant(mode.relaxation_time_s))
+            (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
             for mode in answer.modes
         ],
         "linear": _unbroken(linear_part(answer)),
-        "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
+        "solvent": answer.solvent_viscosity_Pa_s,
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
@@ -249,6 +252,21 @@ def _subscripts(text: str) -> Markup:
     return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
 
 
+_NUMERALS = {
+    "Wi": "Weissenberg number: mean relaxation time λ times the largest shear rate",
+    "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
+}
+
+
+def _explained(text: str) -> Markup:
+    """Return text, escaped, whose dimensionless numbers say what they are where one points."""
+
+    def said(found: re.Match[str]) -> str:
+        return f'<abbr title="{_NUMERALS[found[0]]}">{found[0]}</abbr>'
+
+    return Markup(re.sub(rf"\b({'|'.join(_NUMERALS)})(?=\s=)", said, str(_subscripts(text))))
+
+
 def _in_cell(text: str) -> str:
     """Return a number or an interval that breaks before a power of ten at most."""
     return _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×")
@@ -257,8 +275,30 @@ def _in_cell(text: str) -> str:
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
     lines = answer.written.get("formula", "").splitlines()
-    law = "" if equation is None else _law(equation, any(line.startswith("h = ") for line in lines))
-    return law + _formulas(lines)
+    if equation is None:
+        return _formulas(lines)
+    rest = any(line.startswith("h = ") for line in lines)
+    return _law(_rounded(equation, answer), rest) + _formulas(lines)
+
+
+def _rounded(equation: Equation, answer: Answer) -> Equation:
+    """Return an equation with the digits that the intervals leave, three at most."""
+
+    def short(value: float) -> float:
+        digits = next((one.digits for one in answer.constants if np.isclose(one.value, value)), 3)
+        return float(f"{value:.{digits}g}")
+
+    def all_short(values: Mapping[str, float]) -> dict[str, float]:
+        return {name: short(value) for name, value in values.items()}
+
+    terms = tuple(
+        replace(term, coefficient=short(term.coefficient), inner=all_short(term.inner))
+        for term in equation.terms
+    )
+    named = equation.named
+    if named is not None:
+        named = replace(named, constants=tuple(map(all_short, named.constants)))
+    return replace(equation, terms=terms, named=named)
 
 
 def _formulas(lines: Sequence[str]) -> str:
