@@ -84,7 +84,7 @@ def _begin(
 
 
 def _end(task: str, folder: RunFolder, verdict: Sequence[str]) -> TaskResult:
-    """Keep the verdict beside the report, which was written, and close the folder."""
+    """Keep the verdict next to the report, which was written, and close the folder."""
     text = "\n".join(verdict)
     folder.save("verdict", {"text": text})
     folder.finish()

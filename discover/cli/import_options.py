@@ -193,7 +193,7 @@ _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 
 
 def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str]]:
-    """Write a page on a data folder and a first study beside it.
+    """Write a page on a data folder and a first study next to it.
 
     `name`: the folder, or its name under DISCOVER_DATA. `out`: folder for both files; made if it is
     not there.
@@ -223,7 +223,7 @@ def write_import_page(
 ) -> Path | None:
     """Write the page on an imported folder into it; return its path, None if it cannot be read.
 
-    A first study is written beside it unless there is one: that may have been changed by hand.
+    A first study is written next to it unless there is one: that may have been changed by hand.
     """
     from discover.dataset.load import load_dataset
 

@@ -46,10 +46,7 @@ _SEED = 20261128
 class Band:
     """σ12 (or what is recorded), N1 and N2 of one flow with their 95 % bands, in Pa.
 
-    Attributes
-    ----------
-    middle, low, high
-        By quantity, shape (n,); not finite where no claim can be made.
+    `middle`, `low`, `high`: by quantity, shape (n,); not finite where no claim can be made.
     """
 
     middle: Mapping[str, Float[np.ndarray, " n"]]
@@ -96,10 +93,7 @@ def flow_bands(found: Found, flows: Sequence[Flow], runs: Mapping[str, Run]) -> 
     anything from −2/7 N1 to zero. Measured runs are predicted as recorded, flaws of the instrument
     included, other flows for the fluid alone.
 
-    Parameters
-    ----------
-    runs
-        Runs as recorded, by name.
+    `runs`: runs as recorded, by name.
     """
     parts = _parts(found)
     if not parts or not flows:

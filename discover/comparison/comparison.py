@@ -56,48 +56,20 @@ class SweepPoint:
 class Comparison(PageView, HasAnswer, SummaryView):
     """Both learners and the posterior of the same runs, in the same flows.
 
-    Attributes
-    ----------
-    name
-        Of the study.
-    data_summary, known_part
-        The data and the known part, in words.
-    flows
-        Every flow looked at.
-    before
-        Predictions of the known part alone, by flow.
-    outcomes
-        By learner.
-    posterior
-        What a search among laws, effects and terms and the learners' proposals say together.
-    bands
-        What the posterior predicts with its 95 % band, by the key of the flow.
-    shares
-        Probability of each learner's law among all that were fitted, were one of them all there is.
-    lack_of_fit
-        What each learner's law leaves of the training runs.
-    truth
-        The terms a perfect learner would find, or None.
-    noise
-        Relative noise of synthetic data, or None.
-    rivals, statements
-        What the data do not determine.
-    structure
-        What the training flows can determine of the library; None where that was not asked.
-    classical
-        The classical laws fitted to the same runs.
-    sweep
-        The same again over a parameter.
-    distillations
-        What simpler laws learn from the true one, JSON-able rows.
-    seed
-        Seed of the learners.
-    known
-        The known part as an equation; None where it cannot be written out.
-    known_effects
-        Effects of the instrument that the data were corrected for.
-    conditions
-        Material and temperature, where runs.csv names them.
+    `name`: of the study. `data_summary`, `known_part`: the data and the known part, in words.
+    `flows`: every flow looked at. `before`: predictions of the known part alone, by flow.
+    `outcomes`: by learner. `posterior`: what a search among laws, effects and terms and the
+    learners' proposals say together. `bands`: what the posterior predicts with its 95 % band, by
+    the key of the flow. `shares`: probability of each learner's law among all that were fitted,
+    were one of them all there is. `lack_of_fit`: what each learner's law leaves of the training
+    runs. `truth`: the terms a perfect learner would find, or None. `noise`: relative noise of
+    synthetic data, or None. `rivals`, `statements`: what the data do not determine. `structure`:
+    what the training flows can determine of the library; None where that was not asked.
+    `classical`: the classical laws fitted to the same runs. `sweep`: the same again over a
+    parameter. `distillations`: what simpler laws learn from the true one, JSON-able rows. `seed`:
+    seed of the learners. `known`: the known part as an equation; None where it cannot be written
+    out. `known_effects`: effects of the instrument that the data were corrected for. `conditions`:
+    material and temperature, where runs.csv names them.
     """
 
     name: str
@@ -214,10 +186,7 @@ class Comparison(PageView, HasAnswer, SummaryView):
     def error_map(self, who: str) -> dict[tuple[float, float], dict[str, float | None]]:
         """Return errors over the Pipkin diagram: (Wi, De) → quantity → relative error.
 
-        Parameters
-        ----------
-        who
-            A learner, or ``"before"``.
+        `who`: a learner, or ``"before"``.
         """
         return {
             (flow.amplitude, flow.frequency or 0.0): self.errors(who, flow)

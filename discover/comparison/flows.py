@@ -77,7 +77,7 @@ class Flow:
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
     commanded: FlowProtocol | None = None
-    weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
+    weight: float = 1.0  # weight of its samples relative to those of other runs; see `Run`
 
     @property
     def _imposed(self) -> FlowProtocol:
@@ -95,7 +95,7 @@ class Flow:
 
     @property
     def records_shear_stress(self) -> bool:
-        """Whether σ12 in shear is recorded, beside which N1 and N2 are told.
+        """Whether σ12 in shear is recorded, so that N1 and N2 can be told.
 
         Else it is the tensile stress, a strain, a modulus, or a normal stress difference that is
         data of its own.

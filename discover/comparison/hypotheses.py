@@ -40,7 +40,7 @@ MOST_EFFECTS = 3
 def search_hypotheses(
     study: Study, data: StudyData, declared: DeclaredModel, library: TermLibrary, say: Say
 ) -> Found:
-    """Return the posterior over what a search finds beside the known part.
+    """Return the posterior over what a search adds to the known part.
 
     Candidates are every effect with a name, of fluid and instrument, and every library term.
 
@@ -100,7 +100,7 @@ def with_proposals(
 ) -> tuple[Found, dict[str, Proposed]]:
     """Return the posterior over the search's hypotheses and those of learners, and each of these.
 
-    A learner's terms stand beside what the likeliest hypothesis holds of the instrument.
+    A learner's terms stand with what the likeliest hypothesis holds of the instrument.
 
     `terms`: by learner.
     """

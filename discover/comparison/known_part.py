@@ -30,7 +30,7 @@ _INSIDE = 1e-3
 
 @dataclass(frozen=True)
 class Frame:
-    """What learners are given, and how what they find is seen beside the records.
+    """What learners are given, and how what they find is seen in the records.
 
     `made`: what the instrument makes of the stress of a run, by its name; empty where it does
         nothing.

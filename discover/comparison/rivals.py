@@ -2,7 +2,7 @@
 
 The findings are those of `discover.identify`: exact twins of the law found, rivals that a test on
 the data could not rule out, and the structure of the library at the law found. Here they are put
-beside the flows of the comparison.
+next to the flows of the comparison.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -244,9 +244,8 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
     if name == "ucm" and not _shows_a_derivative(result):
-        title = (
-            f"linear viscoelastic{' with solvent' if solvent else ''} (no nonlinear law determined)"
-        )
+        title = title.replace(LAWS[name].title, "linear viscoelastic")
+        title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
 
 

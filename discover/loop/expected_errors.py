@@ -38,11 +38,8 @@ _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
 class Spread:
     """Root-mean-square difference between laws that describe the runs as well.
 
-    Attributes
-    ----------
-    inside, beyond
-        Over the rms of the quantity (N2: of N1), in flows inside and beyond the fitted rates; None
-        where a law diverges.
+    `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
+    fitted rates; None where a law diverges.
     """
 
     inside: float | None
@@ -55,12 +52,8 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
 
     See `weighed_laws`.
 
-    Parameters
-    ----------
-    posterior
-        What the runs say.
-    best
-        The law that is reported, from which differences are counted.
+    `posterior`: what the runs say. `best`: the law that is reported, from which differences are
+    counted.
     """
     runs = posterior.problem.fitted.runs
     weighed = weighed_laws(posterior)

@@ -16,18 +16,10 @@ _EXCHANGE = 1.4
 class SearchTime:
     """Seconds left of searches one after another, by their lines.
 
-    Parameters
-    ----------
-    most
-        Largest number of effects.
-    several_modes
-        Whether a search with constants that differ from mode to mode may follow.
-    rounds
-        How often all of it is done, each time with another run left out.
-    reported
-        Whether curves, bands and the next test belong to it.
-    clock
-        Seconds now.
+    `most`: largest number of effects. `several_modes`: whether a search with constants that differ
+    from mode to mode may follow. `rounds`: how often all of it is done, each time with another run
+    left out. `reported`: whether curves, bands and the next test belong to it. `clock`: seconds
+    now.
     """
 
     def __init__(

@@ -44,7 +44,7 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     """Return what a page says of the run that made it; every table links to it.
 
     `fingerprint`: of the study, its data and the version of this software. `command`: what makes it
-    again. `files`: written beside the page.
+    again. `files`: written with the page.
     """
     packages = [f"Python {platform.python_version()}"]
     for name in _CALCULATES:
@@ -78,7 +78,7 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
     The page carries those that are not too long, so that it hands them out where it stands alone;
-    the others lie beside it. `content`: its variables.
+    the others lie in its folder. `content`: its variables.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (

@@ -366,7 +366,7 @@ def write_comparison(
 
     `linear_relaxation`: whether −σ was part of the known law. `study_text`: the study file, shown
     at the end. `run`: what the page says of the run that made it, where that was no command.
-    `overlays`: curves that the study asks for beside the learners'.
+    `overlays`: curves that the study asks for in addition to the learners'.
 
     Returns the page.
     """
@@ -405,10 +405,10 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     for name, outcome in comparison.outcomes.items():
         known = comparison.known_part_of(name)
         terms = (*known.terms, *outcome.terms)
-        named, beside = known.named, ""
+        named, note = known.named, ""
         if named is not None and not named.is_written:
-            named, beside = None, f", without the h of the known law {named.law}"
+            named, note = None, f", without the h of the known law {named.law}"
         equation = law_latex(terms, linear_relaxation, named=named)
-        head = f"% {learner_title(name)}{beside}\n"
+        head = f"% {learner_title(name)}{note}\n"
         parts.append(f"{head}\\begin{{equation}}\n  {equation}\n\\end{{equation}}\n")
     return "\n".join(parts)
