@@ -74,7 +74,7 @@ def fit_classical_laws(
     bench = [] if best is None else [
         effects[name] for name in best.names if not isinstance(effects[name], ConstitutiveEffect)
     ]  # fmt: skip
-    tried = _added_to_maxwell(found, bench)
+    tried = _added_to_ucm(found, bench)
     for name in dict.fromkeys(further):
         if name not in tried:
             tried[name] = _of_law(found, name, bench)
@@ -84,9 +84,7 @@ def fit_classical_laws(
     return tuple(_result(name, *one, judged, least) for name, one in tried.items())
 
 
-def _added_to_maxwell(
-    found: Found, bench: Sequence[AbstractEffect]
-) -> dict[str, tuple[Fitter, Fit]]:
+def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
     """Return the classical laws as effects added to upper convected Maxwell."""
     problem = found.posterior.problem
     declared = problem.declared

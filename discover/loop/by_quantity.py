@@ -8,9 +8,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError, sentences
-from discover.loop.expected_errors import BEYOND
 from discover.loop.run_record import RunRecord
 from discover.words import percent_of
+
+BEYOND = 2.0
+"""Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
 MUCH = 2.0
 """Relative difference from which on its size says nothing."""

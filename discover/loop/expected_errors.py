@@ -11,13 +11,11 @@ from discover.forward import make_batch
 from discover.inference.engine import Posterior
 from discover.inference.engine.fits import Fit
 from discover.linear_algebra_threads import in_one_thread
+from discover.loop.by_quantity import BEYOND
 from discover.protocols import FlowProtocol, in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
-
-BEYOND = 2.0
-"""Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
 _LAWS, _DRAWS = 20, 4
 _TEMPERED = 0.5

@@ -57,8 +57,8 @@ def run_loop(
     """Find what a declared model lacks, add it, and test the result on held-out runs.
 
     Hypotheses are sets of effects added to the declared model, which is never exact: small
-    instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects among them;
-    see `discover.inference.engine`. Nothing is random.
+    instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects
+    among them; see `discover.inference.engine`. Nothing is random.
 
     `declared`: the model to start from. `fit`: names of the runs to fit; by default all that are
     not held out. `held_out`: names of the held-out runs, which only test. `effects`: candidates, by
