@@ -73,8 +73,7 @@ def description(answer: Any) -> str:
     size = f"{percent_of(found.size)}{ends}"
     subtracted = f", noise {noise} subtracted" if noise else ""
     if answer.is_empirical and answer.alternative:  # behind the best classical law
-        runs = "unseen" if found.unseen else "fitted"
-        return f"The fit: {size} on {runs} runs{subtracted}."
+        return f"The fit: {size} on {'unseen' if found.unseen else 'fitted'} runs."
     # of fitted runs it is no error that a prediction could have
     of = "Model error on unseen runs" if found.unseen else "Residual of the fitted runs"
     return f"{of} {size}{subtracted}."
@@ -106,11 +105,9 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
-    if answer.adequate is not False:
-        return f"Use in {place}."
-    if answer.size > _USELESS:
+    if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
-    return f"Use to that accuracy only, in {place}."
+    return f"Use in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -157,21 +154,19 @@ def tolerance(answer: Any) -> str:
     where_over = ""
     if over:
         worst = max(over, key=lambda name: over[name])
-        place = f"{worst}, {percent_of(over[worst])}"
-        where_over = f"{counted(len(over), 'run')} exceed it (worst: {place})"
-        if len(over) == 1:
-            where_over = f"1 run exceeds it ({place})"
+        first = "worst: " if len(over) > 1 else ""
+        where_over = f"{counted(len(over), 'run')} ({first}{worst}, {percent_of(over[worst])})"
     if not answer.adequate and not (missed or where_over):
         said = "not met"
     elif not answer.adequate or missed:
         # stress is what it is about, unless others miss it as well
         of = "" if missed in ([], [SYMBOLS["sigma12"]]) else f" for {listed(missed)}"
         met_for = f"met for {listed(met)}, " if met and of else ""
-        said = f"{met_for}not met{of}{f': {where_over}' if where_over else ''}"
+        said = f"{met_for}not met{of}{f' in {where_over}' if where_over else ''}"
     else:
         residual = answer.expected("sigma12").is_residual
         of = " by the fitted runs" if residual else f" for {listed(met)}" if met else ""
-        said = f"met{of}{f'; {where_over}' if where_over else ''}"
+        said = f"met{of}{f', but not in {where_over}' if where_over else ''}"
     parts = [f"Tolerance {asked}: {said}"]
     if assumed:
         parts.append(f"{listed(assumed)} within it if this law holds, not measured")

@@ -46,9 +46,6 @@ _MOST_ADDED = 2
 _SETTLED = 0.95
 """Probability from which on nothing is said of other laws."""
 
-_ABOVE = 1.1
-"""Residual over noise from which on it is told as larger than noise."""
-
 _TURNS = 0.5
 """Share of the largest rate that a flow reaches in the other direction, if it oscillates."""
 
@@ -187,9 +184,7 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        if result.error_after.fit < _ABOVE * result.noise_floor:
-            return f"The residual is systematic (p {p})."
-        return f"No law reaches the noise (p {p})."
+        return f"The residual is systematic (p {p})."
     return ""
 
 
@@ -209,7 +204,7 @@ def _alternative(result: Any) -> str:
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *sentences.constants(constants)]
-    return f"Best classical law: {', '.join(said)}, model error {percent_of(near.size)}."
+    return f"Best classical law: {', '.join(said)}, error {percent_of(near.size)}."
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:

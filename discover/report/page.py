@@ -223,9 +223,11 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
     grey = [one for one in copies if not one["text"]]
     if not grey:
         return ""
-    reason = grey[0]["reason"].partition(". ")[0].rstrip(".")
+    reason = grey[0]["reason"].partition(". ")[0].rstrip(".").rpartition(": ")[2]
     names = listed([one["name"] for one in grey])
-    return f"{names} not available: {reason[:1].lower()}{reason[1:]}."
+    if any(one["name"] in reason for one in grey):
+        return f"{reason}."
+    return f"Not {names}: {reason[:1].lower()}{reason[1:]}."
 
 
 _TOGETHER = re.compile(
