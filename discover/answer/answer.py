@@ -185,24 +185,28 @@ class Suspect:
     constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
 
     @property
+    def amplitude(self) -> Constant | None:
+        """Its first constant, a pure number as a percentage."""
+        if not self.constants or self.constants[0].unit != "1":
+            return self.constants[0] if self.constants else None
+        one = self.constants[0]
+        ends = None if one.ci95 is None else (100.0 * one.ci95[0], 100.0 * one.ci95[1])
+        meaning = "" if one.meaning == one.name.replace("_", " ") else one.meaning
+        return replace(one, value=100.0 * one.value, ci95=ends, unit="%", meaning=meaning)
+
+    @property
     def text(self) -> str:
-        """Name and amplitude, with its interval; a pure number as a percentage."""
-        title = effect_title(self.effect)
-        if not self.constants:
+        """Name and amplitude, with its interval."""
+        title, amplitude = effect_title(self.effect), self.amplitude
+        if amplitude is None:
             return title
-        amplitude, share = self.constants[0], ""
-        if amplitude.unit == "1":
-            said = amplitude.meaning != amplitude.name.replace("_", " ")
-            share = f" {amplitude.meaning}" if amplitude.meaning and said else ""
-            ends = None if amplitude.ci95 is None else tuple(100.0 * e for e in amplitude.ci95)
-            value = 100.0 * amplitude.value
-            amplitude = replace(amplitude, value=value, ci95=ends, unit="%")
         if not amplitude.determined:
             return f"{title} not determined"
         if not self.is_established:
             return f"{title} {amplitude.number} (95 %: {amplitude.interval}), not established"
         if amplitude.at_end:
             return f"{title} {amplitude.at_end}"
+        share = f" {amplitude.meaning}" if amplitude.unit == "%" and amplitude.meaning else ""
         ends = f" (95 %: {amplitude.interval})" if amplitude.has_interval else ""
         return f"{title} {amplitude.number}{share}{ends}"
 

@@ -188,21 +188,22 @@ def expected(one: Any, place: str) -> str:
 
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
-    if not answer.suspects:
-        return ""
-    if len(answer.suspects) == 1:
-        return f"Suspect: {answer.suspects[0].text}."
-    names = [effect_title(one.effect) for one in answer.suspects[:_MOST_CONSTANTS]]
-    names += [f"{more} more"] if (more := len(answer.suspects) - len(names)) else []
-    separate = all(one.is_separate for one in answer.suspects)
-    return f"Suspects{'' if separate else ', not separable'}: {listed(names)}."
+    if len(answer.suspects) < 2:
+        return "".join(f"Suspect: {one.text}." for one in answer.suspects)
+    names = listed([effect_title(one.effect) for one in answer.suspects])
+    return f"Suspects{'' if separable(answer) else ', not separable'}: {names}."
+
+
+def separable(answer: Any) -> bool:
+    """Return whether the runs give each suspect a size of its own."""
+    return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)
 
 
 def further(answer: Any) -> list[str]:
-    """Return what stands below the table: instrument and other law, tolerance and failed test."""
+    """Return what stands below the table: another law, tolerance and failed test."""
     behind = "" if answer.is_empirical else answer.alternative
-    pairs = (suspects(answer), behind), (tolerance(answer), answer.failed)
-    return [" ".join(filter(None, pair)) for pair in pairs if any(pair)]
+    return [one for one in (behind, " ".join(filter(None, [tolerance(answer), answer.failed])))
+            if one]  # fmt: skip
 
 
 def lines(answer: Any) -> list[str]:
@@ -218,6 +219,6 @@ def lines(answer: Any) -> list[str]:
                 text += f", beyond the range {percent_of(one.beyond)}{at}"
             parts.append(text)
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    found += further(answer)
+    found += [suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

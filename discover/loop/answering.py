@@ -184,7 +184,7 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        return f"The residual is systematic (p {p})."
+        return f"Residual systematic (p {p})."
     return ""
 
 
@@ -238,13 +238,13 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         return None, title, tuple(found)
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
-    if name == "ucm" and not _shows_a_derivative(result):
+    if name == "ucm" and not shows_a_derivative(result):
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
 
 
-def _shows_a_derivative(result: Any) -> bool:
+def shows_a_derivative(result: Any) -> bool:
     """Return whether runs determine the convected derivative of a law without a nonlinear term.
 
     Its σ12 in shear is the linear one, so it takes a normal stress or an extension, or that nothing

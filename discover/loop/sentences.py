@@ -113,8 +113,7 @@ def _of_the_instrument(result: Any) -> str:
     first = next(iter(suspected(result)), None)
     if first is None:
         return ""
-    check = _as_clause(first.check).partition("; ")[0]  # the section on effects has all of it
-    return f"To confirm {effect_title(first.effect)}, {check}."
+    return f"To confirm {effect_title(first.effect)}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:

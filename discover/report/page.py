@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer
+from discover.answer import Answer, Suspect
 from discover.answer.sentences import (
     SYMBOLS,
     description,
@@ -25,6 +25,7 @@ from discover.answer.sentences import (
     further,
     law,
     linear_part,
+    separable,
     where,
 )
 from discover.equations import Equation
@@ -35,7 +36,7 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import estimate, interval, listed, readable, significant
+from discover.words import effect_title, estimate, interval, listed, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -195,7 +196,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "constants": [
             (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
-        ],
+        ]
+        + [_suspected(one, separable(answer)) for one in answer.suspects],
         "expected": [
             {
                 "symbol": symbol,
@@ -216,6 +218,17 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
+
+
+def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
+    """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
+    title, note = effect_title(one.effect), "suspected"
+    if one.amplitude is None or not separable:
+        return title, note, "not separable" if not separable else "–", "–"
+    number = one.amplitude.at_end.partition(",")[0] or one.amplitude.number
+    if one.amplitude.unit == "%" and one.amplitude.meaning:
+        note = f"{one.amplitude.meaning}; {note}"
+    return title, note, _in_cell(number), _in_cell(one.amplitude.interval)
 
 
 def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
