@@ -340,7 +340,7 @@ def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> 
 
 
 def _turns(record: RunRecord) -> bool:
-    return record.is_transient and np.min(record.rate) < -_TURNS * record.fastest
+    return record.is_transient and bool(np.min(record.rate) < -_TURNS * record.fastest)
 
 
 def _rates_of(record: RunRecord) -> list[float]:

@@ -261,6 +261,6 @@ def test_a_chance_and_a_level_keep_to_a_line():
 
 def test_numbers_keep_to_a_line_with_their_units():
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
-    (row,) = answer_screen(exact)["constants"]
+    row, _ = answer_screen(exact)["constants"]
     assert " " not in row[2].replace(" ×", "")  # a break at most before the power of ten
     assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]
