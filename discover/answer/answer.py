@@ -76,7 +76,8 @@ class Constant:
     def said(self) -> str:
         """What it is, in a few words; empty of a term, and where nobody said."""
         name = self.name.rpartition(".")[2]
-        return self.meaning or _SYMBOLS.get(name, ("", ""))[1]
+        said = self.meaning or _SYMBOLS.get(name, ("", ""))[1]
+        return said.removeprefix("inverse ") if self.reciprocal is not self else said
 
     @property
     def number(self) -> str:
