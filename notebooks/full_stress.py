@@ -27,7 +27,7 @@ import numpy as np
 import pandas as pd
 import pysindy as ps
 from scipy.integrate import solve_ivp
-from scipy.linalg import null_space
+from scipy.optimize import lsq_linear
 
 import discover as dc
 
@@ -83,22 +83,22 @@ places = {"11: σ12²": (0, "s12^2"), "22: σ12²": (1, "s12^2")}
 places |= {"12: σ11 σ12": (2, "s11 s12"), "12: σ22 σ12": (2, "s22 s12")}
 
 
-def mobilities(model):
+def mobilities(found):
     """Return what stands for −α at each of its four places."""
-    found, features = model.coefficients(), model.get_feature_names()
-    return {place: found[row, features.index(name)] for place, (row, name) in places.items()}
+    known = free.get_feature_names()
+    return {place: found[row, known.index(name)] for place, (row, name) in places.items()}
 
 
-pd.Series(mobilities(free), name="should all be −0.3").round(3).to_frame()
+pd.Series(mobilities(free.coefficients()), name="should all be −0.3").round(3).to_frame()
 
 # %% [markdown]
 # ## Frame invariance as constraints
 #
 # The upper convected production and the tensors of the library span all polynomials of this degree
-# that do not depend on the observer (and do not vanish in shear). Whatever is orthogonal to them
-# must vanish: equality constraints on the coefficients. One further inequality says that the
-# coefficient of σ·σ cannot be positive, as a mobility is not negative. For inequalities pysindy
-# needs cvxpy: `pip install "discover-rheology[cvxpy]"`.
+# that do not depend on the observer (and do not vanish in shear). So the coefficients of all three
+# equations together are a combination of five known matrices, one number each; and the number of
+# σ·σ cannot be positive, as a mobility is not negative: bounded least squares. (pysindy's
+# `ConstrainedSR3` takes the same as constraints, and needs `pip install "discover-rheology[cvxpy]"`.)
 
 # %%
 import jax
@@ -125,31 +125,21 @@ anywhere = random.standard_normal((200, 4))
 products = np.asarray(ps.PolynomialLibrary(degree=2, include_bias=False).fit_transform(anywhere))
 values = np.asarray(jax.vmap(tensors)(jnp.asarray(anywhere)))  # sample, tensor, component
 spanned = np.stack(
-    [np.linalg.lstsq(products, values[:, k], rcond=None)[0].ravel() for k in range(len(KEPT) + 1)]
-)
-forbidden = null_space(spanned).T
-mobility = np.linalg.pinv(spanned)[:, [1 + KEPT.index("sigma.sigma")]].T
-print(f"{len(forbidden)} equalities leave {len(spanned)} of {spanned.shape[1]} coefficients")
+    [np.linalg.lstsq(products, values[:, k], rcond=None)[0].T for k in range(len(KEPT) + 1)]
+)  # coefficients by tensor, component and feature
+differentiate = settings["differentiation_method"]
+slopes = np.vstack([differentiate(s, times) for s in stresses])
+states = np.hstack([np.vstack(stresses), np.vstack(controls)])
+features = np.asarray(ps.PolynomialLibrary(degree=2, include_bias=False).fit_transform(states))
+columns = np.einsum("nf,tkf->nkt", features, spanned)
+limits = np.full(len(KEPT) + 1, np.inf)
+limits[1 + KEPT.index("sigma.sigma")] = 0.0
+numbers = lsq_linear(columns.reshape(-1, len(limits)), slopes.ravel(), (-np.inf, limits)).x
+tied = np.tensordot(numbers, spanned, 1)
+pd.Series(numbers, index=["production", *KEPT], name="coefficient").round(3).to_frame()
 
 # %%
-optimizer = ps.ConstrainedSR3(
-    constraint_lhs=np.vstack([mobility, forbidden]),  # pysindy wants inequalities first
-    constraint_rhs=np.zeros(1 + len(forbidden)),
-    constraint_separation_index=1,
-    constraint_order="feature",
-    equality_constraints=True,
-    inequality_constraints=True,
-    regularizer="l1",
-    reg_weight_lam=1e-3,
-    max_iter=20_000,  # of the convex solver, which pysindy's default of 30 stops too early
-    tol=1e-8,
-)
-tied = ps.SINDy(optimizer=optimizer, **settings)
-tied.fit(stresses, t=times, u=controls, feature_names=names)
-tied.print(precision=3)
-
-# %%
-both = pd.DataFrame({"free": mobilities(free), "constrained": mobilities(tied)})
+both = pd.DataFrame({"free": mobilities(free.coefficients()), "constrained": mobilities(tied)})
 axes = both.plot.bar(rot=0, figsize=(7, 3), ylabel="coefficient")
 axes.axhline(-ALPHA, color="black", linestyle=":")
 plt.show()
@@ -162,10 +152,7 @@ plt.show()
 # optimiser will do.
 
 # %%
-differentiate = settings["differentiation_method"]
-slopes = np.vstack([differentiate(s, times) for s in stresses])
-columns = jax.vmap(tensors)(jnp.asarray(np.hstack([np.vstack(stresses), np.vstack(controls)])))
-columns = np.asarray(columns)
+columns = np.asarray(jax.vmap(tensors)(jnp.asarray(states)))
 target = (slopes - columns[:, 0]).ravel()
 design = columns[:, 1:].transpose(0, 2, 1).reshape(target.size, -1)
 stacked = ps.STLSQ(threshold=0.05).fit(design, target[:, None])

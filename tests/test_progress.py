@@ -45,6 +45,13 @@ RECORDED = {
         (96.07, "exchanged: 134 sets"), (127.87, "curves of one variable"),
         (136.27, "bands, intervals and the next test"), (141.83, "drawing"), (145.41, "end"),
     ],
+    # wall-clock seconds of a busy machine, one mode
+    "blood, one mode and seven effects, at most 2 effects": [
+        (24.8, "search among 7 effects"), (67.8, "sets of 1: 7 fitted"),
+        (154.4, "sets of 2: 15 fitted"), (228.5, "exchanged: 26 sets"),
+        (405.4, "curves of one variable"), (513.9, "bands, intervals and the next test"),
+        (665.3, "end"),
+    ],
 }  # fmt: skip
 
 
@@ -57,7 +64,7 @@ def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_
 
     whole = FollowedBy(lambda text, fraction: told.append(fraction), 2.5, clock)
     say = by_time(whole, clock)
-    search = SearchTime(int(name[-9]), True, clock=clock)
+    search = SearchTime(int(name[-9]), "one mode" not in name, clock=clock)
     end, checked = RECORDED[name][-1][0], 0
     for now, line in RECORDED[name][:-1]:  # the clock reads it
         whole(line, 1.0) if line == "drawing" else say(line, search.heard(line))
@@ -66,21 +73,22 @@ def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_
             assert 1.0 / 1.5 < left / (end - now) < 1.5, line
             checked += 1
     assert told == sorted(told)
-    assert checked > 10
+    assert checked > (10 if len(RECORDED[name]) > 10 else 4)
 
 
 def test_rounds_that_leave_a_run_out_each_take_as_long_as_the_first():
     now = 0.0
     search = SearchTime(1, False, rounds=3, clock=lambda: now)
-    round_ = [(0.0, "search among 10 effects"), (1.0, "sets of 1: 10 fitted"),
-              (1.0, "exchanged: 10 sets"), (10.0, "curves of one variable"),
-              (13.8, "bands, intervals and the next test")]  # fmt: skip
-    for begins in (0.0, 17.8, 35.6):
+    # ten fits a second, none exchanged; 90, 38 and 40 fits follow
+    round_ = [(0.0, "search among 400 effects"), (40.0, "sets of 1: 400 fitted"),
+              (40.0, "exchanged: 400 sets"), (49.0, "curves of one variable"),
+              (52.8, "bands, intervals and the next test")]  # fmt: skip
+    for begins in (0.0, 56.8, 113.6):
         for after, line in round_:
             now = begins + after
             left = search.heard(f"without a: {line}")
             if after:
-                assert left == pytest.approx(53.4 - now, rel=0.2), (begins, line)
+                assert left == pytest.approx(170.4 - now, rel=0.2), (begins, line)
 
 
 def test_last_words_are_said_backwards_and_one_that_fails_stops_none():

@@ -76,7 +76,8 @@ class Constant:
     def said(self) -> str:
         """What it is, in a few words; empty of a term, and where nobody said."""
         name = self.name.rpartition(".")[2]
-        return self.meaning or _SYMBOLS.get(name, ("", ""))[1]
+        said = self.meaning or _SYMBOLS.get(name, ("", ""))[1]
+        return said.removeprefix("inverse ") if self.reciprocal is not self else said
 
     @property
     def number(self) -> str:
@@ -99,12 +100,24 @@ class Constant:
             return f"{first} to {last}" if low < 0.0 else f"{first}–{last}"
         return interval(self.ci95)
 
+    @property
+    def digits(self) -> int:
+        """Significant digits of the value in an equation: those of the interval, three at most."""
+        if not self.has_interval or self.ci95 is None or not self.value:
+            return 3
+        of_width = math.floor(math.log10(self.ci95[1] - self.ci95[0]))
+        return min(max(2 + math.floor(math.log10(abs(self.value))) - of_width, 1), 3)
+
     def _rounded(self, value: float) -> str:
-        """Return a number to two digits of the interval's width; empty where it needs a power."""
+        """Return a number to two digits of the interval's width; empty where it needs a power.
+
+        And to three digits in all, unless the ends of the interval would be one number.
+        """
         if self.ci95 is None or not 0.0 < (width := self.ci95[1] - self.ci95[0]) < math.inf:
             return ""
         largest = max(map(abs, (*self.ci95, self.value)))
-        decimals = 1 - math.floor(math.log10(width))
+        of_width, of_value = (math.floor(math.log10(size)) for size in (width, largest))
+        decimals = min(1 - of_width, max(2 - of_value, -of_width))
         if not 1e-3 <= largest < 1e5 or decimals > 6:
             return ""
         text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
@@ -173,24 +186,28 @@ class Suspect:
     constants: tuple[Constant, ...] = ()  # its constants with their intervals, the amplitude first
 
     @property
+    def amplitude(self) -> Constant | None:
+        """Its first constant, a pure number as a percentage."""
+        if not self.constants or self.constants[0].unit != "1":
+            return self.constants[0] if self.constants else None
+        one = self.constants[0]
+        ends = None if one.ci95 is None else (100.0 * one.ci95[0], 100.0 * one.ci95[1])
+        meaning = "" if one.meaning == one.name.replace("_", " ") else one.meaning
+        return replace(one, value=100.0 * one.value, ci95=ends, unit="%", meaning=meaning)
+
+    @property
     def text(self) -> str:
-        """Name and amplitude, with its interval; a pure number as a percentage."""
-        title = effect_title(self.effect)
-        if not self.constants:
+        """Name and amplitude, with its interval."""
+        title, amplitude = effect_title(self.effect), self.amplitude
+        if amplitude is None:
             return title
-        amplitude, share = self.constants[0], ""
-        if amplitude.unit == "1":
-            said = amplitude.meaning != amplitude.name.replace("_", " ")
-            share = f" {amplitude.meaning}" if amplitude.meaning and said else ""
-            ends = None if amplitude.ci95 is None else tuple(100.0 * e for e in amplitude.ci95)
-            value = 100.0 * amplitude.value
-            amplitude = replace(amplitude, value=value, ci95=ends, unit="%")
         if not amplitude.determined:
             return f"{title} not determined"
         if not self.is_established:
             return f"{title} {amplitude.number} (95 %: {amplitude.interval}), not established"
         if amplitude.at_end:
             return f"{title} {amplitude.at_end}"
+        share = f" {amplitude.meaning}" if amplitude.unit == "%" and amplitude.meaning else ""
         ends = f" (95 %: {amplitude.interval})" if amplitude.has_interval else ""
         return f"{title} {amplitude.number}{share}{ends}"
 
@@ -231,15 +248,15 @@ class Range:
 class ExpectedError:
     """Relative error that a prediction of one quantity is expected to have.
 
-    `inside`, `beyond`: inside the range of the data and beyond it (rates up to twice as fast); None
-        where unknown.
+    `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
+    `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note` in a few words why, or on what the numbers rest: ``if Giesekus; networks differ by 1.3
-        %``.
+    `note`: why it is unknown, or on what it rests: ``if Giesekus; not measured``.
     """
 
     inside: float | None = None
     beyond: float | None = None
+    beyond_at: str = ""
     missing: Literal["untested", "not determined", "not modelled"] = "untested"
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
@@ -276,7 +293,7 @@ class Answer:
         them.
     `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
     `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
-    `discrepancy`: size of what it leaves beside noise; None where unknown.
+    `discrepancy`: size of what it leaves besides noise; None where unknown.
     `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
     `equation`: law written out; None where it cannot be.
     `shown`: law as a page shows it where it cannot be written out, constants that differ from mode
@@ -294,7 +311,7 @@ class Answer:
     ...     range=Range((1.0, 2.0), (0.25, 1.0)),
     ... )
     >>> answer.headline.partition(". ")[0]
-    'Giesekus, α = 0.2000 (95 %: 0.1990–0.2010)'
+    'Giesekus, α = 0.200 (95 %: 0.199–0.201)'
     >>> answer.adequate
     True
     """

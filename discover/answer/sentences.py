@@ -73,8 +73,7 @@ def description(answer: Any) -> str:
     size = f"{percent_of(found.size)}{ends}"
     subtracted = f", noise {noise} subtracted" if noise else ""
     if answer.is_empirical and answer.alternative:  # behind the best classical law
-        runs = "unseen" if found.unseen else "fitted"
-        return f"The fit: {size} on {runs} runs{subtracted}."
+        return f"The fit: {size} on {'unseen' if found.unseen else 'fitted'} runs."
     # of fitted runs it is no error that a prediction could have
     of = "Model error on unseen runs" if found.unseen else "Residual of the fitted runs"
     return f"{of} {size}{subtracted}."
@@ -106,11 +105,9 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
-    if answer.adequate is not False:
-        return f"Use in {place}."
-    if answer.size > _USELESS:
+    if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
-    return f"Use to that accuracy only, in {place}."
+    return f"Use in {place}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -135,7 +132,9 @@ def linear_part(answer: Any) -> str:
         modulus = f"G = {significant(answer.modes[0].modulus_Pa, 3)} Pa"
         found = [modulus, f"λ = {significant(times[0], 3)} s"]
     else:
-        found = ["G", f"λ = {span((min(times), max(times)))} s"] if times else []
+        moduli = [mode.modulus_Pa for mode in answer.modes]
+        found = [f"G = {span((min(moduli), max(moduli)))} Pa"] if times else []
+        found += [f"λ = {span((min(times), max(times)))} s"] if times else []
     if answer.solvent_viscosity_Pa_s:
         found.append(f"η_s = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
     return ", ".join(found)
@@ -155,21 +154,19 @@ def tolerance(answer: Any) -> str:
     where_over = ""
     if over:
         worst = max(over, key=lambda name: over[name])
-        place = f"{worst}, {percent_of(over[worst])}"
-        where_over = f"{counted(len(over), 'run')} exceed it (worst: {place})"
-        if len(over) == 1:
-            where_over = f"1 run exceeds it ({place})"
+        first = "worst: " if len(over) > 1 else ""
+        where_over = f"{counted(len(over), 'run')} ({first}{worst}, {percent_of(over[worst])})"
     if not answer.adequate and not (missed or where_over):
         said = "not met"
     elif not answer.adequate or missed:
         # stress is what it is about, unless others miss it as well
         of = "" if missed in ([], [SYMBOLS["sigma12"]]) else f" for {listed(missed)}"
         met_for = f"met for {listed(met)}, " if met and of else ""
-        said = f"{met_for}not met{of}{f': {where_over}' if where_over else ''}"
+        said = f"{met_for}not met{of}{f' in {where_over}' if where_over else ''}"
     else:
         residual = answer.expected("sigma12").is_residual
         of = " by the fitted runs" if residual else f" for {listed(met)}" if met else ""
-        said = f"met{of}{f'; {where_over}' if where_over else ''}"
+        said = f"met{of}{f', but not in {where_over}' if where_over else ''}"
     parts = [f"Tolerance {asked}: {said}"]
     if assumed:
         parts.append(f"{listed(assumed)} within it if this law holds, not measured")
@@ -185,29 +182,28 @@ def expected(one: Any, place: str) -> str:
     """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
-        return percent_of(value)
+        return percent_of(value) if value else "within noise"
     return "–" if one.is_known else one.missing
 
 
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
-    several = [one.text for one in answer.suspects[:_MOST_CONSTANTS]]
-    if more := len(answer.suspects) - len(several):
-        several.append(f"{more} more")
-    if not several:
-        return ""
-    apart = len(several) == 1 or all(one.is_separate for one in answer.suspects)
-    if apart:
-        return f"Suspect {listed(several)}."
-    names = [effect_title(one.effect) for one in answer.suspects[:_MOST_CONSTANTS]]
-    return f"Suspects, not separable: {listed(names + several[_MOST_CONSTANTS:])}."
+    if len(answer.suspects) < 2:
+        return "".join(f"Suspect: {one.text}." for one in answer.suspects)
+    names = listed([effect_title(one.effect) for one in answer.suspects])
+    return f"Suspects{'' if separable(answer) else ', not separable'}: {names}."
+
+
+def separable(answer: Any) -> bool:
+    """Return whether the runs give each suspect a size of its own."""
+    return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)
 
 
 def further(answer: Any) -> list[str]:
-    """Return what stands below the table: instrument and other law, tolerance and failed test."""
+    """Return what stands below the table: another law, tolerance and failed test."""
     behind = "" if answer.is_empirical else answer.alternative
-    pairs = (suspects(answer), behind), (tolerance(answer), answer.failed)
-    return [" ".join(filter(None, pair)) for pair in pairs if any(pair)]
+    return [one for one in (behind, " ".join(filter(None, [tolerance(answer), answer.failed])))
+            if one]  # fmt: skip
 
 
 def lines(answer: Any) -> list[str]:
@@ -217,11 +213,12 @@ def lines(answer: Any) -> list[str]:
         parts = []
         for name, symbol in SYMBOLS.items():
             one = answer.expected(name)
-            text = f"{symbol} {expected(one, 'inside')}"
+            text = f"{symbol} {expected(one, 'inside')}{f' ({one.note})' if one.note else ''}"
             if one.beyond is not None:
-                text += f", {percent_of(one.beyond)} beyond"
-            parts.append(f"{text} ({one.note})" if one.note else text)
+                at = f" ({one.beyond_at})" if one.beyond_at else ""
+                text += f", beyond the range {percent_of(one.beyond)}{at}"
+            parts.append(text)
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    found += further(answer)
+    found += [suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -93,7 +93,7 @@ def fit(
 
 
 def _write(found, out: Path, overwrite: bool) -> None:
-    """Write the page and what stands beside it into a folder that holds nothing else."""
+    """Write the page and its files into a folder that holds nothing else."""
     from discover.report.in_memory import fit_files, fit_page
     from discover.study.run_folder import RunFolder
 

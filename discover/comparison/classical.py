@@ -1,4 +1,4 @@
-"""The classical laws fitted to the same runs, each a hypothesis beside the same instrument."""
+"""The classical laws fitted to the same runs, each a hypothesis with the same instrument."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -68,7 +68,7 @@ def fit_classical_laws(
     bench = [] if best is None else [
         effects[name] for name in best.names if not isinstance(effects[name], ConstitutiveEffect)
     ]  # fmt: skip
-    tried = _beside_maxwell(found, bench)
+    tried = _added_to_ucm(found, bench)
     for name in dict.fromkeys(further):
         if name not in tried:
             tried[name] = _of_law(found, name, bench)
@@ -78,8 +78,8 @@ def fit_classical_laws(
     return tuple(_result(name, *one, judged, least) for name, one in tried.items())
 
 
-def _beside_maxwell(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
-    """Return the classical laws as effects beside upper convected Maxwell, fitted side by side."""
+def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
+    """Return the classical laws as effects added to upper convected Maxwell."""
     problem = found.posterior.problem
     declared = problem.declared
     is_maxwell = isinstance(declared.law, UpperConvectedMaxwell) and declared.law.linear_relaxation

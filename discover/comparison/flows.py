@@ -65,7 +65,7 @@ class Flow:
     training_end: float | None = None
     oscillatory: bool = False  # whether Lissajous curves make sense
     commanded: protocols.FlowProtocol | None = None
-    weight: float = 1.0  # how much its samples weigh in fits beside those of other runs; see `Run`
+    weight: float = 1.0  # weight of its samples relative to those of other runs; see `Run`
 
     @property
     def _imposed(self) -> protocols.FlowProtocol:

@@ -38,7 +38,7 @@ MOST_EFFECTS = 3
 def search_hypotheses(
     study: Study, data: StudyData, declared: DeclaredModel, library: TermLibrary, say: Say
 ) -> Found:
-    """Return the posterior over what a search finds beside the known part.
+    """Return the posterior over what a search adds to the known part.
 
     Candidates are every named effect, of fluid and instrument, and every library term. What of the
     known part is to be fitted is fitted with every hypothesis. `say`: takes a line of text.

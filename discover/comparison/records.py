@@ -79,8 +79,8 @@ def _with_effect(
     for term in terms:
         base = None if isinstance(law, UpperConvectedMaxwell) else law
         law = law_of_terms(LawTerms.of([term]), law.linear_relaxation, base)
-    beside = np.asarray(effect.instantaneous_stress(values, jnp.asarray(_RATES)))
-    if not np.isclose(beside[1], _RATES[1] * beside[0], rtol=1e-9):
+    viscous = np.asarray(effect.instantaneous_stress(values, jnp.asarray(_RATES)))
+    if not np.isclose(viscous[1], _RATES[1] * viscous[0], rtol=1e-9):
         raise InputError(
             f"compare cannot take {known.name} as known: learners know no stress besides the "
             f"modes but a solvent's. {ONLY_LOOP}"
@@ -99,7 +99,7 @@ def _with_effect(
         law_name=f"{declared.law_name} with {known.text}" if terms else declared.law_name,
         modulus=modulus,
         relaxation_time=relaxation_time,
-        solvent_viscosity=declared.solvent_viscosity + float(beside[0]),
+        solvent_viscosity=declared.solvent_viscosity + float(viscous[0]),
     )
 
 

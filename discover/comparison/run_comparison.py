@@ -105,7 +105,7 @@ def data_in_words(data: StudyData, study: Study) -> str:
     """Return what is fitted of which data."""
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
-    # what is recorded beside σ12 is data of its own, and no other run
+    # what is recorded in addition to σ12 is data of its own, and no other run
     fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
     runs = f"{recorded} of {_runs(fitted)} ({samples} samples)"
     made = study.data.synthetic

@@ -29,7 +29,13 @@ from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
-from discover.loop.by_quantity import beyond_noise, errors_by_quantity, of_stress, with_unseen
+from discover.loop.by_quantity import (
+    beyond_noise,
+    errors_by_quantity,
+    normal_stress_settled,
+    of_stress,
+    with_unseen,
+)
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import effect_title, effects_title, listed, percent_of, readable
@@ -40,11 +46,14 @@ _MOST_ADDED = 2
 _SETTLED = 0.95
 """Probability from which on nothing is said of other laws."""
 
-_ABOVE = 1.1
-"""Residual over noise from which on it is told as larger than noise."""
-
 _TURNS = 0.5
 """Share of the largest rate that a flow reaches in the other direction, if it oscillates."""
+
+_STAYS = 0.05
+"""Share of the time of a run for which it is at most as slow as the slowest rate of its range."""
+
+_AT_REST = 1e-3
+"""Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop."""
 
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
@@ -175,9 +184,7 @@ def _failed(result: Any) -> str:
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        if result.error_after.fit < _ABOVE * result.noise_floor:
-            return f"The residual is systematic (p {p})."
-        return f"No law reaches the noise (p {p})."
+        return f"Residual systematic (p {p})."
     return ""
 
 
@@ -197,7 +204,7 @@ def _alternative(result: Any) -> str:
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *sentences.constants(constants)]
-    return f"Best classical law: {', '.join(said)}, model error {percent_of(near.size)}."
+    return f"Best classical law: {', '.join(said)}, error {percent_of(near.size)}."
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -223,7 +230,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             title = LAWS[LAW_OF_EFFECT[core]].title
         added = [effect_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
-            found = _beside(base[1], found)
+            found = _law_first(base[1], found)
         if added:
             title = f"{title} with {listed(added)}"
         if len(added) > _MOST_ADDED or any(one.is_term for one in found):
@@ -231,10 +238,24 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         return None, title, tuple(found)
     name, values = named
     title = LAWS[name].title + (" with solvent" if solvent else "")
-    return name, title, tuple(_beside(values, found))
+    if name == "ucm" and not shows_a_derivative(result):
+        title = title.replace(LAWS[name].title, "linear viscoelastic")
+        title += " (no nonlinear law determined)"
+    return name, title, tuple(_law_first(values, found))
 
 
-def _beside(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:
+def shows_a_derivative(result: Any) -> bool:
+    """Return whether runs determine the convected derivative of a law without a nonlinear term.
+
+    Its σ12 in shear is the linear one, so it takes a normal stress or an extension, or that nothing
+    nonlinear fits as well.
+    """
+    seen = [(r.flow, r.quantity) for r in result.records if not r.held_out]
+    other = any(flow != "shear" or quantity in ("N1", "N2") for flow, quantity in seen)
+    return other or normal_stress_settled(result)
+
+
+def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[Constant]:
     """Return the constants of a law first, with the intervals of those that were fitted."""
     left, own = list(found), []
     for name, value in values.items():
@@ -291,7 +312,8 @@ def _renamed(
 def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> Range:
     """Return the flows of the fitted runs, in numbers without units if the equation has them.
 
-    Of a flow curve each sample has a rate of its own, of other runs the largest counts.
+    Of a flow curve each sample counts, of an oscillation the amplitude, of other runs the largest
+    rate and the smallest at which the run stays.
     """
     fitted = [record for record in records if not record.held_out]
     flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
@@ -301,15 +323,10 @@ def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> 
         frequencies = np.concatenate([record.rate / record.strain for record in fitted])
         ends = float(np.min(frequencies)), float(np.max(frequencies))
         return Range(None, None, strain, None, ends, flows)
-    rates = [
-        float(rate)
-        for r in fitted
-        for rate in ([r.fastest] if r.is_transient else np.abs(r.rate))
-        if rate > 0.0 and r.control != "oscillation"
-    ]
+    turned = [r for r in fitted if _turns(r)]
+    rates = [rate for r in fitted for rate in _rates_of(r) if rate > 0.0]
     box = None if equation is None or equation.tested is None else equation.tested.learned_in
     # one that turns has a frequency besides its rate
-    turned = [r for r in fitted if r.is_transient and np.min(r.rate) < -_TURNS * r.fastest]
     found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
     return Range(
         None if box is None else box.weissenberg,
@@ -320,3 +337,24 @@ def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> 
         flows,
         bool(turned),
     )
+
+
+def _turns(record: RunRecord) -> bool:
+    return record.is_transient and bool(np.min(record.rate) < -_TURNS * record.fastest)
+
+
+def _rates_of(record: RunRecord) -> list[float]:
+    """Return the slowest rate at which a run stays and its fastest; of states each."""
+    if record.control == "oscillation":
+        return []
+    if _turns(record):
+        return [record.fastest]
+    rates = np.abs(record.rate)
+    if not record.is_transient:
+        return [float(rate) for rate in rates]
+    lasting = np.gradient(record.time) if len(rates) > 1 else np.ones(1)
+    moving = np.flatnonzero(rates > _AT_REST * record.fastest)
+    order = moving[np.argsort(rates[moving])]
+    passed = np.cumsum(lasting[order])
+    slowest = order[np.searchsorted(passed, _STAYS * passed[-1])] if len(order) else 0
+    return [float(rates[slowest]), record.fastest]

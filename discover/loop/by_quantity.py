@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from discover.answer import Discrepancy, ExpectedError
+from discover.answer import Discrepancy, ExpectedError, sentences
 from discover.loop.run_record import RunRecord
 from discover.words import percent_of
+
+BEYOND = 2.0
+"""Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
 MUCH = 2.0
 """Relative difference from which on its size says nothing."""
@@ -23,7 +26,9 @@ _WORTH_SAYING = 0.05
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
-_UNSEEN, _FITTED = "unseen runs, noise subtracted", "fitted runs, residual"
+_UNSEEN, _FITTED = "unseen runs, noise subtracted", "fitted runs, noise subtracted"
+
+_TWICE = f"predicted at {BEYOND:g}× the rate"
 
 
 def beyond_noise(error: float, noise: float | None) -> float:
@@ -91,8 +96,7 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
     `name`: law on which they rest.
     """
     found = {"sigma12": of_stress(result)}
-    n1 = differing(result, "N1")
-    settled = n1 is not None and n1 < _APART and not _only_linear(result)
+    settled = normal_stress_settled(result)
     for kind in ("N1", "N2", "uniaxial"):
         own = measured(result.records, kind, result.noise_floor)
         if own is not None:
@@ -103,7 +107,7 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             note = f"if {name}; not measured"
-            found[kind] = ExpectedError(apart, beyond, note=note, is_measured=False)
+            found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N1":
             found[kind] = ExpectedError(missing="not determined", note=differ)
         elif kind == "N2":
@@ -116,6 +120,12 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
+
+
+def normal_stress_settled(result: Any) -> bool:
+    """Return whether laws that describe the runs as well have one N1: more than linear response."""
+    apart = differing(result, "N1")
+    return apart is not None and apart < _APART and not _only_linear(result)
 
 
 def differing(result: Any, kind: str) -> float | None:
@@ -138,16 +148,16 @@ def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    fast = [_missed(r, result) for r in held if r.fastest > _FASTER * fastest]
+    fast = [r for r in held if r.fastest > _FASTER * fastest]
     errors = unseen_errors(result)
-    inside, beyond = _rms(errors), _rms(fast)
+    inside, beyond, at = _rms(errors), _rms([_missed(r, result) for r in fast]), _measured_at(fast)
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
-        beyond = max(spread.beyond, inside or 0.0)
+        beyond, at = max(spread.beyond, inside or 0.0), _TWICE
     if inside is None and result.material is not None:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
-        return ExpectedError(inside, beyond, note=_FITTED, is_residual=True)
-    return ExpectedError(inside, beyond, note=_UNSEEN if errors or fast else "")
+        return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
+    return ExpectedError(inside, beyond, at, note=_UNSEEN if errors or fast else "")
 
 
 def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
@@ -160,14 +170,19 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
         return None
     held = [record for record in own if record.held_out]
     fastest = max((r.fastest for r in records if not r.held_out), default=0.0)
+    fast = [r for r in held if r.fastest > _FASTER * fastest]
+    slow = [r for r in (held or own) if r.fastest <= _FASTER * fastest]
     inside, beyond = (
-        _rms([beyond_noise(float(r.errors[-1]), noise) for r in some])
-        for some in (
-            [r for r in (held or own) if r.fastest <= _FASTER * fastest],
-            [r for r in held if r.fastest > _FASTER * fastest],
-        )
+        _rms([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    return ExpectedError(inside, beyond, note=_UNSEEN if held else _FITTED, is_residual=not held)
+    note = _UNSEEN if held else _FITTED
+    return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
+
+
+def _measured_at(fast: Sequence[RunRecord]) -> str:
+    """Return at which rate runs beyond the range were measured."""
+    rates = [record.fastest for record in fast]
+    return f"measured at {sentences.span((min(rates), max(rates)))} 1/s" if rates else ""
 
 
 def _is(record: RunRecord, kind: str) -> bool:

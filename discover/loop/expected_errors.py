@@ -11,13 +11,11 @@ from discover.forward import make_batch
 from discover.inference.engine import Posterior
 from discover.inference.engine.fits import Fit
 from discover.linear_algebra_threads import in_one_thread
+from discover.loop.by_quantity import BEYOND
 from discover.protocols import FlowProtocol, in_flow, start_up
 from discover.protocols.kinematics import RecordedQuantity
 from discover.protocols.protocol import shear_rates
 from discover.statistics.noise.noise_model import rms
-
-BEYOND = 2.0
-"""Rates beyond the fastest fitted one, at which errors beyond the range are given."""
 
 _LAWS, _DRAWS = 20, 4
 _TEMPERED = 0.5
@@ -38,11 +36,8 @@ _SHEAR: tuple[RecordedQuantity, ...] = ("sigma12", "N1", "N2")
 class Spread:
     """Root-mean-square difference between laws that describe the runs as well.
 
-    Attributes
-    ----------
-    inside, beyond
-        Over the rms of the quantity (N2: of N1), in flows inside and beyond the fitted rates; None
-        where a law diverges.
+    `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
+    fitted rates; None where a law diverges.
     """
 
     inside: float | None
@@ -55,12 +50,8 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
 
     See `weighed_laws`.
 
-    Parameters
-    ----------
-    posterior
-        What the runs say.
-    best
-        The law that is reported, from which differences are counted.
+    `posterior`: what the runs say. `best`: the law that is reported, from which differences are
+    counted.
     """
     runs = posterior.problem.fitted.runs
     weighed = weighed_laws(posterior)

@@ -68,14 +68,8 @@ def declared_law(
 ) -> Equation | None:
     """Return the declared law with its modes as fitted; None where it cannot be written out.
 
-    Parameters
-    ----------
-    declared
-        The declared model.
-    theta
-        Its constants.
-    by_mode
-        Constants of the law that differ from mode to mode.
+    `declared`: the declared model. `theta`: its constants. `by_mode`: constants of the law that
+    differ from mode to mode.
     """
     law = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
     if by_mode and declared.added_modes:

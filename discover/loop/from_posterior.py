@@ -188,7 +188,7 @@ class Ended(Path):
         return tuple(found)
 
     def rankings(self) -> tuple[tuple[CandidateScore, ...], ...]:
-        """Return the candidates beside each part of the likeliest hypothesis, the best first."""
+        """Return the candidates added to each part of the likeliest hypothesis, the best first."""
         search, fitter, found = self.posterior.search, self.posterior.search.fitter, []
         effects = self.posterior.problem.effects
         for fit in self.path:
@@ -304,16 +304,9 @@ def result_of(
 ) -> LoopResult:
     """Return the result of a loop.
 
-    Parameters
-    ----------
-    ended
-        The posterior that it ended with.
-    laws
-        Those that the declared one was chosen from.
-    spikes
-        Times of samples set aside as outliers, by run.
-    of_rates
-        That rates were read with noise which the fluid did not feel, in words; empty where not.
+    `ended`: the posterior that it ended with. `laws`: those that the declared one was chosen from.
+    `spikes`: times of samples set aside as outliers, by run. `of_rates`: that rates were read with
+    noise which the fluid did not feel, in words; empty where not.
     """
     problem, theta = ended.posterior.problem, ended.theta
     declared, model, by_mode = problem.declared, problem.model, ended.by_mode

@@ -22,10 +22,7 @@ _DECLARED = "declared"
 def labelled_loop(result: Any) -> "xarray.Dataset":
     """Return explanations, constants and predictions of a loop; see `LoopResult.to_xarray`.
 
-    Raises
-    ------
-    InputError
-        If xarray is not installed.
+    Raises InputError if xarray is not installed.
     """
     told = result.explanations
     explanations = told.likeliest_first

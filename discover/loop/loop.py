@@ -56,48 +56,27 @@ def run_loop(
 ) -> LoopResult:
     """Find what a declared model lacks, add it, and test the result on held-out runs.
 
-    Hypotheses are sets of effects beside the declared model, which is never exact: small instrument
-    errors are fitted jointly. All are weighed by evidence and prior, unknown effects among them;
-    see `discover.inference.engine`. Nothing is random.
+    Hypotheses are sets of effects added to the declared model, which is never exact: small
+    instrument errors are fitted jointly. All are weighed by evidence and prior, unknown effects
+    among them; see `discover.inference.engine`. Nothing is random.
 
-    Parameters
-    ----------
-    declared
-        The model to start from.
-    fit
-        Names of the runs to fit; by default all that are not held out.
-    held_out
-        Names of the held-out runs, which only test.
-    effects
-        Candidates, by name, by spelling of a library term, or as objects; ``"named"`` for every
-        effect with a name that is no candidate on request alone; by default these and every library
-        term up to one invariant.
-    max_effects
-        Largest number of effects added.
-    strain
-        Smallest and largest strain of the samples fitted and tested.
-    noise
-        Relative noise, where it is known; estimated along otherwise.
-    most_samples
-        Of a run with more samples at most so many are used, evenly chosen; of
-        one with little noise fewer, but no fewer than 150.
-    explanations
-        How many sets of effects are listed, at most.
-    laws
-        Named laws to choose the declared one from, by the fitted runs alone, each with the effects
-        likeliest beside it. By default it is as it was declared.
-    progress
-        Called with a line of text now and then.
-    loading
-        Relative standard deviation by which loadings of the sample differ, where each run is one of
-        its own: its record is then a factor of its own times what the model predicts, with that
-        deviation from one. By default there is no such factor.
+    `declared`: the model to start from. `fit`: names of the runs to fit; by default all that are
+    not held out. `held_out`: names of the held-out runs, which only test. `effects`: candidates, by
+    name, by spelling of a library term, or as objects; ``"named"`` for every effect with a name
+    that is no candidate on request alone; by default these and every library term up to one
+    invariant. `max_effects`: largest number of effects added. `strain`: smallest and largest strain
+    of the samples fitted and tested. `noise`: relative noise, where it is known; estimated along
+    otherwise. `most_samples`: of a run with more samples at most so many are used, evenly chosen;
+    of one with little noise fewer, but no fewer than 150. `explanations`: how many sets of effects
+    are listed, at most. `laws`: named laws to choose the declared one from, by the fitted runs
+    alone, each with its likeliest further effects. By default it is as it was declared.
+    `progress`: called with a line of text now and then. `loading`: relative standard deviation by
+    which loadings of the sample differ, where each run is one of its own: its record is then a
+    factor of its own times what the model predicts, with that deviation from one. By default there
+    is no such factor.
 
-    Raises
-    ------
-    InputError
-        If runs, window or effects are not as they should be, or the model diverges in the fitted
-        runs.
+    Raises InputError if runs, window or effects are not as they should be, or the model diverges in
+    the fitted runs.
     """
     started = time.perf_counter()
     task = Task.of_runs(
@@ -128,14 +107,9 @@ def run_loop_on(
 ) -> LoopResult:
     """Close the loop on data that are divided, and judge it by the runs held out.
 
-    Parameters
-    ----------
-    data
-        Runs to fit, and those held out: some, or each in turn.
-    declared, max_effects, **options
-        As in `run_loop`.
-    progress
-        Called with a line of text now and then, and about what fraction is done.
+    `data`: runs to fit, and those held out: some, or each in turn. `declared`, `max_effects`,
+    `**options`: as in `run_loop`. `progress`: called with a line of text now and then, and about
+    what fraction is done.
     """
     rounds = 1 + len(data.fit) if data.each else 1
     tell = by_time(progress)
@@ -165,17 +139,10 @@ def run_loop_on_each(
     without one run, so that neither its stress nor the choice of effects has seen it   [Stone 1974,
     J. R. Stat. Soc. B 36, 111]. They judge the way of finding a law rather than the one law found.
 
-    Parameters
-    ----------
-    dataset, declared, progress, **options
-        As in `run_loop`.
-    fit
-        Names of the runs; by default all.
+    `dataset`, `declared`, `progress`, `**options`: as in `run_loop`. `fit`: names of the runs; by
+    default all.
 
-    Raises
-    ------
-    InputError
-        As in `run_loop`, or if there are fewer than two runs.
+    Raises InputError as in `run_loop`, or if there are fewer than two runs.
     """
     names = list(dataset.names if fit is None else fit)
     if len(names) < 2:
@@ -220,16 +187,9 @@ def _with_folds(error: ErrorPair, left_out: Sequence[float]) -> ErrorPair:
 class Found:
     """What a search found in runs, before it is reported.
 
-    Attributes
-    ----------
-    task
-        What was searched.
-    posterior
-        Over the hypotheses that were fitted.
-    tried
-        The search with each law that the declared one was chosen from.
-    curves
-        Free functions of one variable that are likelier than all that has a name.
+    `task`: what was searched. `posterior`: over the hypotheses that were fitted. `tried`: the
+    search with each law that the declared one was chosen from. `curves`: free functions of one
+    variable that are likelier than all that has a name.
     """
 
     task: Task
@@ -277,7 +237,7 @@ def search(task: Task, laws: Sequence[str] = ()) -> Found:
 def without_fluid(posterior: Posterior) -> bool:
     """Return whether noise and instrument errors alone, without a fluid, are as likely.
 
-    Such records hold no curve beside their noise either; where they do, it is the model that is
+    Such records hold no curve besides their noise either; where they do, it is the model that is
     wrong.
     """
     search, problem = posterior.search, posterior.problem

@@ -56,66 +56,33 @@ if TYPE_CHECKING:
 class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     """The outcome of a closed loop.
 
-    Attributes
-    ----------
-    verdict
-        What is to be believed.
-    error_before, error_after
-        Of the declared and of the augmented model.
-    noise_floor
-        Relative noise, mean over the fitted runs.
-    stages
-        Effects added, in order.
-    remaining
-        The residual, and whether it is systematic.
-    rankings
-        Candidates at each stage, and those that earned nothing at the last.
-    records
-        Every run with its predictions.
-    declared_parameters
-        What was fitted of the declared model: modulus in Pa and relaxation time in s, or for
-        several modes a common factor on each, and parameters of the law; those that may differ
-        from mode to mode are a `ConstantByMode`.
-    declared_effects
-        Effects that were part of the declared model, and so are no finding.
-    declared_law
-        The declared law with its modes as finally fitted, without effects; None where it cannot be
-        written out.
-    fluid
-        The augmented fluid, without instrument effects; None where an effect gives it a state that
-        no law of stress and rate can carry, or where its constants differ from mode to mode.
-    fluid_at_mean
-        The same with constants that differ from mode to mode at the mean relaxation time, and
-        without states; None where `fluid` is there, or a state cannot be written out.
-    states
-        Structure variables of the whole fluid.
-    explanations
-        What explains the fitted runs about as well as what was found, and how probable each is.
-    next_tests
-        The tests that were weighed by how well they would distinguish these.
-    laws
-        The laws that the declared one was chosen from, the best first; none where one was declared.
-    free_form
-        Free functions of one variable that explain what named effects leave, the likeliest first.
-    discrepancy
-        Size of what no hypothesis holds, as the contract writes it; None where nothing is said.
-    spread_of_laws
-        By how much laws that describe the runs as well differ in σ12, N1, N2, uniaxial stress.
-    left_out_error
-        Root-mean-square relative error of fitted runs that are left out of the fit in turn.
-    nearest_law
-        Where the law has no name of the field: the best that has one.
-    material
-        The simple material that the runs show, recognised before any search; None where none is.
-    tolerance
-        Relative discrepancy that is accepted.
-    folds
-        The loops that left each run out in turn, where they were asked for; the held-out errors
-        are then their means.
-    seconds
-        Time taken.
-    title, described
-        Name of the data, and data and declared model in words, for the page.
+    `verdict`: what is to be believed. `error_before`, `error_after`: of the declared and of the
+    augmented model. `noise_floor`: relative noise, mean over the fitted runs. `stages`: effects
+    added, in order. `remaining`: the residual, and whether it is systematic. `rankings`: candidates
+    at each stage, and those that earned nothing at the last. `records`: every run with its
+    predictions. `declared_parameters`: what was fitted of the declared model: modulus in Pa and
+    relaxation time in s, or for several modes a common factor on each, and parameters of the law;
+    those that may differ from mode to mode are a `ConstantByMode`. `declared_effects`: effects that
+    were part of the declared model, and so are no finding. `declared_law`: the declared law with
+    its modes as finally fitted, without effects; None where it cannot be written out. `fluid`: the
+    augmented fluid, without instrument effects; None where an effect gives it a state that no law
+    of stress and rate can carry, or where its constants differ from mode to mode. `fluid_at_mean`:
+    the same with constants that differ from mode to mode at the mean relaxation time, and without
+    states; None where `fluid` is there, or a state cannot be written out. `states`: structure
+    variables of the whole fluid. `explanations`: what explains the fitted runs about as well as
+    what was found, and how probable each is. `next_tests`: the tests that were weighed by how well
+    they would distinguish these. `laws`: the laws that the declared one was chosen from, the best
+    first; none where one was declared. `free_form`: free functions of one variable that explain
+    what named effects leave, the likeliest first. `discrepancy`: size of what no hypothesis holds,
+    as the contract writes it; None where nothing is said. `spread_of_laws`: by how much laws that
+    describe the runs as well differ in σ12, N1, N2, uniaxial stress. `left_out_error`:
+    root-mean-square relative error of fitted runs that are left out of the fit in turn.
+    `nearest_law`: where the law has no name of the field: the best that has one. `material`: the
+    simple material that the runs show, recognised before any search; None where none is.
+    `tolerance`: relative discrepancy that is accepted. `folds`: the loops that left each run out in
+    turn, where they were asked for; the held-out errors are then their means. `seconds`: time
+    taken. `title`, `described`: name of the data, and data and declared model in words, for the
+    page.
     """
 
     verdict: Verdict
@@ -179,22 +146,16 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def equation(self) -> Equation:
         """Return the augmented fluid as an equation, with its error and range in the notes.
 
-        Raises
-        ------
-        InputError
-            If an effect gives the fluid a state that nobody wrote out, or adds what is no sum of
-            library terms, or if what it adds differs from mode to mode.
+        Raises InputError if an effect gives the fluid a state that nobody wrote out, or adds what
+        is no sum of library terms, or if what it adds differs from mode to mode.
         """
         return self.answer.equation or self.without_answer()
 
     def without_answer(self) -> Equation:
         """Return the augmented fluid as an equation, with the box in which it was tested.
 
-        Raises
-        ------
-        InputError
-            If an effect gives the fluid a state that nobody wrote out, or adds what is no sum of
-            library terms, or if what it adds differs from mode to mode.
+        Raises InputError if an effect gives the fluid a state that nobody wrote out, or adds what
+        is no sum of library terms, or if what it adds differs from mode to mode.
         """
         fluid = self.fluid_at_mean if self.fluid is None else self.fluid
         if self.material is not None:
@@ -244,7 +205,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         core, added = law.split()
         named = name_of(core)
         known = {} if named is None else named[1]
-        # what an effect adds is the same sum in all modes; of a mode beside the declared ones
+        # what an effect adds is the same sum in all modes; of a mode added to the declared ones
         # nothing was said
         if (
             named is None
@@ -312,10 +273,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         recorded. What is unknown is NaN. Explanations are no draws from a posterior: weigh them by
         their probability.
 
-        Raises
-        ------
-        InputError
-            If xarray is not installed (extra ``xarray``).
+        Raises InputError if xarray is not installed (extra ``xarray``).
         """
         from discover.loop.labelled import labelled_loop
 
@@ -324,10 +282,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def ranking_table(self, stage: int = 0) -> pd.DataFrame:
         """Return the candidates at one stage, counted from 0, the best first.
 
-        Parameters
-        ----------
-        stage
-            From 0; the last one holds those that earned nothing.
+        `stage`: from 0; the last one holds those that earned nothing.
         """
         lines = [asdict(candidate) for candidate in self.rankings[stage]]
         return pd.DataFrame(lines, columns=["effect", "kind", "score", "evidence", "error"])

@@ -26,22 +26,11 @@ class ErrorPair:
 class Stage:
     """An effect that was added.
 
-    Attributes
-    ----------
-    effect, kind
-        Its name and kind.
-    parameters
-        Its parameters in the final model.
-    aliases
-        Effects that these data cannot tell from it.
-    error
-        Errors after this stage.
-    evidence
-        Twice the log of the posterior odds that it adds.
-    equation, source, check
-        What it adds, where that comes from, and how to confirm it in the laboratory.
-    left_open
-        Names of constants that the runs do not determine.
+    `effect`, `kind`: its name and kind. `parameters`: its parameters in the final model. `aliases`:
+    effects that these data cannot tell from it. `error`: errors after this stage. `evidence`: twice
+    the log of the posterior odds that it adds. `equation`, `source`, `check`: what it adds, where
+    that comes from, and how to confirm it in the laboratory. `left_open`: names of constants that
+    the runs do not determine.
     """
 
     effect: str
@@ -78,17 +67,10 @@ class DeclaredEffect:
 class CandidateScore:
     """A candidate effect at one stage.
 
-    Attributes
-    ----------
-    effect, kind
-        Its name and kind.
-    score
-        Share of the squared residual that it explains to first order, 0 to 1, beside what is
-        fitted already.
-    evidence
-        Twice the log of the posterior odds that it adds, where it was refitted.
-    error
-        Mean relative error on the fitted runs after that.
+    `effect`, `kind`: its name and kind. `score`: share of the squared residual that it explains to
+    first order, 0 to 1, given what is fitted already. `evidence`: twice the log of the posterior
+    odds that it adds, where it was refitted. `error`: mean relative error on the fitted runs after
+    that.
     """
 
     effect: str
@@ -102,18 +84,9 @@ class CandidateScore:
 class Explanation:
     """A set of effects that may be what the declared model lacks; empty where it lacks nothing.
 
-    Attributes
-    ----------
-    effects
-        Their names.
-    probability
-        Of this set and its twins together.
-    error
-        Mean relative errors of the runs fitted and held out.
-    parameters
-        Values of the parameters of each effect.
-    twins
-        Other sets that predict these records alike.
+    `effects`: their names. `probability`: of this set and its twins together. `error`: mean
+    relative errors of the runs fitted and held out. `parameters`: values of the parameters of each
+    effect. `twins`: other sets that predict these records alike.
     """
 
     effects: tuple[str, ...]
@@ -132,15 +105,10 @@ class Explanation:
 class Explanations:
     """The posterior over sets of effects.
 
-    Attributes
-    ----------
-    likeliest_first
-        Their probabilities add up to 1 with `unexplained_probability`.
-    unexplained_probability
-        That it is none of them.
-    inclusion, inclusion_by_kind
-        Probability that an effect, or some effect of a kind, is in the explanation. Twins share
-        that of their class in equal parts.
+    `likeliest_first`: their probabilities add up to 1 with `unexplained_probability`.
+    `unexplained_probability`: that it is none of them. `inclusion`, `inclusion_by_kind`:
+    probability that an effect, or some effect of a kind, is in the explanation. Twins share that of
+    their class in equal parts.
     """
 
     likeliest_first: tuple[Explanation, ...] = ()
@@ -166,23 +134,12 @@ class Explanations:
 
 @dataclass(frozen=True)
 class LawFit:
-    """A named law with the effects likeliest beside it, among others of which one is chosen.
+    """A named law with its likeliest further effects, among others of which one is chosen.
 
-    Attributes
-    ----------
-    law
-        Key of `LAWS`.
-    parameters
-        Its constants.
-    at_end
-        Those of them at an end of their range, where they are no finding.
-    error
-        Mean relative errors of the runs fitted and held out; None where it cannot be integrated
-        through the fitted ones.
-    probability
-        Of the law among these, by the fitted runs; None likewise.
-    effects
-        Those that are likeliest beside it.
+    `law`: key of `LAWS`. `parameters`: its constants. `at_end`: those of them at an end of their
+    range, where they are no finding. `error`: mean relative errors of the runs fitted and held out;
+    None where it cannot be integrated through the fitted ones. `probability`: of the law among
+    these, by the fitted runs; None likewise. `effects`: its likeliest further effects.
     """
 
     law: str
@@ -206,16 +163,9 @@ class LawFit:
 class NearestLaw:
     """The best law with a name, where the answer is a sum of terms that has none.
 
-    Attributes
-    ----------
-    law
-        Name of the law, as in `discover.laws`.
-    constants
-        By name, with their 95 % intervals by the fitted runs.
-    size
-        Root-mean-square relative error of fitted runs that are left out in turn.
-    equation
-        The law with its modes, for exports.
+    `law`: name of the law, as in `discover.laws`. `constants`: by name, with their 95 % intervals
+    by the fitted runs. `size`: root-mean-square relative error of fitted runs that are left out in
+    turn. `equation`: the law with its modes, for exports.
     """
 
     law: str
@@ -241,18 +191,10 @@ class NearestLaw:
 class FreeForm:
     """A smooth function of one variable that explains what named effects leave.
 
-    Attributes
-    ----------
-    slot
-        Where it acts, such as ``relaxation`` or ``slip``.
-    variable, unit
-        Of what it is a function, and its unit.
-    beside
-        Effects in the model with it.
-    grid, value, low95, high95
-        The curve with its 95 % band, shape (n,).
-    nearest
-        Name of a closed form that is it within its uncertainty; None if none is.
+    `slot`: where it acts, such as ``relaxation`` or ``slip``. `variable`, `unit`: of what it is a
+    function, and its unit. `beside`: effects in the model with it. `grid`, `value`, `low95`,
+    `high95`: the curve with its 95 % band, shape (n,). `nearest`: name of a closed form that is it
+    within its uncertainty; None if none is.
     """
 
     slot: str
@@ -270,14 +212,8 @@ class FreeForm:
 class Fold:
     """A loop that left one run out, where each run is held out in turn.
 
-    Attributes
-    ----------
-    run
-        The run left out.
-    verdict, effects
-        What the loop said of the other runs, and what it added.
-    error_before, error_after
-        Relative error of the run left out.
+    `run`: the run left out. `verdict`, `effects`: what the loop said of the other runs, and what it
+    added. `error_before`, `error_after`: relative error of the run left out.
     """
 
     run: str

@@ -47,18 +47,9 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
 class Path:
     """A posterior, the likeliest hypothesis of it, and the way there.
 
-    Attributes
-    ----------
-    posterior
-        What the runs say.
-    without_fluid
-        Whether a record without any fluid is as likely.
-    order
-        Names of the runs of the data set, in its order.
-    most
-        Explanations that are listed.
-    curves
-        Functions of one variable that are likelier than all that has a name.
+    `posterior`: what the runs say. `without_fluid`: whether a record without any fluid is as
+    likely. `order`: names of the runs of the data set, in its order. `most`: explanations that are
+    listed. `curves`: functions of one variable that are likelier than all that has a name.
     """
 
     posterior: Posterior

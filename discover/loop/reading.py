@@ -30,12 +30,8 @@ _ABOVE_NOISE = 4.0  # in a run of its own a drift of chance reaches three
 class Collapse:
     """How much of the residual the runs share along a coordinate.
 
-    Attributes
-    ----------
-    coordinate
-        What the residuals of all runs were drawn against.
-    share
-        Of the squared residual, that a function of this coordinate alone explains.
+    `coordinate`: what the residuals of all runs were drawn against. `share`: of the squared
+    residual, that a function of this coordinate alone explains.
     """
 
     coordinate: str
@@ -46,16 +42,9 @@ class Collapse:
 class Trend:
     """How the residual changes from run to run.
 
-    Attributes
-    ----------
-    quantity
-        What differs between runs.
-    of
-        ``"size"`` of the relative residual, or ``"sign"``: the excess of the prediction.
-    correlation
-        Rank correlation with the quantity.
-    probability
-        Of one as strong among as many unrelated quantities   [Bonferroni].
+    `quantity`: what differs between runs. `of`: ``"size"`` of the relative residual, or ``"sign"``:
+    the excess of the prediction. `correlation`: rank correlation with the quantity. `probability`:
+    of one as strong among as many unrelated quantities   [Bonferroni].
     """
 
     quantity: str
@@ -68,14 +57,8 @@ class Trend:
 class Reading:
     """A residual, read.
 
-    Attributes
-    ----------
-    collapses
-        Coordinates, the one that explains most first.
-    trends
-        From run to run, the least probable first; only those beyond chance.
-    waves
-        One for each oscillating run.
+    `collapses`: coordinates, the one that explains most first. `trends`: from run to run, the least
+    probable first; only those beyond chance. `waves`: one for each oscillating run.
     """
 
     collapses: tuple[Collapse, ...]
@@ -165,12 +148,8 @@ def _plain(name: str) -> str:
 def read_residual(records: Sequence[RunRecord], model: int = -1) -> Reading:
     """Return what the residuals of some runs depend on.
 
-    Parameters
-    ----------
-    records
-        Runs with their predictions.
-    model
-        Which prediction: 0 for the declared model, −1 for the augmented one.
+    `records`: runs with their predictions. `model`: which prediction: 0 for the declared model, −1
+    for the augmented one.
     """
     # strains, rates and stresses of a shear and of an extension have no scale in common
     # only records of one kind fall together; a steady state knows neither time nor strain

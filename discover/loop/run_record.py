@@ -19,35 +19,18 @@ from discover.statistics.noise.noise_model import rms
 class RunRecord:
     """One run in the window of the loop, measured and predicted.
 
-    Attributes
-    ----------
-    name, held_out
-        The run, and whether it was held out.
-    time, strain, instrument_time
-        In s, dimensionless, and in s on the instrument's clock, shape (n,).
-    rate
-        Commanded, in 1/s, shape (n,); in extension the Hencky rate.
-    measured
-        The quantity recorded, shape (n,): σ12 in shear, σ11 − σ22 in extension.
-    predicted
-        Recorded stress in Pa by the declared model and after each stage, shape (stages + 1, n).
-    errors
-        Relative error of each of these, shape (stages + 1,).
-    conditions
-        Numbers that the source gives of the run, such as its temperature, and its place in the
-        order of the runs.
-    flow
-        Which flow it is.
-    quantity
-        What is recorded: ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or
-        ``loss_modulus`` in Pa, or ``strain``.
-    band
-        Where 95 % of the measurements should lie by all explanations together, shape (2, n).
-    by_explanation
-        What each explanation predicts, in the order of their probability, shape (explanations, n).
-    control
-        What was imposed. Where it is ``steady`` or ``oscillation``, time only counts the samples;
-        strain and rate of an oscillation are amplitudes.
+    `name`, `held_out`: the run, and whether it was held out. `time`, `strain`, `instrument_time`:
+    in s, dimensionless, and in s on the instrument's clock, shape (n,). `rate`: commanded, in 1/s,
+    shape (n,); in extension the Hencky rate. `measured`: the quantity recorded, shape (n,): σ12 in
+    shear, σ11 − σ22 in extension. `predicted`: recorded stress in Pa by the declared model and
+    after each stage, shape (stages + 1, n). `errors`: relative error of each of these, shape
+    (stages + 1,). `conditions`: numbers that the source gives of the run, such as its temperature,
+    and its place in the order of the runs. `flow`: which flow it is. `quantity`: what is recorded:
+    ``sigma12``, ``tensile_stress``, ``N1``, ``N2``, ``storage_modulus`` or ``loss_modulus`` in Pa,
+    or ``strain``. `band`: where 95 % of the measurements should lie by all explanations together,
+    shape (2, n). `by_explanation`: what each explanation predicts, in the order of their
+    probability, shape (explanations, n). `control`: what was imposed. Where it is ``steady`` or
+    ``oscillation``, time only counts the samples; strain and rate of an oscillation are amplitudes.
     """
 
     name: str
@@ -106,14 +89,8 @@ def record_runs(
 ) -> list[RunRecord]:
     """Return each run with the predictions of several models.
 
-    Parameters
-    ----------
-    runs, predictions
-        The runs, and what each model predicts of them, padded.
-    held_out
-        Whether no fit saw them.
-    order
-        Names of the runs of the data set, in its order.
+    `runs`, `predictions`: the runs, and what each model predicts of them, padded. `held_out`:
+    whether no fit saw them. `order`: names of the runs of the data set, in its order.
     """
     records = []
     for i, run in enumerate(runs):

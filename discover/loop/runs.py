@@ -38,20 +38,11 @@ def split_runs(
 ) -> tuple[list[Run], list[Run], dict[str, list[float]]]:
     """Return the runs that are fitted, those that judge, and the times of spikes left out of each.
 
-    Parameters
-    ----------
-    fit, held_out
-        Names; by default all are fitted that are not held out.
-    strain
-        Smallest and largest strain of the samples used.
-    most
-        Samples of a run, at most.
+    `fit`, `held_out`: names; by default all are fitted that are not held out. `strain`: smallest
+    and largest strain of the samples used. `most`: samples of a run, at most.
 
-    Raises
-    ------
-    InputError
-        If a run is both fitted and held out, by name or by its samples; if none is left to fit; or
-        if the samples asked for are too few.
+    Raises InputError if a run is both fitted and held out, by name or by its samples; if none is
+    left to fit; or if the samples asked for are too few.
     """
     overlap = [name for name in (fit or ()) if name in held_out]
     if overlap:
@@ -96,10 +87,7 @@ def strain_of(run: Run) -> Float[np.ndarray, " n"]:
 def cut_to_strain(runs: Sequence[Run], window: tuple[float, float] | None) -> list[Run]:
     """Return the samples of every run whose strain magnitude lies in a window.
 
-    Raises
-    ------
-    InputError
-        If the window is no window, or a run has fewer than 3 samples in it.
+    Raises InputError if the window is no window, or a run has fewer than 3 samples in it.
     """
     if window is None:
         return list(runs)
@@ -162,10 +150,7 @@ def why_untested(
     they are reached: a viscosity η₀/(1 + q γ̇) is that of a structure that flow breaks down, and as
     well one of White and Metzner.
 
-    Parameters
-    ----------
-    constants
-        Fitted; those of the declared model count as one.
+    `constants`: fitted; those of the declared model count as one.
     """
     if not constants:
         return None

@@ -113,8 +113,7 @@ def _of_the_instrument(result: Any) -> str:
     first = next(iter(suspected(result)), None)
     if first is None:
         return ""
-    place = f" (worst run: {_worst(result)})"
-    return f"To confirm {effect_title(first.effect)}{place}, {_as_clause(first.check)}."
+    return f"To confirm {effect_title(first.effect)}, {_as_clause(first.check)}."
 
 
 def _of_another_stress(result: Any) -> str:

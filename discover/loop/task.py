@@ -1,4 +1,4 @@
-"""The task of a closed loop: among which effects to search, in which runs, beside which law."""
+"""The task of a closed loop: among which effects to search, in which runs, added to which law."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -44,28 +44,14 @@ _DIVERGES = "its stress diverges. Check its parameters, modes and units."
 
 @dataclass(frozen=True)
 class Task:
-    """Among which effects to search, in which runs, beside which law.
+    """Among which effects to search, in which runs, added to which law.
 
-    Attributes
-    ----------
-    declared
-        The model to start from.
-    fitted, held_out
-        Runs to fit, and runs that only test.
-    noise, loading
-        Relative noise where it is known, and deviation of loadings, zero where there are none.
-    most
-        Largest number of effects.
-    say
-        Called with a line of text now and then.
-    computed
-        Whether runs were computed: they know no instrument, a sound one either.
-    order
-        Names of the runs of the data set.
-    spikes
-        Times of samples set aside as outliers, by run.
-    of_rates
-        That rates were read with noise which the fluid did not feel; empty where not.
+    `declared`: the model to start from. `fitted`, `held_out`: runs to fit, and runs that only test.
+    `noise`, `loading`: relative noise where it is known, and deviation of loadings, zero where
+    there are none. `most`: largest number of effects. `say`: called with a line of text now and
+    then. `computed`: whether runs were computed: they know no instrument, a sound one either.
+    `order`: names of the runs of the data set. `spikes`: times of samples set aside as outliers, by
+    run. `of_rates`: that rates were read with noise which the fluid did not feel; empty where not.
     """
 
     declared: DeclaredModel
@@ -106,7 +92,7 @@ class Task:
         declared, every, _ = with_places(declared, [*fitted, *held], [])
         fitted, held = every[: len(fitted)], every[len(fitted) :]
         require_samples(fitted, declared)
-        candidates = candidates_beside(declared, effects, [*fitted, *held])
+        candidates = further_candidates(declared, effects, [*fitted, *held])
         of_rates = unfelt_scatter(declared, fitted)
         if of_rates:
             fitted, held = [*map(smoothed, fitted)], [*map(smoothed, held)]
@@ -128,10 +114,7 @@ class Task:
     def explained(self, declared: DeclaredModel) -> Posterior:
         """Return the posterior over what a declared model lacks.
 
-        Raises
-        ------
-        InputError
-            If it cannot be integrated through the fitted runs.
+        Raises InputError if it cannot be integrated through the fitted runs.
         """
         problem = self.problem(declared)
         self.say(f"search among {len(problem.candidates)} effects")
@@ -166,10 +149,7 @@ class Task:
     def choose(self, laws: Sequence[str]) -> tuple[DeclaredModel, dict[str, Search]]:
         """Return the declared model with the likeliest of some laws, and the search with each.
 
-        Raises
-        ------
-        InputError
-            If a name is none, or no law can be integrated through the fitted runs.
+        Raises InputError if a name is none, or no law can be integrated through the fitted runs.
         """
         unknown = [name for name in laws if name not in LAWS]
         if unknown:
@@ -251,16 +231,11 @@ def with_law(declared: DeclaredModel, name: str) -> DeclaredModel:
 def candidates_of(effects: Sequence[str | AbstractEffect] | str | None) -> list[AbstractEffect]:
     """Return the effects that are asked for.
 
-    Parameters
-    ----------
-    effects
-        Names, spellings of library terms or objects; ``"named"`` for every effect with a name that
-        is no candidate on request alone; None for these and every library term up to one invariant.
+    `effects`: names, spellings of library terms or objects; ``"named"`` for every effect with a
+    name that is no candidate on request alone; None for these and every library term up to one
+    invariant.
 
-    Raises
-    ------
-    InputError
-        If there is none, one is given twice, or a name is unknown.
+    Raises InputError if there is none, one is given twice, or a name is unknown.
     """
     named = [effect for effect in named_effects().values() if not effect.on_request]
     if effects is None:
@@ -325,25 +300,17 @@ def _require_present(declared: DeclaredModel, present: set[str]) -> None:
         )
 
 
-def candidates_beside(
+def further_candidates(
     declared: DeclaredModel,
     effects: Sequence[str | AbstractEffect] | str | None,
     runs: Sequence[Run],
 ) -> list[AbstractEffect]:
     """Return the effects that are asked for and that the declared model does not know.
 
-    Parameters
-    ----------
-    effects
-        As `candidates_of` takes them.
-    runs
-        Those that are fitted and those that judge.
+    `effects`: as `candidates_of` takes them. `runs`: those that are fitted and those that judge.
 
-    Raises
-    ------
-    InputError
-        If they are not as `candidates_of` takes them, an effect by mode is neither declared nor
-        among them, or the rates of the runs contain a known effect already.
+    Raises InputError if they are not as `candidates_of` takes them, an effect by mode is neither
+    declared nor among them, or the rates of the runs contain a known effect already.
     """
     candidates = candidates_of(effects)
     known = {effect.name for effect in declared.effects}

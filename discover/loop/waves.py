@@ -20,21 +20,11 @@ _PURE = 0.97  # share of the rate that odd harmonics must explain
 class Wave:
     """What the residual of an oscillation is made of, each relative to the stress's fundamental.
 
-    Attributes
-    ----------
-    run
-        The run.
-    frequency
-        In rad/s.
-    elastic, viscous
-        Fundamental in phase with the strain and with the shear rate; positive where the model
-        predicts too much.
-    odd, even
-        Higher odd harmonics, and even ones; root of the sum of squares.
-    drift
-        Change from the first to the last sample that does not oscillate.
-    noise
-        What noise, as large as what is left between the harmonics, would put into two of them.
+    `run`: the run. `frequency`: in rad/s. `elastic`, `viscous`: fundamental in phase with the
+    strain and with the shear rate; positive where the model predicts too much. `odd`, `even`:
+    higher odd harmonics, and even ones; root of the sum of squares. `drift`: change from the first
+    to the last sample that does not oscillate. `noise`: what noise, as large as what is left
+    between the harmonics, would put into two of them.
     """
 
     run: str

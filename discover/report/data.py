@@ -1,4 +1,4 @@
-"""Pages on data: what was read, linear tests beside each other, shifted curves."""
+"""Pages on data: what was read, linear tests side by side, shifted curves."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby

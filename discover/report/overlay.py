@@ -1,4 +1,4 @@
-"""Curves that a study asks for beside the others: a law, or what another program predicts."""
+"""Curves that a study asks for in addition: a law, or what another program predicts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -61,7 +61,7 @@ class Overlay:
 
 
 def read_overlays(study: Study) -> list[Source]:
-    """Return what a study wants drawn beside its own curves.
+    """Return what a study wants drawn with its own curves.
 
     Raises InputError if a law's parameter or a file is wrong.
     """

@@ -5,17 +5,18 @@ import os
 import platform
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeVar
 from urllib.parse import quote
 
+import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer
+from discover.answer import Answer, Suspect
 from discover.answer.sentences import (
     SYMBOLS,
     description,
@@ -24,6 +25,7 @@ from discover.answer.sentences import (
     further,
     law,
     linear_part,
+    separable,
     where,
 )
 from discover.equations import Equation
@@ -34,7 +36,7 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import estimate, interval, listed, readable, significant
+from discover.words import effect_title, estimate, interval, listed, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -43,7 +45,7 @@ def made_by(fingerprint: str, command: str, files: tuple[str, ...], study_text: 
     """Return what a page says of the run that made it; every table links to it.
 
     `fingerprint`: of the study, its data and the version of this software. `command`: what makes it
-    again. `files`: written beside the page.
+    again. `files`: written with the page.
     """
     packages = [f"Python {platform.python_version()}"]
     for name in _CALCULATES:
@@ -77,7 +79,7 @@ def render(template: str, data: Mapping[str, str] | None = None, **content: Any)
 
     `template`: file in ``templates``. `data`: text of files that each picture links to, by name.
     The page carries those that are not too long, so that it hands them out where it stands alone;
-    the others lie beside it. `content`: its variables.
+    the others lie in its folder. `content`: its variables.
     """
     carried = {name: text for name, text in (data or {}).items() if len(text) <= _MOST_INSIDE}
     return (
@@ -110,6 +112,7 @@ def _environment() -> Environment:
         estimate=estimate,
         readable=readable,
         subscripts=_subscripts,
+        explained=_explained,
         safe_svg=Markup,
         as_link=_as_link,
     )
@@ -172,7 +175,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "level": "95 % CI" if answer.adequate and answer.fits_to_the_noise else "95 %, statistical",
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": "",
+        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": 0.0,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -193,26 +196,39 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "constants": [
             (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
-        ],
+        ]
+        + [_suspected(one, separable(answer)) for one in answer.suspects],
         "expected": [
             {
                 "symbol": symbol,
                 "inside": expected(one, "inside"),
                 "beyond": expected(one, "beyond"),
+                "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
                 "known": one.is_known,
                 "note": _unbroken(one.note),
             }
             for symbol, one in rows
         ],
         "modes": [
-            (significant(mode.modulus_Pa), significant(mode.relaxation_time_s))
+            (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
             for mode in answer.modes
         ],
         "linear": _unbroken(linear_part(answer)),
-        "solvent": significant(viscosity) if (viscosity := answer.solvent_viscosity_Pa_s) else "",
+        "solvent": answer.solvent_viscosity_Pa_s,
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
+
+
+def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
+    """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
+    title, note = effect_title(one.effect), "suspected"
+    if one.amplitude is None or not separable:
+        return title, note, "not separable" if not separable else "–", "–"
+    number = one.amplitude.at_end.partition(",")[0] or one.amplitude.number
+    if one.amplitude.unit == "%" and one.amplitude.meaning:
+        note = f"{one.amplitude.meaning}; {note}"
+    return title, note, _in_cell(number), _in_cell(one.amplitude.interval)
 
 
 def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
@@ -220,9 +236,11 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
     grey = [one for one in copies if not one["text"]]
     if not grey:
         return ""
-    reason = grey[0]["reason"].partition(". ")[0].rstrip(".")
+    reason = grey[0]["reason"].partition(". ")[0].rstrip(".").rpartition(": ")[2]
     names = listed([one["name"] for one in grey])
-    return f"{names} not available: {reason[:1].lower()}{reason[1:]}."
+    if any(one["name"] in reason for one in grey):
+        return f"{reason}."
+    return f"Not {names}: {reason[:1].lower()}{reason[1:]}."
 
 
 _TOGETHER = re.compile(
@@ -249,6 +267,21 @@ def _subscripts(text: str) -> Markup:
     return Markup(_LOWERED.sub(r"\1<sub>\2</sub>", str(escape(text))))
 
 
+_NUMERALS = {
+    "Wi": "Weissenberg number: mean relaxation time λ times the largest shear rate",
+    "De": "Deborah number: mean relaxation time λ times the frequency ω, or over the time of a run",
+}
+
+
+def _explained(text: str) -> Markup:
+    """Return text, escaped, whose dimensionless numbers say what they are where one points."""
+
+    def said(found: re.Match[str]) -> str:
+        return f'<abbr title="{_NUMERALS[found[0]]}">{found[0]}</abbr>'
+
+    return Markup(re.sub(rf"\b({'|'.join(_NUMERALS)})(?=\s=)", said, str(_subscripts(text))))
+
+
 def _in_cell(text: str) -> str:
     """Return a number or an interval that breaks before a power of ten at most."""
     return _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×")
@@ -257,8 +290,30 @@ def _in_cell(text: str) -> str:
 def _typeset(answer: Answer) -> str:
     equation = answer.equation or answer.shown
     lines = answer.written.get("formula", "").splitlines()
-    law = "" if equation is None else _law(equation, any(line.startswith("h = ") for line in lines))
-    return law + _formulas(lines)
+    if equation is None:
+        return _formulas(lines)
+    rest = any(line.startswith("h = ") for line in lines)
+    return _law(_rounded(equation, answer), rest) + _formulas(lines)
+
+
+def _rounded(equation: Equation, answer: Answer) -> Equation:
+    """Return an equation with the digits that the intervals leave, three at most."""
+
+    def short(value: float) -> float:
+        digits = next((one.digits for one in answer.constants if np.isclose(one.value, value)), 3)
+        return float(f"{value:.{digits}g}")
+
+    def all_short(values: Mapping[str, float]) -> dict[str, float]:
+        return {name: short(value) for name, value in values.items()}
+
+    terms = tuple(
+        replace(term, coefficient=short(term.coefficient), inner=all_short(term.inner))
+        for term in equation.terms
+    )
+    named = equation.named
+    if named is not None:
+        named = replace(named, constants=tuple(map(all_short, named.constants)))
+    return replace(equation, terms=terms, named=named)
 
 
 def _formulas(lines: Sequence[str]) -> str:

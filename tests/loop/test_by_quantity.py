@@ -1,11 +1,13 @@
 """Expected errors and the next test of a closed loop, from results that are made up."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
+from discover.loop.answering import range_of, shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread
 from discover.loop.run_record import RunRecord
@@ -59,6 +61,9 @@ def test_a_run_beyond_the_rates_does_not_count_inside():
     errors = errors_by_quantity(found, "Giesekus")["sigma12"]
     assert errors.inside == pytest.approx(0.06)
     assert errors.beyond == pytest.approx(np.sqrt(0.5**2 - NOISE**2))
+    assert errors.beyond_at == "measured at 3 1/s"
+    computed = errors_by_quantity(result(FITTED, spread_of_laws={"sigma12": Spread(0.1, 0.2)}), "")
+    assert computed["sigma12"].beyond_at == "predicted at 2× the rate"
 
 
 def test_fitted_runs_alone_are_a_residual():
@@ -94,7 +99,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     edge = stage("edge_fracture", (0.01, 0.03), 5.0, "Watch the edge; repeat with another cone.")
     slip = stage("wall_slip", (0.0, 0.03), 9.0, "Repeat with another gap.")
     told = what_to_measure_next(result(FITTED, stages=(slip, edge)))
-    assert told.startswith("To confirm edge fracture (worst run: ")
+    assert told.startswith("To confirm edge fracture, ")
     assert told.endswith("watch the edge; repeat with another cone.")
     told = what_to_measure_next(result(FITTED))
     assert told == "Measure N1 at 1 1/s: laws that fit as well differ by 60 %."
@@ -103,3 +108,33 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast in a geometry with another gap")
+
+
+def test_a_range_of_rates_is_where_runs_stay():
+    time = np.linspace(0.0, 60.0, 601)
+    step = np.where(time < 0.3, 10.0, 0.1)  # measured while it falls from the rate before
+    down = RunRecord(
+        "down",
+        False,
+        time,
+        0.1 * time,
+        time,
+        step,
+        np.ones(601),
+        np.ones((1, 601)),
+        np.array([0.1]),
+    )
+    assert range_of([down]).rate_1_s == pytest.approx((0.1, 10.0))
+    assert range_of(FITTED).rate_1_s == pytest.approx((0.1, 1.0))
+    wave = record("wave", 1.0, 0.1)
+    turns = replace(wave, rate=np.array([2.0, 0.1, -2.0, 0.1, 2.0]))
+    assert range_of([turns]).rate_1_s == pytest.approx((2.0, 2.0))  # its amplitude
+
+
+def test_linear_response_alone_names_no_convected_derivative():
+    close, apart = Spread(0.01, 0.02), Spread(0.5, 0.6)
+    assert not shows_a_derivative(result(FITTED, spread_of_laws={"N1": apart}))
+    assert not shows_a_derivative(result(FITTED, spread_of_laws={}))
+    assert shows_a_derivative(result(FITTED, spread_of_laws={"N1": close}))
+    normal = record("slow", 0.1, 0.05, quantity="N1")
+    assert shows_a_derivative(result([*FITTED, normal], spread_of_laws={"N1": apart}))

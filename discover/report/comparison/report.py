@@ -144,58 +144,50 @@ _NO_TERM = {
 }
 
 
-@dataclass(frozen=True)
-class Part:
-    """A table or a paragraph of the page.
-
-    `content`: returns the template's variables; None where there is nothing to show.
-    """
-
-    title: str  # what it is, as the subject of a sentence
-    template: str  # file in ``templates/comparison``, without its extension
-    content: Callable[[], Content | None]
-
-    def draw(self, comparison: Comparison, run: Content) -> str | Missing | None:
-        """Return the part as HTML; None where there is nothing to show."""
-
-        def drawn() -> str | None:
-            content = self.content()
-            if content is None:
-                return None
-            name = f"comparison/{self.template}.html"
-            return Markup(render(name, comparison=comparison, run=run, **content))
-
-        return attempt(self.title, drawn)
+Part = tuple[str, str, Callable[[], Content | None]]
+"""What it is, as the subject of a sentence; file in ``templates/comparison``, without extension;
+what returns the template's variables, or None where there is nothing to show."""
 
 
 @dataclass(frozen=True)
 class Section:
-    """A heading with what stands below it.
-
-    `anchor`, `heading`, `link`: identifier, heading, and the words of the link at the top; without
-        words, no link.
-    """
+    """A heading with what stands below it."""
 
     anchor: str
     heading: str
-    link: str
+    link: str  # words of the link at the top; without words, no link
     parts: tuple[str | Missing, ...]  # HTML, or what could not be drawn
 
 
 def sections(comparison: Comparison, run: Content, linear_relaxation: bool) -> list[Section]:
     """Return the sections between the pictures and how it was learned, without the empty ones."""
+
+    def draw(template: str, make: Callable[[], Content | None]) -> str | None:
+        content = make()
+        name = f"comparison/{template}.html"
+        if content is None:
+            return None
+        return Markup(render(name, comparison=comparison, run=run, **content))
+
     drawn = []
-    for anchor, heading, link, parts in _outline(comparison, linear_relaxation):
+    for (anchor, heading, link), parts in _outline(comparison, linear_relaxation).items():
         if anchor == "law" and not comparison.outcomes:  # a simple material asks no learner
             continue
-        shown = [part.draw(comparison, run) for part in parts]
+        shown = [attempt(title, partial(draw, name, make)) for title, name, make in parts]
         kept = tuple(part for part in shown if part is not None)
         if kept:
             drawn.append(Section(anchor, heading, link, kept))
     return drawn
 
 
-def _outline(comparison: Comparison, linear_relaxation: bool):
+def _outline(
+    comparison: Comparison, linear_relaxation: bool
+) -> dict[tuple[str, str, str], list[Part]]:
+    """Return the parts of each section, by its anchor, heading and link."""
+
+    def table(name: str, rows: Callable[[Comparison], Any]) -> Callable[[], Content | None]:
+        return lambda: {name: found} if (found := rows(comparison)) else None
+
     def laws() -> Content:
         outcomes = comparison.outcomes.values()
         drawn = [
@@ -252,103 +244,46 @@ def _outline(comparison: Comparison, linear_relaxation: bool):
         titles = [learner_title(name) for name in comparison.physics]
         return {"physics_titles": titles, "physics_rows": rows} if rows else None
 
-    return (
-        (
-            "errors",
-            "Errors in test flows",
-            "Errors",
-            [Part("The table of errors", "errors", errors)],
-        ),
-        (
-            "law",
-            "Laws found",
-            "Laws found",
-            [
-                Part("The laws found", "laws", laws),
-                Part("The table of terms", "terms", terms),
-                Part("The table of explanations", "explanations", explanations),
-                Part(
-                    "The table of the network's coefficients",
-                    "coefficients",
-                    lambda: _unless_empty("coefficients", tables.coefficients(comparison)),
-                ),
-            ],
-        ),
-        (
-            "classical",
-            "Against the classical laws",
-            "Classical laws",
-            [Part("The table of classical laws", "classical", classical)],
-        ),
-        (
-            "selection-path",
-            "Which law to believe",
-            "Which law to believe",
-            [
-                Part(
-                    "The path of laws",
-                    "selection",
-                    lambda: _unless_empty("selection", tables.selection(comparison)),
-                ),
-                Part("The misfits on runs left out", "held_out_by_run", held_out_by_run),
-            ],
-        ),
-        (
-            "open",
-            "Not determined",
-            "Not determined",
-            [
-                Part("What is not determined", "statements", dict),
-                Part("The table of rivals", "rivals", rivals),
-            ],
-        ),
-        (
-            "next",
-            "What to measure next",
-            "What to measure next",
-            [
-                Part(
-                    "The table of experiments",
-                    "next",
-                    lambda: _unless_empty("tests", tables.next_rows(comparison)),
-                )
-            ],
-        ),
-        (
-            "distillation",
-            "Distillation: what a simpler law learns from this one",
-            "",
-            [
-                Part(
-                    "The table of distillations",
-                    "distillation",
-                    lambda: _unless_empty("distillations", tables.distillations(comparison)),
-                )
-            ],
-        ),
-        (
-            "structure",
-            "What these flows could tell of any law in the library",
-            "",
-            [
-                Part(
-                    "What the flows could tell",
-                    "structure",
-                    lambda: _unless_empty("structure", tables.structure(comparison)),
-                )
-            ],
-        ),
-        (
-            "physics",
-            "Are the laws physically sound?",
-            "Soundness",
-            [Part("The checks of physical soundness", "physics", physics)],
-        ),
-    )
-
-
-def _unless_empty(name: str, value: Any) -> Content | None:
-    return {name: value} if value else None
+    return {
+        ("errors", "Errors in test flows", "Errors"): [("The table of errors", "errors", errors)],
+        ("law", "Laws found", "Laws found"): [
+            ("The laws found", "laws", laws),
+            ("The table of terms", "terms", terms),
+            ("The table of explanations", "explanations", explanations),
+            (
+                "The table of the network's coefficients",
+                "coefficients",
+                table("coefficients", tables.coefficients),
+            ),
+        ],
+        ("classical", "Against the classical laws", "Classical laws"): [
+            ("The table of classical laws", "classical", classical)
+        ],
+        ("selection-path", "Which law to believe", "Which law to believe"): [
+            ("The path of laws", "selection", table("selection", tables.selection)),
+            ("The misfits on runs left out", "held_out_by_run", held_out_by_run),
+        ],
+        ("open", "Not determined", "Not determined"): [
+            ("What is not determined", "statements", dict),
+            ("The table of rivals", "rivals", rivals),
+        ],
+        ("next", "What to measure next", "What to measure next"): [
+            ("The table of experiments", "next", table("tests", tables.next_rows))
+        ],
+        ("distillation", "Distillation: what a simpler law learns from this one", ""): [
+            (
+                "The table of distillations",
+                "distillation",
+                table("distillations", tables.distillations),
+            )
+        ],
+        ("structure", "What these flows could tell of any law in the library", ""): [
+            ("What the flows could tell", "structure", table("structure", tables.structure))
+        ],
+        ("physics", "Are the laws physically sound?", "Soundness"): [
+            ("The checks of physical soundness", "physics", physics)
+        ],
+    }
 
 
 def write_comparison(
@@ -366,7 +301,7 @@ def write_comparison(
 
     `linear_relaxation`: whether −σ was part of the known law. `study_text`: the study file, shown
     at the end. `run`: what the page says of the run that made it, where that was no command.
-    `overlays`: curves that the study asks for beside the learners'.
+    `overlays`: curves that the study asks for in addition to the learners'.
 
     Returns the page.
     """
@@ -405,10 +340,10 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     for name, outcome in comparison.outcomes.items():
         known = comparison.known_part_of(name)
         terms = (*known.terms, *outcome.terms)
-        named, beside = known.named, ""
+        named, note = known.named, ""
         if named is not None and not named.is_written:
-            named, beside = None, f", without the h of the known law {named.law}"
+            named, note = None, f", without the h of the known law {named.law}"
         equation = law_latex(terms, linear_relaxation, named=named)
-        head = f"% {learner_title(name)}{beside}\n"
+        head = f"% {learner_title(name)}{note}\n"
         parts.append(f"{head}\\begin{{equation}}\n  {equation}\n\\end{{equation}}\n")
     return "\n".join(parts)

@@ -46,7 +46,7 @@ def write_loop(
     `name`, `summary`: title, and the data and declared model in words. `study_text`: the study
     file, shown at the end. `run`: what the page says of the run that made it, where that was no
     command. `conditions`: material and temperature, for the title. `overlays`: curves that the
-    study asks for beside the models.
+    study asks for in addition to the models.
 
     Returns the page.
     """

@@ -149,7 +149,7 @@ def scale_of(rows: Sequence[ResidualRow]) -> float:
 def levels(values: Float[np.ndarray, " n"], limit: float) -> np.ndarray:
     """Return the level of each value, from −`_LEVELS` to `_LEVELS`, as its square root.
 
-    The root lets a small residual be seen beside a large one.
+    The root lets a small residual be seen next to a large one.
     """
     root = np.sign(values) * np.sqrt(np.abs(values) / limit)
     return np.clip(np.rint(_LEVELS * root), -_LEVELS, _LEVELS).astype(int)

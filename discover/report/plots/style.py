@@ -97,7 +97,7 @@ OVERLAY_STYLES: tuple[dict[str, Any], ...] = tuple(
     {"color": colour, "linestyle": line, "linewidth": 1.3}
     for colour, line in ((GREEN, "--"), (PURPLE, ":"), (YELLOW, "--"), (INK, ":"))
 )
-"""Of what a study asks to be drawn beside the rest, in its order."""
+"""Of what a study asks to be drawn in addition, in its order."""
 
 CHOSEN_STYLE: dict[str, Any] = {"color": SPARSE, "linestyle": "-"}
 RIVAL_STYLES: tuple[dict[str, Any], ...] = (
@@ -278,7 +278,7 @@ def _columns_within(drawing: Figure, labels: Sequence[str], most: int) -> int:
     size = font.get_size_in_points()
     # in ems of the font: the handle, its distance from the text, and that between columns
     ems = mpl.rcParams["legend.handlelength"] + mpl.rcParams["legend.handletextpad"]
-    beside = (ems + mpl.rcParams["legend.columnspacing"]) * size
+    handle = (ems + mpl.rcParams["legend.columnspacing"]) * size
     widths = [
         text_to_path.get_text_width_height_descent(label, font, is_math_text(label))[0]
         for label in labels
@@ -286,7 +286,7 @@ def _columns_within(drawing: Figure, labels: Sequence[str], most: int) -> int:
     for count in range(most, 1, -1):
         # a legend fills its columns one after the other, the first ones with what is left over
         parts = np.array_split(widths, count)
-        if sum(max(part) + beside for part in parts) <= 72.0 * drawing.get_figwidth():
+        if sum(max(part) + handle for part in parts) <= 72.0 * drawing.get_figwidth():
             return count
     return 1
 
