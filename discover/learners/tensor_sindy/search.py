@@ -221,10 +221,10 @@ class SupportSearch(Search):
             self.support(fit),
         )
 
-    def add(self, starts: Iterable[Fit]) -> list[Fit]:
+    def add(self, starts: Iterable[Fit], wanted: int | None = None) -> list[Fit]:
         """Fit hypotheses side by side and keep them; of one set the likeliest."""
         require_wanted()
-        fits = super().add(starts)
+        fits = super().add(starts, wanted)
         self.history += [self.fitter.misfit(fit) for fit in fits if np.isfinite(fit.log_posterior)]
         return fits
 
