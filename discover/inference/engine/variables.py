@@ -119,7 +119,9 @@ class Response(Variable):
             asked = own[:, None] - lags
             known = np.append(0.0, own)  # at rest, and at the samples
             at = np.clip(np.searchsorted(known, asked, "right") - 1, 0, len(own) - 1)
-            share.append(np.clip((asked - known[at]) / (known[at + 1] - known[at]), 0.0, 1.0))
+            width = known[at + 1] - known[at]
+            width[width == 0.0] = np.inf  # where the first sample is at rest itself
+            share.append(np.clip((asked - known[at]) / width, 0.0, 1.0))
             before.append(np.where(at > 0, first + at - 1, -1))
             after.append(first + at)
             first += len(own)
@@ -175,7 +177,7 @@ def variables(rows: Rows) -> Iterator[Variable]:
         yield of("rate", "shear rate", "1/s", rates)
     yield of("drift", "time", "s", times)
     yield of("network", "strain", "", strains, True)
-    if all(float(run.protocol.begins) == 0.0 for run in runs):
+    if len(rows) > len(runs) and all(float(run.protocol.begins) == 0.0 for run in runs):
         yield Response.of(rows)
 
 
