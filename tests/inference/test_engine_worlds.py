@@ -24,15 +24,20 @@ CLIPPED, SETTLING = (4, 50), (4, 48)
 """Exponential PTT on a transducer that saturates; linear PTT beside a zero that settles."""
 
 
+def problem_of(folder, runs, effects):
+    """Return the problem of runs that scipy recorded, among some effects or all."""
+    data = dc.load_dataset(write_folder(folder, runs))
+    held = [name for name in data.names if name.startswith("held_")]
+    fitted, held_out, _ = split_runs(data, None, held, None, 400)
+    declared = DeclaredModel.maxwell([MODULUS], [TIME])
+    return Problem(declared, candidates_of(effects), fitted, held_out)
+
+
 def ask(folder, seed, index, effects=None):
     """Return the posterior of a world among some effects or all, and its problem and truth."""
     world = draw_world(seed, index)
     runs = world.make(np.random.default_rng([seed, index, 1]))
-    data = dc.load_dataset(write_folder(folder / f"{seed}-{index}", runs))
-    held = [name for name in data.names if name.startswith("held_")]
-    fitted, held_out, _ = split_runs(data, None, held, None, 400)
-    declared = DeclaredModel.maxwell([MODULUS], [TIME])
-    problem = Problem(declared, candidates_of(effects), fitted, held_out)
+    problem = problem_of(folder / f"{seed}-{index}", runs, effects)
     return explain(problem), problem, world
 
 
@@ -137,11 +142,7 @@ def test_a_transducer_that_bends_by_three_per_cent_is_weighed_by_the_runs_held_o
         name: replace(run, stress=run.stress * (1.0 + 0.03 * (run.stress / typical) ** 2))
         for name, run in runs.items()
     }
-    data = dc.load_dataset(write_folder(tmp_path / "bent", bent))
-    held = [name for name in data.names if name.startswith("held_")]
-    fitted, held_out, _ = split_runs(data, None, held, None, 400)
-    declared = DeclaredModel.maxwell([MODULUS], [TIME])
-    posterior = explain(Problem(declared, candidates_of(None), fitted, held_out))
+    posterior = explain(problem_of(tmp_path / "bent", bent, None))
     best = max(free_functions(posterior), key=lambda one: one.log_odds_in_all)
     assert (best.variable.slot, best.beside) == ("recorded_stress", ("giesekus_mobility",))
     assert best.log_odds_in_all > best.log_odds  # held-out runs reach further
@@ -151,11 +152,7 @@ def test_a_transducer_that_bends_by_three_per_cent_is_weighed_by_the_runs_held_o
 def of_instrument(folder, instrument, effects):
     """Return the posterior of a Giesekus fluid among some effects or all, on an instrument."""
     runs = replace(draw_world(*GIESEKUS), instrument=instrument).make(np.random.default_rng(1))
-    data = dc.load_dataset(write_folder(folder / "flawed", runs))
-    held = [name for name in data.names if name.startswith("held_")]
-    fitted, held_out, _ = split_runs(data, None, held, None, 400)
-    declared = DeclaredModel.maxwell([MODULUS], [TIME])
-    return explain(Problem(declared, candidates_of(effects), fitted, held_out))
+    return explain(problem_of(folder / "flawed", runs, effects))
 
 
 @pytest.mark.parametrize("effects", [FEW, pytest.param(None, marks=pytest.mark.slow)])

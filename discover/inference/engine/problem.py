@@ -124,7 +124,6 @@ class Problem:
         self.model = AugmentedModel(declared, effects, self.scales)
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
         self.zero, self.moduli = self.model.zero(), self.model.moduli
-        self.zero[self.model.positions(SLIP_CURVE.name)[:-1]] = 0.0
         self._priors = self._known()
         self._widths = self._signatures()
         self._odds = sum(self.odds(effect.name) for effect in candidates)

@@ -39,7 +39,7 @@ class SlipCurve(SeriesElement):
 
 def _slope(number: int) -> EffectParameter:
     return EffectParameter(
-        f"slope_{number}", f"s_{number}", "1/(Pa s)", scale="fluidity", first_trial=0.01,
+        f"slope_{number}", f"s_{number}", "1/(Pa s)", scale="fluidity", first_trial=0.0,
         range_source="a change of slope may have either sign",
     )  # fmt: skip
 
