@@ -157,9 +157,9 @@ def _holds(interval: Sequence[float] | None, truth: float) -> bool:
 
 
 def _worst(case: dict, quantity: str) -> float:
-    """Return how far the sparse law's curve is off in a run held out, N2's over N1."""
-    sparse = [b for b in case["bands"] if b["source"] == "tensor_sindy"]
-    return max((b.get("off", 0.0) for b in sparse if b["quantity"] == quantity), default=0.0)
+    """Return how far the answer's curve is off in a run held out, N2's over N1."""
+    answer = [b for b in case["bands"] if b["source"] == "posterior"]
+    return max((b.get("off", 0.0) for b in answer if b["quantity"] == quantity), default=0.0)
 
 
 def _coverage(what: str, bands: list[dict]) -> str:

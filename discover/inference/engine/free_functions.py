@@ -38,12 +38,14 @@ _BASES = 12
 """Hypotheses of each size beside which a function is tried to first order."""
 
 _LARGEST_BASE = 2
-_REFITTED = 4
-_BEHIND = 10.0
+_REFITTED = 2
+"""Of all, so many of the likeliest to first order are fitted, and the likeliest of each size."""
+
+_BEHIND = 30.0
 """Log odds behind the likeliest to first order from which on a hypothesis is not fitted."""
 
-_SLIPPING = 4
-"""Hypotheses of each size beside which slip is fitted."""
+_SMALL = 1e-4
+"""Of the typical fluidity: step of a difference."""
 
 _TOLD = 15.0
 """Log odds against all that has a name and any other discrepancy, from which on a curve is shown.
@@ -146,6 +148,14 @@ class WithFunction(Fitter):
         self.variable, self.width = variable, width
         self.errors = _WithColumns(fitter.errors, variable, width)
 
+    def signatures(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
+        """Return what one of each change of slope does to the records, in Pa."""
+        return self.variable.columns(fit.predicted, self.rows.size)
+
+    def beside(self, fit: Fit, sizes: Float[np.ndarray, " k"]) -> Fit:
+        """Return a hypothesis with the function, before its first step."""
+        return self.start(fit.names, fit.theta, np.append(fit.linear, sizes))
+
     def on(self, fitter: Fitter) -> "WithFunction | None":
         """Return the same on other rows; None where these have no such variable."""
         for variable in variables(fitter.rows):
@@ -180,6 +190,18 @@ class WithSlip(Fitter):
         self.__dict__.update(vars(fitter))
         self._priors, self.width = {}, width
         self._at = list(self.problem.model.positions(SLIP_CURVE.name)[:-1])
+
+    def signatures(self, fit: Fit) -> Float[np.ndarray, "rows k"]:
+        """Return what one of each change of slope does to the records, in Pa."""
+        step = _SMALL * self.problem.scales["fluidity"]
+        thetas = np.tile(fit.theta, (len(self._at), 1))
+        thetas[np.arange(len(self._at)), self._at] += step
+        return (self.predict(thetas) - fit.predicted).T / _SMALL
+
+    def beside(self, fit: Fit, sizes: Float[np.ndarray, " k"]) -> Fit:
+        """Return a hypothesis with slip, before its first step: from none, `sizes` may be far."""
+        del sizes
+        return self.start(fit.names, fit.theta, fit.linear)
 
     def on(self, fitter: Fitter) -> "WithSlip":
         """Return the same on other rows."""
@@ -236,9 +258,12 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     whole, _, discrepancies = posterior.memory["whole"]
     other, in_all = _likeliest(search, [left]), _likeliest(whole, discrepancies)
     prior, found = problem.log_odds_of(TERM_ODDS), []
-    tried: list[Tried] = [_starts(search.fitter, [*chain(*bases)], one) for one in variables(rows)]
-    tried.append(_slipping(search.fitter, bases))
-    for one in tried:
+    functions: list[list[WithFunction | WithSlip]] = [
+        [WithFunction(search.fitter, variable, width) for width in _WIDTHS]
+        for variable in variables(rows)
+    ]
+    functions.append([WithSlip(search.fitter, width) for width in _SLIPS])
+    for one in (_starts(search.fitter, some, [*chain(*bases)]) for some in functions):
         fitted = [
             (fit.log_evidence + problem.log_prior(fit.names) + prior, fitter, fit)
             for fitter, starts in one
@@ -260,39 +285,37 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
     return sorted(found, key=lambda one: -one.log_odds)
 
 
-def _slipping(fitter: Fitter, bases: Sequence[Sequence[Fit]]) -> Tried:
-    """Return hypotheses with slip, by its width."""
-    some = [fit for of_size in bases for fit in of_size[:_SLIPPING]]
-    return [
-        (own, [own.start(fit.names, fit.theta, fit.linear) for fit in some])
-        for own in (WithSlip(fitter, width) for width in _SLIPS)
-    ]
-
-
 def _likeliest(search: Search, discrepancies: Sequence[Discrepancy]) -> float:
     """Return the largest log of evidence times prior, with a discrepancy or without."""
     beside = [search.rank(one.fit) + one.log_factor for one in discrepancies]
     return max(*beside, *(search.rank(fit) for fit in search.alive()[:1]))
 
 
-def _starts(fitter: Fitter, bases: Sequence[Fit], variable: Variable) -> Tried:
+def _starts(
+    fitter: Fitter, functions: Sequence[WithFunction | WithSlip], bases: Sequence[Fit]
+) -> Tried:
     """Return the most promising hypotheses with a function, scored to first order, by its width."""
-    scored, own = [], {width: WithFunction(fitter, variable, width) for width in _WIDTHS}
+    scored, widths = [], np.array([own.width for own in functions])
     for fit in bases:
-        values, steps = _first_order(fitter, fit, variable)
-        for width, value, step in zip(_WIDTHS, values, steps, strict=True):
-            start = own[width].start(fit.names, fit.theta, np.append(fit.linear, step))
-            scored.append((float(value), width, start))
+        values, sizes = _first_order(fitter, fit, functions[0].signatures(fit), widths)
+        for own, value, size in zip(functions, values, sizes, strict=True):
+            scored.append((float(value), own, own.beside(fit, size)))
     scored.sort(key=lambda one: -one[0])
-    chosen: dict[float, list[Fit]] = {}
-    for value, width, start in scored[:_REFITTED]:
-        if value > scored[0][0] - _BEHIND:
-            chosen.setdefault(width, []).append(start)
-    return [(own[width], starts) for width, starts in chosen.items()]
+    chosen: dict[WithFunction | WithSlip, list[Fit]] = {}
+    sizes_seen: set[int] = set()  # the best of each: far from none, first order favours large ones
+    for place, (value, own, start) in enumerate(scored):
+        is_wanted = place < _REFITTED or len(start.names) not in sizes_seen
+        if is_wanted and value > scored[0][0] - _BEHIND:
+            sizes_seen.add(len(start.names))
+            chosen.setdefault(own, []).append(start)
+    return list(chosen.items())
 
 
 def _first_order(
-    fitter: Fitter, fit: Fit, variable: Variable
+    fitter: Fitter,
+    fit: Fit,
+    signatures: Float[np.ndarray, "rows k"],
+    widths: Float[np.ndarray, " widths"],
 ) -> tuple[Float[np.ndarray, " widths"], Float[np.ndarray, "widths k"]]:
     """Return log evidence times prior of a hypothesis with a function of each width, and its sizes.
 
@@ -300,8 +323,8 @@ def _first_order(
     """
     assert fit.jacobian is not None
     assert fit.covariance is not None
-    columns = np.column_stack([fit.jacobian, variable.columns(fit.predicted, fitter.rows.size)])
-    record, k, widths = fitter.record(fit), KNOTS, np.array(_WIDTHS)
+    record, k = fitter.record(fit), signatures.shape[1]
+    columns = np.column_stack([fit.jacobian, signatures])
     both = np.column_stack([columns, fitter.rows.recorded - record])
     white = fitter.noise.whitened(both, record, fit.noise)
     curvature = white[:, :-1].T @ white[:, :-1]
