@@ -53,7 +53,8 @@ class SimpleMaterial:
     """Material without relaxation, as recognised.
 
     `kind`, `title`, `law`: what it is, the name for readers, and that in results.
-    `formula`, `latex`: law typeset, without and with its numbers.
+    `formula`, `latex`: law typeset, without and with its numbers. `onset`: m in s, with which a
+    yield stress sets in as 1 − exp(−m |γ̇|); None where it is there at once.
     """
 
     kind: Kind
@@ -63,6 +64,7 @@ class SimpleMaterial:
     error: float  # relative misfit of the fitted runs
     formula: str
     latex: str
+    onset: float | None = None
 
     def written(self, comments: Sequence[str], slowest: float, density: float) -> dict[str, str]:
         """Return the law as text by format, with lines of comment in front.
@@ -81,13 +83,14 @@ class SimpleMaterial:
                 name: (quantity, one.value)
                 for (name, quantity), one in zip(names, self.constants, strict=True)
             }
-            if self.kind == "yield_stress":
+            if cap := _CAPS.get(self.law):
                 # rheoTool wants a largest viscosity: that of a tenth of the slowest rate
                 at = 0.1 * slowest
-                yield_stress, consistency, index = (one.value for one in self.constants)
-                largest = (yield_stress + consistency * at**index) / at
-                entries["eta0"] = "viscosity", float(f"{largest:.3g}")
-                comments = [*comments, f"eta0 caps the viscosity below {at:.3g} 1/s."]
+                largest = float(viscosity(self.law, self._values, np.array([at]))[0])
+                entries[cap] = "viscosity", float(f"{largest:.3g}")
+                comments = [*comments, f"{cap} caps the viscosity below {at:.3g} 1/s."]
+            if self.law == "power_law":
+                entries["etaMin"] = "viscosity", 0.0
             found["rheotool"] = viscous_fluid(kind, entries, comments, density)
         return found
 
@@ -95,7 +98,12 @@ class SimpleMaterial:
         """Return what it records in a run; None in a flow that it does not describe."""
         if not _is_simple(run):
             return None
-        return _predicted(self.law, np.array([one.value for one in self.constants]), run)
+        return _predicted(self.law, self._values, run)
+
+    @property
+    def _values(self) -> Values:
+        values = [one.value for one in self.constants]
+        return np.array(values if self.onset is None else [*values, self.onset])
 
 
 def recognise(runs: Sequence[Run]) -> SimpleMaterial | None:
@@ -151,12 +159,8 @@ def _predicted(law: str, values: Values, run: Run) -> Float[np.ndarray, " n"]:
             return np.full(len(run), values[0] if law == "kelvin_voigt" else 0.0)
         return values[-1] * omega
     rate = run.rate
-    if law in ("newtonian", "carreau_yasuda"):
+    if law in ("newtonian", "power_law", "carreau_yasuda", "herschel_bulkley"):
         return viscosity(law, values, rate) * rate
-    if law == "herschel_bulkley":
-        yield_stress, consistency, index = values
-        size = np.abs(rate)
-        return np.sign(rate) * (yield_stress + consistency * size**index)
     if law == "carreau":
         zero, infinite, time, index = values
         # without a first plateau in the range it would be a yield stress by another name
@@ -311,6 +315,11 @@ _NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
         "yield-stress fluid (Herschel–Bulkley)",
         (("yield_stress_Pa", "Pa"), ("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
     ),
+    "power_law": (
+        "viscous",
+        "viscous fluid (power law)",
+        (("consistency_Pa_sn", "Pa sⁿ"), ("flow_index", "1")),
+    ),
     "carreau_yasuda": (
         "viscous",
         "viscous fluid (Carreau–Yasuda)",
@@ -335,6 +344,10 @@ _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
         rf"\sigma_{{12}} = \tau_y + K\dot\gamma^n, \qquad "
         rf"\tau_y = {v[0]},\; K = {v[1]},\; n = {v[2]}"
     ),
+    "power_law": lambda v: (
+        r"\sigma_{12} = K|\dot\gamma|^{n-1}\dot\gamma, \qquad "
+        rf"K = {v[0]},\; n = {v[1]}"
+    ),
     "carreau_yasuda": lambda v: (
         r"\sigma_{12} = \left(\eta_\infty + (\eta_0 - \eta_\infty)"
         r"(1 + (k|\dot\gamma|)^a)^{(n-1)/a}\right)\dot\gamma, \qquad "
@@ -349,6 +362,9 @@ _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: f"def stress(rate):\n    return {v[0]} * rate\n",
     "herschel_bulkley": lambda v: (
         f"def stress(rate):\n    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
+    ),
+    "power_law": lambda v: (
+        f"def stress(rate):\n    return {v[0]} * abs(rate) ** ({v[1]} - 1) * rate\n"
     ),
     "carreau_yasuda": lambda v: (
         "def stress(rate):\n"
@@ -368,6 +384,7 @@ _RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
         "HerschelBulkley",
         (("tau0", "stress"), ("k", "viscosity"), ("n", "number")),
     ),
+    "power_law": ("PowerLaw", (("k", "viscosity"), ("n", "number"))),
     "carreau_yasuda": (
         "CarreauYasuda",
         (
@@ -381,6 +398,9 @@ _RHEOTOOL: dict[str, tuple[str, tuple[tuple[str, str], ...]]] = {
 }
 """rheoTool's type and entries, in the order of the constants   [tree ``of90``, folder ``GNF``]."""
 
+_CAPS = {"herschel_bulkley": "eta0", "power_law": "etaMax"}
+"""Entry of a largest viscosity."""
+
 
 def _material(law: str, fit: _Fit) -> SimpleMaterial:
     spread = np.exp(np.outer(fit.quantile * fit.deviation, (-1.0, 1.0)))
@@ -388,7 +408,11 @@ def _material(law: str, fit: _Fit) -> SimpleMaterial:
 
 
 def material_of(
-    law: str, values: Sequence[float] | Values, ci95: Sequence | np.ndarray, error: float
+    law: str,
+    values: Sequence[float] | Values,
+    ci95: Sequence | np.ndarray,
+    error: float,
+    onset: float | None = None,
 ) -> SimpleMaterial:
     """Return a simple material of its constants, with their 95 % intervals and its misfit."""
     kind, title, names = _NAMES[law]
@@ -397,4 +421,6 @@ def material_of(
         for (name, unit), value, (low, high) in zip(names, values, ci95, strict=True)
     )
     latex = _LATEX[law]([f"{value:.6g}" for value in values])
-    return SimpleMaterial(kind, title, law, constants, error, latex.partition(", ")[0], latex)
+    return SimpleMaterial(
+        kind, title, law, constants, error, latex.partition(", ")[0], latex, onset
+    )

@@ -38,7 +38,7 @@ def inelastic_result(task: Task, found: Inelastic) -> LoopResult | None:
 
     None where the declared law has this viscosity.
     """
-    material = material_of(found.law, found.values, found.ci95, found.error)
+    material = material_of(found.law, found.values, found.ci95, found.error, found.onset)
     probability = 1.0 / (1.0 + float(np.exp(-found.log_odds)))
     said = f"A {material.title} is likelier than all laws that relax."
     return _result(task, material, probability, said)

@@ -38,10 +38,11 @@ def entries(text):
 @pytest.mark.parametrize(
     ("law", "constants", "kind", "stress"),
     [
-        # γ̇ = 4: 12 + 4·4^0.5, and (0.1 + 49.9 (1 + 8²)^(−0.3))·4
+        # γ̇ = 4: 12 + 4·4^0.5, (0.1 + 49.9 (1 + 8²)^(−0.3))·4, and 5·4^0.5
         ("herschel_bulkley", HERSCHEL_BULKLEY, "HerschelBulkley", 20.0),
         ("carreau_yasuda", CARREAU_YASUDA, "CarreauYasuda", 4 * (0.1 + 49.9 * 65**-0.3)),
         ("newtonian", {"viscosity_Pa_s": 3.0}, "Newtonian", 12.0),
+        ("power_law", {"consistency_Pa_sn": 5.0, "flow_index": 0.5}, "PowerLaw", 10.0),
     ],
 )
 def test_a_fluid_without_elasticity_leaves_with_its_constants_size_and_range(

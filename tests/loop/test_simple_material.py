@@ -140,6 +140,16 @@ def thinned(times, rate, amplitude):
     return (0.1 + 4.9 * (1.0 + (0.8 * np.abs(rate)) ** 2.0) ** (-0.3)) * rate
 
 
+def yielding(times, rate, amplitude):
+    del times, amplitude
+    return np.sign(rate) * (8.0 + 4.0 * np.abs(rate) ** 0.6)
+
+
+def of_a_power(times, rate, amplitude):
+    del times, amplitude
+    return np.sign(rate) * 4.0 * np.abs(rate) ** 0.6
+
+
 def maxwell(times, rate, amplitude):
     """Return σ12 of one mode of 5 Pa and 1 s from rest under γ̇0 cos t, by hand."""
     del rate
@@ -149,7 +159,13 @@ def maxwell(times, rate, amplitude):
 @pytest.mark.parametrize("noise", [pytest.param(0.0, marks=pytest.mark.slow), 0.01])
 @pytest.mark.parametrize(
     ("stress", "law"),
-    [(lambda t, rate, a: 3.0 * rate, "newtonian"), (thinned, "carreau_yasuda"), (maxwell, None)],
+    [
+        (lambda t, rate, a: 3.0 * rate, "newtonian"),
+        (thinned, "carreau_yasuda"),
+        (yielding, "herschel_bulkley"),
+        (of_a_power, "power_law"),
+        (maxwell, None),
+    ],
 )
 def test_a_fluid_without_elasticity_is_named_where_effects_are_listed(stress, law, noise):
     declared = DeclaredModel.named(
@@ -159,8 +175,11 @@ def test_a_fluid_without_elasticity_is_named_where_effects_are_listed(stress, la
     assert found.verdict != "unexplained"
     assert (found.material.law if found.material else None) == law
     # a viscosity that thins is no solvent, which has one viscosity
-    effect = {"newtonian": "solvent_viscosity", None: None}.get(law, law)
+    effect = {"newtonian": "solvent_viscosity", "herschel_bulkley": "yield_stress"}.get(law, law)
     assert [stage.effect for stage in found.stages] == ([effect] if effect else [])
     if law == "newtonian":
         # the gain of a sound bench is known to 1 %
         assert found.use["constants"]["viscosity_Pa_s"]["value"] == pytest.approx(3.0, rel=0.03)
+    if law == "herschel_bulkley":
+        # four standard errors of what a quarter of the samples, at the slowest rates, say of it
+        assert found.use["constants"]["yield_stress_Pa"]["value"] == pytest.approx(8.0, rel=0.05)

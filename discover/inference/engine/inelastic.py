@@ -4,8 +4,13 @@ Newton's law, and that of Carreau & Yasuda 1972, AIChE J. 18, 1068 [Yasuda 1979,
 
     σ12 = (η∞ + (η0 − η∞) (1 + (k |γ̇|)^a)^((n − 1)/a)) γ̇,
 
-are fitted to the same rows with the same noise as hypotheses that relax, and weighed by the same
-evidence.
+that of Herschel & Bulkley 1926, Kolloid-Z. 39, 291, whose yield stress sets in at a rate 1/m
+[Papanastasiou 1987, J. Rheol. 31, 385],
+
+    σ12 = sign(γ̇) (τ_y (1 − exp(−m |γ̇|)) + K |γ̇|^n),
+
+and the same without a yield stress [Ostwald 1925, Kolloid-Z. 36, 99] are fitted to the same rows
+with the same noise as hypotheses that relax, and weighed by the same evidence.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,6 +28,7 @@ from discover.inference.engine.priors import Prior
 from discover.linear_algebra_threads import in_one_thread
 
 NEWTONIAN, CARREAU_YASUDA = "newtonian", "carreau_yasuda"
+HERSCHEL_BULKLEY, POWER_LAW = "herschel_bulkley", "power_law"
 _NO_FLUID = ""
 """No stress but that of the bench, which is what a viscosity has to beat too."""
 
@@ -33,6 +39,13 @@ _ENDS = 1e-12, 1e12
 _ROUNDS = 60
 _TIMES = 0.1, 1.0, 10.0
 _SHARPNESS = 0.7, 2.0
+_YIELDS = 0.3, 2.0
+_SHARP = 100.0
+"""m times the typical rate: the yield stress is there from a hundredth of it on."""
+
+_AT_REST = 1e-100
+"""Rate in 1/s of which a viscosity is finite, and the stress none."""
+
 _NEAR = 6.0
 """Log odds by which a law that relaxes must lead to be needed where it predicts the same."""
 
@@ -40,9 +53,19 @@ _NEAR = 6.0
 def viscosity(
     law: str, constants: Sequence[float] | np.ndarray, rate: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
-    """Return the viscosity in Pa s at shear rates in 1/s; constants in the order of `priors`."""
+    """Return the viscosity in Pa s at shear rates in 1/s; constants in the order of `priors`.
+
+    A yield stress of which m is not given is there at once.
+    """
     if law == NEWTONIAN:
         return np.full(np.shape(rate), constants[0])
+    size = np.maximum(np.abs(rate), _AT_REST)
+    if law == POWER_LAW:
+        return constants[0] * size ** (constants[1] - 1.0)
+    if law == HERSCHEL_BULKLEY:
+        yield_stress, consistency, index, *sharpness = constants
+        set_in = -np.expm1(-sharpness[0] * size) if sharpness else 1.0
+        return (yield_stress * set_in + consistency * size**index) / size
     zero, infinite, time, index, sharpness = constants
     thinned = (1.0 + (time * np.abs(rate)) ** sharpness) ** ((index - 1.0) / sharpness)
     return infinite + (zero - infinite) * thinned
@@ -55,14 +78,16 @@ class Inelastic:
     Attributes
     ----------
     law
-        ``newtonian`` or ``carreau_yasuda``.
+        ``newtonian``, ``power_law``, ``carreau_yasuda`` or ``herschel_bulkley``.
     values, ci95
-        Constants with their 95 % intervals: the viscosity in Pa s; or η0 and η∞ in Pa s, k in s, n
-        and a.
+        Constants with their 95 % intervals: the viscosity in Pa s; K in Pa sⁿ and n; η0 and η∞ in
+        Pa s, k in s, n and a; or τ_y in Pa, K in Pa sⁿ and n.
     error
         Relative misfit of the runs.
     log_odds
         Against all that relaxes, and against any discrepancy.
+    onset
+        m in s, by which a yield stress sets in; None without one.
     """
 
     law: str
@@ -70,6 +95,7 @@ class Inelastic:
     ci95: tuple[tuple[float, float], ...]
     error: float
     log_odds: float
+    onset: float | None = None
 
 
 class _InelasticFitter(Fitter):
@@ -94,13 +120,23 @@ class _InelasticFitter(Fitter):
         if self.law == NEWTONIAN:
             return {0: scale}
         time = Prior("logarithm", 1.0 / typical, _ORDER, *(end / typical for end in _ENDS))
+        index = Prior("normal", 0.5, 0.3, 0.0, 1.0)
+        if self.law == POWER_LAW:
+            return {0: scale, 1: index}
+        if self.law == HERSCHEL_BULKLEY:
+            stress = float(np.sqrt(np.mean(self.rows.recorded**2)))
+            of_yield = Prior("logarithm", 0.3 * stress, _ORDER, *(e * stress for e in _ENDS))
+            sharp = Prior("logarithm", _SHARP / typical, _ORDER, *(e / typical for e in _ENDS))
+            return {0: of_yield, 1: scale, 2: index, 3: sharp}
         plateau = Prior("logarithm", 0.01 * float(size), _ORDER, *(e * size for e in _ENDS))
-        index, sharpness = Prior("normal", 0.5, 0.3, 0.0, 1.0), Prior("normal", 2.0, 1.0, 0.2, 8.0)
+        sharpness = Prior("normal", 2.0, 1.0, 0.2, 8.0)
         return {0: scale, 1: plateau, 2: time, 3: index, 4: sharpness}
 
     def starts(self) -> list[Fit]:
         """Return fits before their first step."""
         middle = [prior.middle for prior in self.priors(()).values()]
+        if self.law == HERSCHEL_BULKLEY:
+            return [self.start((), np.array([share * middle[0], *middle[1:]])) for share in _YIELDS]
         if self.law != CARREAU_YASUDA:
             return [self.start((), np.array(middle))]
         return [
@@ -140,7 +176,8 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
     runs = fitter.rows.runs
     if any(_has_memory(run) for run in runs) or not np.any(fitter.rows.recorded):
         return None
-    own = {law: _InelasticFitter(fitter, law) for law in (_NO_FLUID, NEWTONIAN, CARREAU_YASUDA)}
+    laws = _NO_FLUID, NEWTONIAN, POWER_LAW, CARREAU_YASUDA, HERSCHEL_BULKLEY
+    own = {law: _InelasticFitter(fitter, law) for law in laws}
     fits = {law: max(one.fit(one.starts(), _ROUNDS), key=lambda f: f.log_evidence)
             for law, one in own.items()}  # fmt: skip
     nothing = fits.pop(_NO_FLUID).log_evidence
@@ -162,5 +199,9 @@ def inelastic(posterior: Posterior) -> Inelastic | None:
     odds = rank - float(np.logaddexp.reduce([other, nothing, rank + beside]))
     if odds < 0.0:
         return None
-    spans = tuple(map(fit.interval, fit.free))
-    return Inelastic(law, tuple(map(float, fit.theta)), spans, fitted.misfit(fit), odds)
+    # how sharply a yield stress sets in is as much of the instrument as of the fluid
+    own, onset = (
+        (fit.free[:-1], float(fit.theta[-1])) if law == HERSCHEL_BULKLEY else (fit.free, None)
+    )
+    values = tuple(float(fit.theta[at]) for at in own)
+    return Inelastic(law, values, tuple(map(fit.interval, own)), fitted.misfit(fit), odds, onset)
