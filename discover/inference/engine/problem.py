@@ -29,7 +29,7 @@ _SPREAD = 1.5
 _FEW = 30.0
 """Ratio of the ends of a range from which on only the order of a constant is known."""
 
-_STARTS = (1.0, 0.2, 5.0)
+_STARTS = (1.0, 0.2, 5.0, 0.04)
 """Multiples of the first trial of an inner time from which fits start."""
 
 TERM_ODDS = 0.15

@@ -1,6 +1,7 @@
 """Search among hypotheses: sets of effects, from the simplest on, with exchange and steps back."""
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -81,10 +82,12 @@ class Search:
             starts: list[Fit] = []
             new: dict[Key, None] = {}  # in their order: that of a set changes from run to run
             for parent in usable:
-                top = _REFITTED if depth else None  # far from the minimum a score says little
-                for start in self.scored(parent)[:top]:
+                # far from the minimum a score says little, of effects and of their inner constants
+                top = _REFITTED if depth else None
+                some = self.scored(parent, every_start=not depth)[:top]
+                for start in some:
                     key = frozenset(start.names)
-                    if key not in self.found and key not in new:
+                    if key not in self.found:  # of two parents it may end in two places
                         new[key] = None
                         starts += self.at_several_times(start)
             if not starts:
@@ -102,8 +105,10 @@ class Search:
         self.say(f"exchanged: {len(self.found)} sets")
         return self
 
-    def scored(self, fit: Fit) -> list[Fit]:
+    def scored(self, fit: Fit, every_start: bool = False) -> list[Fit]:
         """Return hypotheses with one effect more, ready to be fitted, the likeliest first.
+
+        With `every_start` each from all starts of its inner constants, and else from the likeliest.
 
         Each is scored from one linearisation at amplitude zero, inner constants at several starts:
         the gain of log likelihood with noise sizes free, less the Laplace price of its prior. Both
@@ -147,7 +152,7 @@ class Search:
         slope = left @ new
         curvature = np.sum(new**2, axis=0) - np.sum(shared**2, axis=0)
         total, count = float(left @ left), len(left)
-        best: dict[str, tuple[float, Fit]] = {}
+        best: dict[Any, tuple[float, Fit]] = {}
         for i, ((name, inner, _), prior) in enumerate(zip(asked, priors, strict=True)):
             at = problem.model.positions(name)[0]
             stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
@@ -159,7 +164,8 @@ class Search:
             gain = slope[i] * size - 0.5 * stiff * size**2
             gain = -0.5 * count * np.log(max(1.0 - 2.0 * gain / max(total, 1e-300), 1e-4))
             score = gain - 0.5 * np.log(stiff * prior.width**2) + np.log(problem.odds(name))
-            if name in best and best[name][0] >= score:
+            key = (name, *inner.items()) if every_start else name
+            if key in best and best[key][0] >= score:
                 continue
             theta = fit.theta.copy()
             for position, value in inner.items():
@@ -167,9 +173,9 @@ class Search:
             theta[at] = np.clip(
                 theta[at] + size if at in fit.priors else size, prior.low, prior.high
             )
-            best[name] = score, fitter.start((*fit.names, name), theta, fit.linear)
+            best[key] = score, fitter.start((*fit.names, name), theta, fit.linear)
             share = max(-np.expm1(-2.0 * gain / count), 0.0)
-            best[name][1].memory["scored"] = float(share), float(score)
+            best[key][1].memory["scored"] = float(share), float(score)
         return [one for _, one in sorted(best.values(), key=lambda pair: -pair[0])]
 
     def exchange(self) -> None:
