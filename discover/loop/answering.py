@@ -66,6 +66,19 @@ LAW_OF_EFFECT = {
 }
 """Laws that an effect makes of an upper convected Maxwell fluid."""
 
+_TITLE_OF_EFFECT = {name: LAWS[law].title for name, law in LAW_OF_EFFECT.items()} | {
+    name: "thixotropic Maxwell"
+    for name in (
+        "thixotropy",
+        "thixotropic_modulus",
+        "thixotropic_modulus_by_stress",
+        "thixotropic_relaxation",
+        "thixotropic_relaxation_by_stress",
+        "thixotropic_relaxation_two_times",
+    )
+}
+"""What the field calls an upper convected Maxwell fluid with an effect, the first that applies."""
+
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
     "states": "Fitted, not tested: only steady or periodic states were measured.",
@@ -183,8 +196,7 @@ def _failed(result: Any) -> str:
         return _NOT_TESTED[untested]
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
-        p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        return f"Residual systematic (p {p})."
+        return "Residual systematic."
     return ""
 
 
@@ -225,10 +237,11 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = LAWS[base[0]].title if base else "law"
         # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
         names = [stage.effect for stage in in_fluid]
-        core = next((n for n in names if base and base[0] == "ucm" and n in LAW_OF_EFFECT), None)
+        is_ucm = base is not None and base[0] == "ucm"
+        core = next((one for one in _TITLE_OF_EFFECT if is_ucm and one in names), None)
         if core is not None:
-            title = LAWS[LAW_OF_EFFECT[core]].title
-        added = [effect_title(name) for name in names if name != core]
+            title = _TITLE_OF_EFFECT[core]
+        added = [_added_title(name) for name in names if name != core]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
         if added:
@@ -242,6 +255,10 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
+
+
+def _added_title(effect: str) -> str:
+    return "solvent" if effect == "solvent_viscosity" else effect_title(effect)
 
 
 def shows_a_derivative(result: Any) -> bool:

@@ -8,14 +8,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError, sentences
+from discover.answer.sentences import MUCH
 from discover.loop.run_record import RunRecord
 from discover.words import percent_of
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
-
-MUCH = 2.0
-"""Relative difference from which on its size says nothing."""
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from discover.answer.sentences import A_TRANSIENT
-from discover.loop.by_quantity import MUCH, differing, measured
+from discover.answer.sentences import A_TRANSIENT, MUCH
+from discover.loop.by_quantity import differing, measured
 from discover.loop.parts import Stage
 from discover.words import (
     FIGURE_SYMBOLS,
@@ -137,7 +137,7 @@ _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
 def _by_geometry(result: Any) -> str:
     """Return which run to repeat where nothing says whether instrument or fluid is amiss."""
     run = _worst(result)
-    return f"Repeat {run} in a geometry with another gap, to separate instrument and fluid."
+    return f"Repeat {run} with another gap, to separate instrument and fluid."
 
 
 def _telling_test(result: Any) -> str:
