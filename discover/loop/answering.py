@@ -66,18 +66,15 @@ LAW_OF_EFFECT = {
 }
 """Laws that an effect makes of an upper convected Maxwell fluid."""
 
-_TITLE_OF_EFFECT = {name: LAWS[law].title for name, law in LAW_OF_EFFECT.items()} | {
-    name: "thixotropic Maxwell"
-    for name in (
-        "thixotropy",
-        "thixotropic_modulus",
-        "thixotropic_modulus_by_stress",
-        "thixotropic_relaxation",
-        "thixotropic_relaxation_by_stress",
-        "thixotropic_relaxation_two_times",
-    )
-}
-"""What the field calls an upper convected Maxwell fluid with an effect, the first that applies."""
+_STRUCTURES = (
+    "thixotropy",
+    "thixotropic_modulus",
+    "thixotropic_modulus_by_stress",
+    "thixotropic_relaxation",
+    "thixotropic_relaxation_by_stress",
+    "thixotropic_relaxation_two_times",
+)
+"""Effects that make a thixotropic fluid of an upper convected Maxwell fluid."""
 
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
@@ -238,10 +235,13 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
         names = [stage.effect for stage in in_fluid]
         is_ucm = base is not None and base[0] == "ucm"
-        core = next((one for one in _TITLE_OF_EFFECT if is_ucm and one in names), None)
+        core = next((one for one in names if is_ucm and one in LAW_OF_EFFECT), None)
+        known = [core]
         if core is not None:
-            title = _TITLE_OF_EFFECT[core]
-        added = [_added_title(name) for name in names if name != core]
+            title = LAWS[LAW_OF_EFFECT[core]].title
+        elif is_ucm and any(name in _STRUCTURES for name in names):
+            title, known = "thixotropic Maxwell", [*_STRUCTURES]
+        added = [_added_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
         if added:
@@ -322,7 +322,14 @@ def _renamed(
         constants = [replace(first, name=effect), *inner]
     names = [one.name for one in taken]
     return [
-        replace(one, name=f"{effect}.{one.name}") if one.name in names else one for one in constants
+        replace(
+            one,
+            name=f"{effect}.{one.name}",
+            meaning=f"{one.meaning or one.said} ({effect_title(effect)})",
+        )
+        if one.name in names
+        else one
+        for one in constants
     ]
 
 

@@ -35,17 +35,17 @@ _FIRST = 0.8
 _EXCHANGE = 1.4
 """Fits that an exchanged hypothesis takes."""
 
-_WEIGHED, _WEIGHED_ALONE = _Part(90.0, share=0.75), _Part(10.0)
+_WEIGHED, _WEIGHED_ALONE = _Part(135.0, share=1.2), _Part(10.0)
 """What is weighed after the search: with runs held out, when all are fitted again, or without."""
 
-_CURVES, _BANDS = _Part(30.0, 3.5, 0.5), _Part(15.0, 8.0, 0.7)
+_CURVES, _BANDS = _Part(36.0, 3.5, 0.5), _Part(15.0, 8.0, 0.7)
 """Curves of one variable; bands, intervals and the next test. All these were measured on two cores:
-on a polyisoprene melt, a gel, blood, two-mode PTT and noise."""
+on LDPE, a polyisoprene melt, a gel, blood, two-mode PTT and noise."""
 
 _SECOND = 1.6
 """What is weighed after the second search, with more constants, over that after the first."""
 
-_FEW_NEAR = 0.25
+_FEW_NEAR = 0.2
 """Share of what follows a search where no effect is the likeliest: few hypotheses are near."""
 
 _SLOW = 0.3

@@ -259,6 +259,10 @@ def test_a_maxwell_fluid_with_a_structure_is_called_thixotropic():
     stages = [replace(result.stages[0], effect=one, kind="constitutive") for one in names]
     found = replace(result, stages=tuple(stages), declared_law=Equation(()))
     assert found.answer.title == "thixotropic Maxwell with solvent"
+    two = replace(stages[1], effect="thixotropic_relaxation_two_times")
+    both = replace(found, stages=(*stages, two)).answer  # two structures are one kind of fluid
+    assert both.title == "thixotropic Maxwell with solvent"
+    assert both.constants[-1].said.endswith("(two-time thixotropic relaxation)")
 
 
 def test_a_grey_button_says_why():
