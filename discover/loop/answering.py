@@ -207,7 +207,7 @@ def _alternative(result: Any) -> str:
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
         after = f"; next: {others[0] or 'the declared model'}" if others else ""
-        return f"Probability {percent_of(own.probability)}{after}."
+        return f"Probability of this law {percent_of(own.probability)}{after}."
     if result.nearest_law is None:
         return ""
     near = result.nearest_law
