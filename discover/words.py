@@ -140,6 +140,7 @@ _EFFECTS = {
     "non_affine_motion": "non-affine motion",
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",
+    "rate_rise_time": "slow motor",
     "thixotropic_modulus_by_stress": "stress-driven thixotropic modulus",
     "thixotropic_relaxation_by_stress": "stress-driven thixotropic relaxation",
     "thixotropic_relaxation_two_times": "two-time thixotropic relaxation",

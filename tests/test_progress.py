@@ -23,34 +23,84 @@ def test_a_search_of_unknown_length_never_goes_back_and_never_ends_before_it_doe
 
 
 # (seconds of the processor, line) of closed loops, as recorded on 2 cores, up to the drawing and to
-# the end; without lines that hold no number
+# the end; without lines that hold no number, and of the likeliest effects with some alone
 RECORDED = {
     "gel, at most 5 effects": [
-        (0.67, "search among 24 effects"), (1.21, "sets of 1: 20 fitted"),
-        (2.13, "sets of 2: 22 fitted"), (3.01, "sets of 3: 23 fitted"),
-        (3.91, "sets of 4: 21 fitted"), (5.03, "sets of 5: 21 fitted"),
-        (8.28, "exchanged: 157 sets"), (10.93, "constants that may differ from mode to mode"),
-        (14.52, "search among 24 effects"), (15.08, "sets of 1: 20 fitted"),
-        (16.03, "sets of 2: 22 fitted"), (17.02, "sets of 3: 23 fitted"),
-        (17.97, "sets of 4: 21 fitted"), (19.14, "sets of 5: 21 fitted"),
-        (22.60, "exchanged: 157 sets"), (25.40, "curves of one variable"),
-        (26.95, "bands, intervals and the next test"), (28.74, "drawing"), (31.05, "end"),
+        (2.88, "search among 24 effects"),
+        (3.62, "sets of 1: 20 fitted, likeliest: thixotropy"),
+        (4.62, "sets of 2: 22 fitted, likeliest: instrument_inertia, thixotropy"),
+        (5.69, "sets of 3: 23 fitted, likeliest: bearing_friction, thixotropy"),
+        (6.96, "sets of 4: 21 fitted, likeliest: thixotropy, transducer_lag"),
+        (8.17, "sets of 5: 21 fitted, likeliest: thixotropy, wall_slip"),
+        (13.61, "exchanged: 167 sets"),
+        (18.16, "curves of one variable"),
+        (21.61, "bands, intervals and the next test"),
+        (27.34, "drawing"),
+        (29.52, "end"),
+    ],
+    "polyisoprene melt, at most 5 effects": [
+        (1.13, "search among 32 effects"),
+        (6.24, "sets of 1: 26 fitted, likeliest: ptt_linear"),
+        (14.47, "sets of 2: 23 fitted, likeliest: ptt_linear"),
+        (21.68, "sets of 3: 24 fitted, likeliest: ptt_linear"),
+        (28.36, "sets of 4: 24 fitted, likeliest: ptt_linear"),
+        (34.99, "sets of 5: 23 fitted, likeliest: ptt_linear"),
+        (56.42, "exchanged: 172 sets, likeliest: ptt_linear"),
+        (81.33, "constants that may differ from mode to mode"),
+        (85.45, "search among 32 effects"),
+        (91.32, "sets of 1: 26 fitted, likeliest: ptt_linear"),
+        (96.67, "sets of 2: 23 fitted, likeliest: ptt_linear"),
+        (103.20, "sets of 3: 23 fitted, likeliest: ptt_linear"),
+        (110.05, "sets of 4: 24 fitted, likeliest: ptt_linear"),
+        (117.03, "sets of 5: 23 fitted, likeliest: ptt_linear"),
+        (131.22, "exchanged: 152 sets, likeliest: ptt_linear"),
+        (186.99, "curves of one variable"),
+        (197.75, "bands, intervals and the next test"),
+        (212.88, "drawing"),
+        (216.59, "end"),
+    ],
+    "two-mode PTT, at most 3 effects": [
+        (2.77, "search among 86 effects"),
+        (4.78, "sets of 1: 83 fitted, likeliest: ptt_linear"),
+        (5.62, "sets of 2: 22 fitted, likeliest: ptt_linear"),
+        (6.19, "exchanged: 106 sets"),
+        (10.87, "constants that may differ from mode to mode"),
+        (13.12, "search among 86 effects"),
+        (15.12, "sets of 1: 83 fitted, likeliest: ptt_linear"),
+        (16.08, "sets of 2: 22 fitted, likeliest: ptt_linear"),
+        (16.68, "exchanged: 106 sets"),
+        (21.82, "curves of one variable"),
+        (27.29, "bands, intervals and the next test"),
+        (38.14, "drawing"),
+        (40.99, "end"),
     ],
     "LDPE, at most 3 effects": [
-        (2.61, "search among 86 effects"), (17.24, "sets of 1: 70 fitted"),
-        (21.38, "sets of 2: 23 fitted"), (25.37, "sets of 3: 24 fitted"),
-        (30.21, "exchanged: 133 sets"), (51.28, "constants that may differ from mode to mode"),
-        (55.62, "search among 86 effects"), (72.12, "sets of 1: 70 fitted"),
-        (79.55, "sets of 2: 24 fitted"), (88.35, "sets of 3: 24 fitted"),
-        (96.07, "exchanged: 134 sets"), (127.87, "curves of one variable"),
-        (136.27, "bands, intervals and the next test"), (141.83, "drawing"), (145.41, "end"),
+        (3.11, "search among 86 effects"),
+        (12.51, "sets of 1: 70 fitted, likeliest: ptt_linear"),
+        (18.14, "sets of 2: 23 fitted, likeliest: ptt_linear, strain_damping"),
+        (23.46, "sets of 3: 24 fitted, likeliest: edge_fracture, ptt_linear"),
+        (29.42, "exchanged: 132 sets, likeliest: edge_fracture, ptt_linear"),
+        (64.57, "constants that may differ from mode to mode"),
+        (68.76, "search among 86 effects"),
+        (76.45, "sets of 1: 70 fitted, likeliest: strain_damping"),
+        (80.84, "sets of 2: 22 fitted, likeliest: convective_constraint_release, strain_damping"),
+        (86.42, "sets of 3: 23 fitted, likeliest: convective_constraint_release, strain_damping"),
+        (94.00, "exchanged: 129 sets, likeliest: convective_constraint_release, thixotropy"),
+        (149.94, "curves of one variable"),
+        (170.24, "bands, intervals and the next test"),
+        (178.84, "drawing"),
+        (182.52, "end"),
     ],
-    # wall-clock seconds of a busy machine, one mode
-    "blood, one mode and seven effects, at most 2 effects": [
-        (24.8, "search among 7 effects"), (67.8, "sets of 1: 7 fitted"),
-        (154.4, "sets of 2: 15 fitted"), (228.5, "exchanged: 26 sets"),
-        (405.4, "curves of one variable"), (513.9, "bands, intervals and the next test"),
-        (665.3, "end"),
+    "blood, one mode and none held out, at most 3 effects": [
+        (8.39, "search among 10 effects"),
+        (13.66, "sets of 1: 10 fitted"),
+        (20.34, "sets of 2: 22 fitted"),
+        (30.15, "sets of 3: 19 fitted"),
+        (42.78, "exchanged: 68 sets"),
+        (48.25, "curves of one variable"),
+        (48.25, "bands, intervals and the next test"),
+        (59.34, "drawing"),
+        (62.56, "end"),
     ],
 }  # fmt: skip
 
@@ -64,31 +114,35 @@ def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_
 
     whole = FollowedBy(lambda text, fraction: told.append(fraction), 2.5, clock)
     say = by_time(whole, clock)
-    search = SearchTime(int(name[-9]), "one mode" not in name, clock=clock)
+    without = "none held out" in name
+    search = SearchTime(
+        int(name[-9]), "one mode" not in name, 1, not without, "gel" not in name and not without,
+        clock=clock,
+    )  # fmt: skip
     end, checked = RECORDED[name][-1][0], 0
     for now, line in RECORDED[name][:-1]:  # the clock reads it
         whole(line, 1.0) if line == "drawing" else say(line, search.heard(line))
-        if now > 0.1 * end:
+        if told[-1] and now > 0.1 * end:
             left = now * (1.0 - told[-1]) / told[-1]
             assert 1.0 / 1.5 < left / (end - now) < 1.5, line
             checked += 1
     assert told == sorted(told)
-    assert checked > (10 if len(RECORDED[name]) > 10 else 4)
+    assert checked >= len(RECORDED[name]) // 2
 
 
 def test_rounds_that_leave_a_run_out_each_take_as_long_as_the_first():
     now = 0.0
     search = SearchTime(1, False, rounds=3, clock=lambda: now)
-    # ten fits a second, none exchanged; 90, 38 and 40 fits follow
+    # 8 fits a second, of one effect 10, none exchanged; then 135 fits, 36 and 3.5 s, 15 and 8 s
     round_ = [(0.0, "search among 400 effects"), (40.0, "sets of 1: 400 fitted"),
-              (40.0, "exchanged: 400 sets"), (49.0, "curves of one variable"),
-              (52.8, "bands, intervals and the next test")]  # fmt: skip
-    for begins in (0.0, 56.8, 113.6):
+              (40.0, "exchanged: 400 sets"), (56.9, "curves of one variable"),
+              (64.9, "bands, intervals and the next test")]  # fmt: skip
+    for begins in (0.0, 74.8, 149.6):
         for after, line in round_:
             now = begins + after
             left = search.heard(f"without a: {line}")
             if after:
-                assert left == pytest.approx(170.4 - now, rel=0.2), (begins, line)
+                assert left == pytest.approx(224.4 - now, rel=0.2), (begins, line)
 
 
 def test_last_words_are_said_backwards_and_one_that_fails_stops_none():

@@ -10,7 +10,7 @@ from discover.equations.equation import Equation
 from discover.equations.spelling.plain_signs import plain as plain_signs
 from discover.plain_numbers import plain
 from discover.summary_view import Estimate
-from discover.words import effect_title, estimate, interval, readable
+from discover.words import effect_title, estimate, interval, readable, significant
 
 TOLERANCE = 0.05
 """Relative discrepancy that is accepted where nobody says otherwise."""
@@ -121,6 +121,8 @@ class Constant:
         if not 1e-3 <= largest < 1e5 or decimals > 6:
             return ""
         text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
+        if self.ci95[0] > 0.0 and not float(text):  # small, but not zero
+            return significant(value, 1)
         return text.replace("-", _MINUS)
 
     @property

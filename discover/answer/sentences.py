@@ -22,8 +22,23 @@ A_TRANSIENT = (
 
 def headline(answer: Any) -> str:
     """Return the first line: law, constants, how well it describes, where to use it."""
+    return " ".join(filter(None, [law(answer), quality(answer)]))
+
+
+def quality(answer: Any) -> str:
+    """Return what follows the law: how well it describes, what else there is, where to use it."""
     behind = answer.alternative if answer.is_empirical else ""
-    return " ".join(filter(None, [law(answer), behind, description(answer), where(answer)]))
+    return _level_once(answer, " ".join(filter(None, [description(answer), behind, where(answer)])))
+
+
+_LEVEL = "95 %: "
+"""Level of intervals, which a first screen says once."""
+
+
+def _level_once(answer: Any, text: str) -> str:
+    """Return text that follows the law, without a level of intervals that has been said."""
+    said, first, rest = ("", "", text) if _LEVEL in law(answer) else text.partition(f"({_LEVEL}")
+    return said + first + rest.replace(f"({_LEVEL}", "(")
 
 
 def law(answer: Any) -> str:
@@ -39,9 +54,9 @@ def law(answer: Any) -> str:
     ]  # fmt: skip
     own = sorted(own, key=lambda one: one.name in _OF_MODES)
     named = constants(own[:_MOST_CONSTANTS])
-    if several:
+    if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
-    elif answer.modes and not named and not _is_plain(answer):
+    elif answer.modes and not several and not named and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
@@ -51,7 +66,7 @@ def law(answer: Any) -> str:
 def constants(several: Sequence[Any]) -> list[str]:
     """Return constants in words; the first interval says that it is one of 95 %."""
     first = next((one for one in several if one.has_interval), None)
-    return [one.with_interval("95 %: " if one is first else "") for one in several]
+    return [one.with_interval(_LEVEL if one is first else "") for one in several]
 
 
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
@@ -69,14 +84,11 @@ def description(answer: Any) -> str:
     if found is None or not found.size:
         return f"Residual of the fitted runs {residual}." if residual else ""
     low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-    ends = f" (95 %: {low}–{high} %)" if low != high else ""
-    size = f"{percent_of(found.size)}{ends}"
-    subtracted = f", noise {noise} subtracted" if noise else ""
-    if answer.is_empirical and answer.alternative:  # behind the best classical law
-        return f"The fit: {size} on {'unseen' if found.unseen else 'fitted'} runs."
+    ends = f" ({_LEVEL}{low}–{high} %)" if low != high else ""
     # of fitted runs it is no error that a prediction could have
-    of = "Model error on unseen runs" if found.unseen else "Residual of the fitted runs"
-    return f"{of} {size}{subtracted}."
+    of = "Error on unseen runs" if found.unseen else "Residual of the fitted runs"
+    besides = f", noise {noise}" if noise else ""
+    return f"{of} {percent_of(found.size)}{ends}{besides}."
 
 
 def flows(answer: Any) -> str:
@@ -98,7 +110,7 @@ def where(answer: Any) -> str:
     numeral = "λω" if one.oscillates else "λ/duration"
     if _is_plain(answer) and one.weissenberg is not None:
         found.append(f"Wi = λγ̇ ≤ {_short(one.weissenberg[1])}")
-        found += [] if one.deborah is None else [f"De = {numeral} {span(one.deborah)}"]
+        found += [] if one.deborah is None else [f"De = {numeral} = {span(one.deborah)}"]
     else:
         found += [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
         found += [] if one.frequency_rad_s is None else [f"{span(one.frequency_rad_s)} rad/s"]
@@ -149,13 +161,8 @@ def tolerance(answer: Any) -> str:
     met = [SYMBOLS[name] for name in within if answer.expected(name).is_measured]
     assumed = [SYMBOLS[name] for name in within if not answer.expected(name).is_measured]
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
-    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
-    over = {name: size for name, size in by_run.items() if size > answer.tolerance}
-    where_over = ""
-    if over:
-        worst = max(over, key=lambda name: over[name])
-        first = "worst: " if len(over) > 1 else ""
-        where_over = f"{counted(len(over), 'run')} ({first}{worst}, {percent_of(over[worst])})"
+    over = _over_tolerance(answer)
+    where_over = counted(len(over), "run") if over else ""
     if not answer.adequate and not (missed or where_over):
         said = "not met"
     elif not answer.adequate or missed:
@@ -167,10 +174,24 @@ def tolerance(answer: Any) -> str:
         residual = answer.expected("sigma12").is_residual
         of = " by the fitted runs" if residual else f" for {listed(met)}" if met else ""
         said = f"met{of}{f', but not in {where_over}' if where_over else ''}"
-    parts = [f"Tolerance {asked}: {said}"]
     if assumed:
-        parts.append(f"{listed(assumed)} within it if this law holds, not measured")
-    return f"{'; '.join(parts)}."
+        said += f"; {'met ' if 'not met' in said else ''}for {listed(assumed)} if this law holds"
+    return f"Tolerance {asked}: {said}."
+
+
+def _over_tolerance(answer: Any) -> dict[str, float]:
+    """Return runs that are missed by more than the tolerance, with their discrepancy."""
+    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
+    return {name: size for name, size in by_run.items() if size > answer.tolerance}
+
+
+def worst_run(answer: Any) -> tuple[str, str] | None:
+    """Return name and error of the run that is missed most; None where all are within tolerance."""
+    over = _over_tolerance(answer)
+    if not over:
+        return None
+    name = max(over, key=lambda name: over[name])
+    return name, percent_of(over[name])
 
 
 def error_title(answer: Any) -> str:
@@ -182,8 +203,17 @@ def expected(one: Any, place: str) -> str:
     """Return an expected error, ``inside`` the range or ``beyond`` it, or why there is none."""
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
-        return percent_of(value) if value else "within noise"
+        return _at_most(value) if value else "within noise"
     return "–" if one.is_known else one.missing
+
+
+def _at_most(value: float) -> str:
+    """Return a relative error; of one that is large only that it is."""
+    return percent_of(value) if value <= MUCH else f"> {percent_of(MUCH)}"
+
+
+MUCH = 2.0
+"""Relative error from which on its size says nothing."""
 
 
 def suspects(answer: Any) -> str:
@@ -201,7 +231,7 @@ def separable(answer: Any) -> bool:
 
 def further(answer: Any) -> list[str]:
     """Return what stands below the table: another law, tolerance and failed test."""
-    behind = "" if answer.is_empirical else answer.alternative
+    behind = "" if answer.is_empirical else _level_once(answer, answer.alternative)
     return [one for one in (behind, " ".join(filter(None, [tolerance(answer), answer.failed])))
             if one]  # fmt: skip
 
@@ -216,8 +246,10 @@ def lines(answer: Any) -> list[str]:
             text = f"{symbol} {expected(one, 'inside')}{f' ({one.note})' if one.note else ''}"
             if one.beyond is not None:
                 at = f" ({one.beyond_at})" if one.beyond_at else ""
-                text += f", beyond the range {percent_of(one.beyond)}{at}"
+                text += f", beyond the range {_at_most(one.beyond)}{at}"
             parts.append(text)
+        if (worst := worst_run(answer)) is not None:
+            parts.append("worst run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
     found += [suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")

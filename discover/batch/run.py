@@ -30,10 +30,10 @@ from discover.study.schema import Study, Verdict
 from discover.validation import validated
 from discover.words import counted
 
-_DRAWING = 2.5
-"""Seconds in which the pictures of a page are drawn."""
+_DRAWING = {"compare": 4.0, "close-loop": 2.5}
+"""Seconds in which the pictures of a page are drawn, by task."""
 
-_DEMO_SHARES = {"comparison": 0.86, "loop": 0.14}
+_DEMO_SHARES = {"comparison": 0.84, "loop": 0.16}
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -97,7 +97,9 @@ class _Task:
         if there:
             text = (folder.load("verdict") or {}).get("text", "")
         else:
-            text = "\n".join(self.work(study, seed, folder, FollowedBy(progress, _DRAWING)))
+            text = "\n".join(
+                self.work(study, seed, folder, FollowedBy(progress, _DRAWING[self.name]))
+            )
             folder.save("verdict", {"text": text})
             folder.finish()
             progress("done", 1.0)

@@ -191,8 +191,9 @@ def compare(
             progress("done", 1.0)
             return _of_material(simple, study, data, declared, learning.seed)
     n_parts = (1 + len(sweep)) * len(options.learners) + int(options.distillation)
-    several = len(declared.modulus) > 1
-    times = ComparisonTime(progress, MOST_EFFECTS, several, n_parts / len(options.learners))
+    several, held_out = len(declared.modulus) > 1, len(data.held_out) > 0
+    trainings = n_parts / len(options.learners)
+    times = ComparisonTime(progress, MOST_EFFECTS, several, held_out, trainings)
     progress("searching among laws, effects and terms", 0.0)
     found = search_hypotheses(study, data, declared, library, times.searching)
     frame = known_part(declared, found.ended(), data, options.high_deborah, pipkin)

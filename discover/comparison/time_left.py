@@ -16,12 +16,20 @@ _LEAST = 0.15
 class ComparisonTime:
     """Progress of a comparison.
 
-    `most`, `several_modes`: as for `SearchTime`. `trainings`: how often all learners learn.
+    `most`, `several_modes`, `held_out`: as for `SearchTime`. `trainings`: how often all learners
+    learn.
     """
 
-    def __init__(self, progress: Progress, most: int, several_modes: bool, trainings: float):
+    def __init__(
+        self,
+        progress: Progress,
+        most: int,
+        several_modes: bool,
+        held_out: bool,
+        trainings: float,
+    ):
         self._tell, self._trainings = by_time(progress), trainings
-        self._searches = SearchTime(most, several_modes, reported=False)
+        self._searches = SearchTime(most, several_modes, held_out=held_out, reported=False)
         self._begun = self._since = time.perf_counter()
         self._learn = self._weigh = 0.0
         self._weighs = False

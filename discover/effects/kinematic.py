@@ -76,7 +76,7 @@ RATE_RISE_TIME = RateRiseTime(
     ),
     equation=r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} = \dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: response time of the drive",
-    check="Record the angle of the motor in start-up; repeat at another rate.",
+    check="Record the angle of the motor in start-up.",
     visible="tau of about 5 % of the time in which the stress grows.",
 )  # fmt: skip
 

@@ -45,6 +45,7 @@ THIXOTROPY = Thixotropy(
         EffectParameter(
             "build_up_time", r"t_\mathrm{b}", "s", low=1e-3, high=1e6, scale="run_time",
             first_trial=0.3, ends=("high",), endless="damping_by_total_strain",
+            meaning="build-up time",
             range_source="from the Brownian time 6πηa³/kT of particles of 0.1 µm in water, some "
             "milliseconds, to structures that build up over weeks or never (Mewis & Wagner 2009)",
         ),

@@ -69,7 +69,7 @@ EDGE_FRACTURE = EdgeFracture(
     source="Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929: the torque of melts falls from "
     "cycle to cycle. Tanner & Keentok 1983, J. Rheol. 27, 47, say when an edge breaks (by N2), "
     "not how the torque falls: the exponential in strain is an empirical form",
-    check="Watch the edge; repeat with a smaller cone angle or a partitioned plate.",
+    check="Watch the edge; repeat with a smaller cone angle.",
     visible="k times the strain beyond the critical one of about 0.1.",
 )  # fmt: skip
 

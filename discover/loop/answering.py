@@ -66,6 +66,16 @@ LAW_OF_EFFECT = {
 }
 """Laws that an effect makes of an upper convected Maxwell fluid."""
 
+_STRUCTURES = (
+    "thixotropy",
+    "thixotropic_modulus",
+    "thixotropic_modulus_by_stress",
+    "thixotropic_relaxation",
+    "thixotropic_relaxation_by_stress",
+    "thixotropic_relaxation_two_times",
+)
+"""Effects that make a thixotropic fluid of an upper convected Maxwell fluid."""
+
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
     "states": "Fitted, not tested: only steady or periodic states were measured.",
@@ -183,8 +193,7 @@ def _failed(result: Any) -> str:
         return _NOT_TESTED[untested]
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
-        p = "< 0.001" if chance < 1e-3 else f"= {chance:.2g}"
-        return f"Residual systematic (p {p})."
+        return "Residual systematic."
     return ""
 
 
@@ -198,7 +207,7 @@ def _alternative(result: Any) -> str:
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
         after = f"; next: {others[0] or 'the declared model'}" if others else ""
-        return f"Probability {percent_of(own.probability)}{after}."
+        return f"Probability of this law {percent_of(own.probability)}{after}."
     if result.nearest_law is None:
         return ""
     near = result.nearest_law
@@ -225,10 +234,14 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = LAWS[base[0]].title if base else "law"
         # what makes a named law of a Maxwell fluid gives its name, and other effects come with it
         names = [stage.effect for stage in in_fluid]
-        core = next((n for n in names if base and base[0] == "ucm" and n in LAW_OF_EFFECT), None)
+        is_ucm = base is not None and base[0] == "ucm"
+        core = next((one for one in names if is_ucm and one in LAW_OF_EFFECT), None)
+        known = [core]
         if core is not None:
             title = LAWS[LAW_OF_EFFECT[core]].title
-        added = [effect_title(name) for name in names if name != core]
+        elif is_ucm and any(name in _STRUCTURES for name in names):
+            title, known = "thixotropic Maxwell", [*_STRUCTURES]
+        added = [_added_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
         if added:
@@ -242,6 +255,10 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
+
+
+def _added_title(effect: str) -> str:
+    return "solvent" if effect == "solvent_viscosity" else effect_title(effect)
 
 
 def shows_a_derivative(result: Any) -> bool:
@@ -305,7 +322,14 @@ def _renamed(
         constants = [replace(first, name=effect), *inner]
     names = [one.name for one in taken]
     return [
-        replace(one, name=f"{effect}.{one.name}") if one.name in names else one for one in constants
+        replace(
+            one,
+            name=f"{effect}.{one.name}",
+            meaning=f"{one.meaning or one.said} ({effect_title(effect)})",
+        )
+        if one.name in names
+        else one
+        for one in constants
     ]
 
 

@@ -8,14 +8,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from discover.answer import Discrepancy, ExpectedError, sentences
+from discover.answer.sentences import MUCH
 from discover.loop.run_record import RunRecord
 from discover.words import percent_of
 
 BEYOND = 2.0
 """Rates beyond the fastest fitted one, at which errors beyond the range are given."""
-
-MUCH = 2.0
-"""Relative difference from which on its size says nothing."""
 
 _APART = 0.2
 """Relative difference between laws from which on a quantity is not determined."""
@@ -106,6 +104,7 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
         differ = "" if apart is None else f"laws that fit as well differ by {_at_most(apart)}"
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
+            beyond = None if beyond is None else max(beyond, apart)
             note = f"if {name}; not measured"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N1":

@@ -113,8 +113,9 @@ def run_loop_on(
     """
     rounds = 1 + len(data.fit) if data.each else 1
     tell = by_time(progress)
-    left = SearchTime(max_effects, len(declared.modulus) > 1, rounds)
-
+    sheared = all(run.protocol.control == "rate" and run.flow == "shear" for run in data.fit.runs)
+    held_out = data.each or bool(len(data.held_out))
+    left = SearchTime(max_effects, len(declared.modulus) > 1, rounds, held_out, sheared)
     states = not any(run.protocol.control in ("rate", "stress") for run in data.fit.runs)
 
     def say(line: str) -> None:

@@ -19,14 +19,14 @@ from discover._version import __version__
 from discover.answer import Answer, Suspect
 from discover.answer.sentences import (
     SYMBOLS,
-    description,
     error_title,
     expected,
     further,
     law,
     linear_part,
+    quality,
     separable,
-    where,
+    worst_run,
 )
 from discover.equations import Equation
 from discover.equations.files import FORMATS
@@ -168,10 +168,9 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     """Return what the template ``answer.html`` shows; None shows nothing."""
     if answer is None:
         return None
-    behind = answer.alternative if answer.is_empirical else ""
     found: dict[str, Any] = {
         "headline": _unbroken(law(answer)),
-        "quality": _unbroken(" ".join(filter(None, [behind, description(answer), where(answer)]))),
+        "quality": _unbroken(quality(answer)),
         "level": "95 % CI" if answer.adequate and answer.fits_to_the_noise else "95 %, statistical",
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
@@ -208,7 +207,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
                 "note": _unbroken(one.note),
             }
             for symbol, one in rows
-        ],
+        ]
+        + _worst(answer),
         "modes": [
             (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
             for mode in answer.modes
@@ -218,6 +218,16 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
+
+
+def _worst(answer: Answer) -> list[dict[str, Any]]:
+    """Return the row of the run that is missed most, if by more than the tolerance."""
+    worst = worst_run(answer)
+    if worst is None:
+        return []
+    note, error = worst
+    return [{"symbol": "worst run", "inside": error, "beyond": "–", "beyond_at": "",
+             "known": True, "note": note}]  # fmt: skip
 
 
 def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:

@@ -57,7 +57,7 @@ def test_steps_of_trios_become_the_tables_that_they_are(tmp_path, name, mark):
     assert_sweep(out / "lve.csv")
     np.testing.assert_allclose(table(out / "flow_curve.csv")["stress_Pa"], 3.0 * RATES, rtol=EXACT)
     assert not (out / "runs.csv").exists()
-    assert "block 1 Amplitude sweep - 1: taken for an amplitude sweep" in result.stdout
+    assert "block 1 Amplitude sweep - 1: read as an amplitude sweep" in result.stdout
     again, _ = run(tmp_path, "--mapping", out / "import.toml", "--overwrite")
     assert_softening(again / "amplitude_sweep.csv")
 

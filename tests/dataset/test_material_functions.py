@@ -77,9 +77,9 @@ def test_an_amplitude_sweep_judges_and_the_linear_sweep_gives_modes_unless_asked
 def test_the_check_says_what_each_table_was_taken_for(tmp_path):
     found = check_folder(write(tmp_path, {**TABLES, **SWEEPS}))
     said = " ".join(str(finding) for finding in found)
-    assert "amplitude_sweep.csv is taken for an amplitude sweep" in said
-    assert "flow_curve.csv is taken for a flow curve" in said
-    assert "lve.csv is taken for a frequency sweep" in said
+    assert "amplitude_sweep.csv is read as an amplitude sweep" in said
+    assert "flow_curve.csv is read as a flow curve" in said
+    assert "lve.csv is read as a frequency sweep" in said
     assert "In amplitude_sweep.csv, strain_percent" in said
     assert not found.of("error")
 

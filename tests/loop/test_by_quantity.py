@@ -107,7 +107,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     assert "uniaxial extension" in what_to_measure_next(result([*FITTED, normal]))
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
-    assert again.startswith("Repeat fast in a geometry with another gap")
+    assert again.startswith("Repeat fast with another gap")
 
 
 def test_a_range_of_rates_is_where_runs_stay():

@@ -185,7 +185,7 @@ def said_of(probability, **inclusion):
 def test_what_is_less_probable_than_not_is_not_said_to_explain_the_data():
     text = said_of(0.44, stress_gain=0.44)
     assert text.startswith("Your model is missing an effect, but the data do not identify it.")
-    assert "Probability 44 %." in text
+    assert "Probability of this law 44 %." in text
     assert "Probability that no candidate is right: 56 %." in text
     assert "fitted to the noise" not in text
     sure = said_of(0.89, stress_gain=0.89)

@@ -319,7 +319,7 @@ _WORDS = {
     "flow_curve": "a flow curve, of steady states",
     "relaxation": "relaxation after a step of strain",
     "creep": "a test at a given stress",
-    "run": "a transient at a given rate, such as start-up",
+    "run": "a transient, such as start-up",
 }
 
 
@@ -333,7 +333,7 @@ def _summary(
         understood = "columns as before" if understood in said else understood
         said.append(understood)
     rows = len(next(iter(made.table.values())))
-    text = f"{where}: taken for {_WORDS[made.kind]} ({one.why}); {understood}; {rows} rows"
+    text = f"{where}: read as {_WORDS[made.kind]} ({one.why}); {understood}; {rows} rows"
     text += f", {made.dropped} without all these numbers left out" if made.dropped else ""
     return "; ".join([text, *made.notes]) + "."
 

@@ -55,6 +55,10 @@ class Search:
         usable = (fit for fit in self.found.values() if np.isfinite(fit.log_evidence))
         return sorted(usable, key=self.rank, reverse=True)
 
+    @property
+    def _likeliest(self) -> str:
+        return ", ".join(max(self.found.values(), key=self.rank).names) or "none"
+
     def add(self, starts: Iterable[Fit], wanted: int | None = None) -> list[Fit]:
         """Fit hypotheses side by side and keep them; of one set the likeliest.
 
@@ -94,7 +98,7 @@ class Search:
                 break
             best = max(map(self.rank, self.found.values()))
             self.add(starts, wanted=_BEAM)
-            self.say(f"sets of {depth + 1}: {len(new)} fitted")
+            self.say(f"sets of {depth + 1}: {len(new)} fitted, likeliest: {self._likeliest}")
             level = sorted((self.found[key] for key in new), key=self.rank, reverse=True)[:_BEAM]
             level = [fit for fit in level if np.isfinite(self.rank(fit))]
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
@@ -102,7 +106,7 @@ class Search:
         self.backwards()
         self.exchange()
         self.backwards()
-        self.say(f"exchanged: {len(self.found)} sets")
+        self.say(f"exchanged: {len(self.found)} sets, likeliest: {self._likeliest}")
         return self
 
     def scored(self, fit: Fit, every_start: bool = False) -> list[Fit]:
