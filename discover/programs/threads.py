@@ -54,7 +54,7 @@ def on_device(values: ArrayLike) -> Array:
     Told no type, `jax.numpy.asarray` compiles a copy for every new shape, some 10 ms each; told the
     one that the array has, it only copies.
     """
-    if isinstance(values, jax.Array):
-        return values
+    if isinstance(values, jax.Array | float | int):  # a number of Python's has no type of its own
+        return jnp.asarray(values)
     held = np.asarray(values)
     return jnp.asarray(held, held.dtype)
