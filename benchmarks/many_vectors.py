@@ -57,11 +57,14 @@ def problem(name: str, modes: dict):
     declared = forward_model(declared_model(study, data))
     used = {key: getattr(declared, key) for key in ("modulus", "relaxation_time")}
     used = {key: np.asarray(modes.get(key, value)) for key, value in used.items()}
+    solvent = float(modes.get("solvent_viscosity", declared.solvent_viscosity))
     effects = import_module(_CANDIDATES).candidates_of(None)
     # a structure is a candidate on request alone
     effects += [make_effect("thixotropy")] * all(one.name != "thixotropy" for one in effects)
-    model = AugmentedModel(replace(declared, **used), effects, data_scales(runs))
-    return model, runs, {key: value.tolist() for key, value in used.items()}
+    declared = replace(declared, **used, solvent_viscosity=solvent)
+    model = AugmentedModel(declared, effects, data_scales(runs))
+    given = {key: value.tolist() for key, value in used.items()}
+    return model, runs, given | {"solvent_viscosity": solvent}
 
 
 def reference(model, theta, effect: str, run) -> list[float]:
@@ -81,7 +84,8 @@ def reference(model, theta, effect: str, run) -> list[float]:
             return (1.0 - s) / build_up - breakdown * abs(np.interp(t, knots, rates)) * s
 
         span, tight = (float(flow.begins), run.time[-1]), {"rtol": 1e-10, "atol": 1e-12}
-        stress *= solve_ivp(change, span, [1.0], "LSODA", run.time, max_step=0.05, **tight).y[0]
+        state = solve_ivp(change, span, [1.0], "LSODA", run.time, max_step=0.05, **tight)
+        stress = stress * state.y[0]
     return stress.tolist()
 
 
