@@ -132,7 +132,8 @@ class Equation(NotebookView):
         """
         named, terms = parts or law_parts(fluid.law)
         return cls(
-            terms, tuple(map(float, fluid.modulus)), tuple(map(float, fluid.relaxation_time)),
+            terms, tuple(np.asarray(fluid.modulus).tolist()),
+            tuple(np.asarray(fluid.relaxation_time).tolist()),
             fluid.law.linear_relaxation, float(fluid.solvent_viscosity), named=named, **stated,
         )  # fmt: skip
 

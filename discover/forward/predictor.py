@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -64,9 +63,9 @@ class Predictor:
         declared = self._declared
         return Numbers(
             declared.law,
-            jnp.asarray(declared.modulus),
-            jnp.asarray(declared.relaxation_time),
-            jnp.asarray(float(declared.solvent_viscosity)),
+            on_device(declared.modulus),
+            on_device(declared.relaxation_time),
+            on_device(float(declared.solvent_viscosity)),
         )
 
     @cached_property
@@ -154,7 +153,7 @@ class Predictor:
 
         def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
             theta, moduli, _ = trial
-            moduli, solvent = on_device(moduli[:-1]), jnp.asarray(float(moduli[-1]))
+            moduli, solvent = on_device(moduli[:-1]), on_device(float(moduli[-1]))
             numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
             return np.asarray(program.predict(numbers, program.fluid.in_use(theta), theta, part))
 

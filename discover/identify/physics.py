@@ -15,7 +15,7 @@ from discover.identify import physics_flows
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly
 
@@ -158,7 +158,7 @@ def _flow_curve(fluid: Fluid, weissenberg: float) -> _Found:
     modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
     for number, (modulus, time) in enumerate(modes):
         law = law_of_mode(fluid.law, number)
-        found, _, residual = physics_flows.steady_shear(law, jnp.asarray(time * rates))
+        found, _, residual = physics_flows.steady_shear(law, on_device(time * rates))
         stress = stress + modulus * np.asarray(found)[:, 3]
         steady &= physics_flows.is_steady(np.asarray(residual))
     last = rates.size if steady.all() else int(np.argmin(steady))
@@ -214,7 +214,7 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     good = np.ones(rates.size, dtype=bool)
     for number in numbers:
         law = law_of_mode(fluid.law, number)
-        scaled = jnp.asarray(same * (times[number] / times[slowest]))
+        scaled = on_device(same * (times[number] / times[slowest]))
         _, jacobian, residual = physics_flows.steady_uniaxial_extension(law, scaled)
         found = physics_flows.is_steady(np.asarray(residual)) & physics_flows.is_stable(
             np.asarray(jacobian)

@@ -136,11 +136,11 @@ def random_histories(max_step: float = np.inf) -> Histories:
             weights *= amplitude * np.sqrt(2.0 / np.sum(weights**2))
             protocols.append(
                 FlowProtocol(
-                    jnp.zeros(1),
-                    jnp.zeros(1),
-                    jnp.asarray(weights),
-                    jnp.asarray(generator.uniform(0.1, 3.0, _WAVES)),
-                    jnp.asarray(generator.uniform(0.0, 2.0 * np.pi, _WAVES)),
+                    on_device(np.zeros(1)),
+                    on_device(np.zeros(1)),
+                    on_device(weights),
+                    on_device(generator.uniform(0.1, 3.0, _WAVES)),
+                    on_device(generator.uniform(0.0, 2.0 * np.pi, _WAVES)),
                 )
             )
             amplitudes.append(amplitude)

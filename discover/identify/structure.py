@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any, Literal
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 from jaxtyping import Array, Bool, Float
@@ -32,7 +31,7 @@ from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hid
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.learners.runs import as_runs
-from discover.programs import compiled
+from discover.programs import compiled, on_device
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
 from discover.words import percent_of
 from tensor_library import LawTerm, LawTerms, TermLibrary, parse_term
@@ -236,8 +235,8 @@ def _at(
     base = known.law
     coefficients, inner = law.over(library)
     whole = LibraryExpansion(
-        coefficients=jnp.asarray(coefficients),
-        inner=jnp.asarray(inner),
+        coefficients=on_device(coefficients),
+        inner=on_device(inner),
         library=library,
         linear_relaxation=base.linear_relaxation,
         base=base,

@@ -69,8 +69,8 @@ def law_of_terms(
     library = TermLibrary(tuple(map(parse_term, terms.coefficients or ["sigma"])))
     coefficients, inner = terms.over(library)
     return LibraryExpansion(
-        coefficients=jnp.asarray(coefficients),
-        inner=jnp.asarray(inner),
+        coefficients=on_device(coefficients),
+        inner=on_device(inner),
         library=library,
         linear_relaxation=linear_relaxation,
         base=base,

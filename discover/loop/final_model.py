@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
@@ -14,6 +13,7 @@ from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS, Fluid
 from discover.laws.each_mode import with_modes
 from discover.loop.parts import DeclaredEffect, KnownParameter
+from discover.programs import on_device
 
 Bounds = Mapping[int, tuple[float, float]]
 """Ends of the 95 % interval of what is fitted, by its position."""
@@ -120,7 +120,7 @@ def augmented_fluid(model: AugmentedModel, theta: Theta, active: Sequence[str]) 
     """Return the augmented fluid, without states that no law of one mode can carry."""
     declared = model.declared
     added = [
-        (effect, jnp.asarray(theta[model.positions(effect.name)]))
+        (effect, on_device(theta[model.positions(effect.name)]))
         for effect in model.effects
         if effect.name in active
         and isinstance(effect, ConstitutiveEffect)
@@ -133,9 +133,9 @@ def augmented_fluid(model: AugmentedModel, theta: Theta, active: Sequence[str]) 
         effects=tuple(effect for effect, _ in added),
         linear_relaxation=base.linear_relaxation,
     )
-    one = jnp.ones(1)
+    one = on_device(np.ones(1))
     viscosity = declared.solvent_viscosity + sum(
-        float(effect.instantaneous_stress(values, one)[0]) for effect, values in added
+        float(np.asarray(effect.instantaneous_stress(values, one))[0]) for effect, values in added
     )
     modes = [effect.mode(values) for effect, values in added if isinstance(effect, ModeEffect)]
     modulus = declared.modulus * np.exp(theta[0])

@@ -321,7 +321,7 @@ def _if_known(options: dict[str, Any]) -> dict[str, Any]:
 def _where() -> jax.sharding.Sharding:
     """Return the place where JAX computes unless it is told otherwise."""
     with jax.ensure_compile_time_eval():  # also when a function is being traced
-        return jnp.zeros(()).sharding
+        return jax.device_put(np.zeros(())).sharding
 
 
 def _weak(array: Any) -> bool:

@@ -7,6 +7,7 @@ from contextvars import copy_context
 from functools import cache
 from typing import TypeVar
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.typing import ArrayLike
@@ -48,11 +49,12 @@ def in_threads(
 
 
 def on_device(values: ArrayLike) -> Array:
-    """Return an array of NumPy's as one of JAX's; one of JAX's stays as it is.
+    """Return numbers, or an array of NumPy's, as an array of JAX's; one of JAX's stays as it is.
 
     Told no type, `jax.numpy.asarray` compiles a copy for every new shape, some 10 ms each; told the
     one that the array has, it only copies.
     """
-    if isinstance(values, np.ndarray):
-        return jnp.asarray(values, values.dtype)
-    return jnp.asarray(values)
+    if isinstance(values, jax.Array | float | int):  # a number of Python's has no type of its own
+        return jnp.asarray(values)
+    held = np.asarray(values)
+    return jnp.asarray(held, held.dtype)

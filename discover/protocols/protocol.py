@@ -64,8 +64,8 @@ class FlowProtocol(eqx.Module):
     amplitudes: Float[Array, " c"]
     frequencies: Float[Array, " c"]
     phases: Float[Array, " c"]
-    begins: Float[Array, ""] = eqx.field(default=0.0, converter=jnp.asarray)
-    cycle: Float[Array, "2"] = eqx.field(default=(0.0, 0.0), converter=jnp.asarray)
+    begins: Float[Array, ""] = eqx.field(default=0.0, converter=on_device)
+    cycle: Float[Array, "2"] = eqx.field(default=(0.0, 0.0), converter=on_device)
     kinematics: Kinematics | None = None
     control: Control = eqx.field(static=True, default="rate")
     modulus: RecordedQuantity | None = eqx.field(static=True, default=None)
@@ -160,13 +160,8 @@ def require_flow(protocol: object, name: str) -> None:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
-    table = jnp.asarray(times, float), jnp.asarray(rates, float)
-    return FlowProtocol(
-        *table,
-        jnp.asarray(amplitudes, float),
-        jnp.asarray(frequencies, float),
-        jnp.asarray(phases, float),
-    )
+    parts = times, rates, amplitudes, frequencies, phases
+    return FlowProtocol(*(on_device(np.asarray(part, float)) for part in parts))
 
 
 def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> FlowProtocol:

@@ -5,7 +5,7 @@ A residual is prediction minus record, times its weight: the run's own (`Run.wei
 values that the mean is over, so that squares add up to a mean squared relative misfit; see `Mean`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, Literal, TypeVar
 
@@ -199,7 +199,7 @@ class Records(eqx.Module):
         `keep`: which, shape (runs,) or (runs, n).
         """
         keep = keep.reshape(*keep.shape, *(1,) * (self.weight.ndim - keep.ndim))
-        return replace(self, weight=_looked_at(keep, self.weight))
+        return replace(self, weight=_by_numpy(lambda weight: _looked_at(keep, weight), self.weight))
 
     def __len__(self) -> int:
         return len(self.weight)
@@ -219,7 +219,9 @@ class Records(eqx.Module):
 
     def of_one_kind(self) -> "Records":
         """Return the records of the first kind alone, without an axis of kinds."""
-        return replace(self, recorded=self.recorded[..., 0], weight=self.weight[..., 0])
+        parts = (self.recorded, self.weight)
+        recorded, weight = (_by_numpy(lambda values: values[..., 0], part) for part in parts)
+        return replace(self, recorded=recorded, weight=weight)
 
     def without_factors(self) -> "Records":
         """Return the records as if all runs were of one loading."""
@@ -317,3 +319,9 @@ def even(weight: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
 def _looked_at(seen: Any, values: Any) -> Any:
     """Return values where they are looked at and zero elsewhere, of NumPy or JAX."""
     return values.__array_namespace__().where(seen, values, 0.0)
+
+
+def _by_numpy(function: Callable[[np.ndarray], np.ndarray], values: Values) -> Any:
+    """Return what a function makes of values, by NumPy, which compiles nothing; of their kind."""
+    found = function(np.asarray(values))
+    return found if isinstance(values, np.ndarray) else on_device(found)

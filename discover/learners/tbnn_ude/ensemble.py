@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Key
 
@@ -86,7 +85,7 @@ def halves_of_runs(
 
 def seen_in(problem: TrainingProblem, runs: Bool[np.ndarray, " runs"]) -> TrainingProblem:
     """Return the problem with only some of the runs counting; its shapes stay the same."""
-    return replace(problem, records=problem.records.only(jnp.asarray(runs)))
+    return replace(problem, records=problem.records.only(runs))
 
 
 def choose_member(

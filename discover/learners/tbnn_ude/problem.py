@@ -89,7 +89,7 @@ def make_problem(
         on_device(np.array([rms(stress) for stress in own])),
         on_device(modulus),
         on_device(relaxation_time),
-        jnp.asarray(solvent_viscosity),
+        on_device(solvent_viscosity),
     )
 
 

@@ -71,7 +71,7 @@ def constant_scale(cloud: least_squares.Cloud) -> Float[Array, "8"]:
 
 def with_tensors(law: TensorBasisNetwork, tensors: np.ndarray) -> TensorBasisNetwork:
     """Return the law in which the coefficients of these tensors may vary."""
-    mask = jnp.asarray(tensors, dtype=law.network_mask.dtype)
+    mask = on_device(np.asarray(tensors, dtype=law.network_mask.dtype))
     return eqx.tree_at(lambda tree: tree.network_mask, law, mask)
 
 
@@ -91,7 +91,7 @@ def without_empty_terms(
     return eqx.tree_at(
         lambda tree: (tree.constants, tree.network_mask),
         law,
-        (jnp.asarray(constants), jnp.asarray(varying, dtype=law.network_mask.dtype)),
+        (on_device(constants), on_device(varying.astype(law.network_mask.dtype))),
     )
 
 
@@ -161,7 +161,7 @@ class Session:
         make = Rebuild.with_network if network else Rebuild.of_constants
         rebuild = make(law, tensors, constant_scale(cloud))
         if prior is None:
-            prior = least_squares.reweighted(law, cloud, jnp.asarray(strength))
+            prior = least_squares.reweighted(law, cloud, on_device(strength))
         objective = least_squares.Objective(self.problem, rebuild, cloud, prior)
         target = 0.1 * self.recipe.exact
         weights = least_squares.minimise(rebuild.start, objective, steps, self.record, target, pace)
@@ -302,7 +302,7 @@ def nearly_constant_functions(
     before = np.inf
     variations = session.recipe.variations
     for number, strength in enumerate([*variations, *_MORE_ROUNDS * variations[-1:]]):
-        prior = least_squares.least_variation(jnp.asarray(strength))
+        prior = least_squares.least_variation(on_device(strength))
         law = session.round(law, strength, everything, True, session.recipe.steps, prior=prior)
         misfit = session.misfit(law)
         if misfit < before:  # the same law twice is no second opinion

@@ -4,7 +4,6 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 from pysindy.optimizers import BaseOptimizer
@@ -26,6 +25,7 @@ from discover.learners.tensor_sindy.search import (
     choose_by_one_standard_error,
     library_problem,
 )
+from discover.programs import on_device
 from discover.progress import Progress, by_lines
 from tensor_library.library import TermLibrary
 
@@ -226,8 +226,8 @@ def _law(
     smaller = library.subset(support or [0])
     used = [inner[i] for i, form in enumerate(library.forms) if form in smaller.forms]
     return LibraryExpansion(
-        coefficients=jnp.asarray(coefficients[list(support or [0])]),
-        inner=jnp.asarray(used, float),
+        coefficients=on_device(coefficients[list(support or [0])]),
+        inner=on_device(np.array(used, float)),
         library=smaller,
         linear_relaxation=known.linear_relaxation,
         base=known.law,

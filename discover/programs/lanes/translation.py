@@ -14,6 +14,7 @@ import llvmlite.ir as ir
 import numpy as np
 
 from discover.programs.lanes.arithmetic import DOUBLES, Arithmetic, NotTranslatable, Value
+from discover.programs.threads import on_device
 
 Values = np.ndarray
 """An array of values."""
@@ -190,7 +191,7 @@ class Translation:
             alone = np.zeros(updates.shape)
             alone[place] = 1.0
             hit = equation.primitive.bind(
-                jnp.zeros(base.shape), indices, jnp.asarray(alone), **equation.params
+                on_device(np.zeros(base.shape)), indices, on_device(alone), **equation.params
             )
             for target in zip(*np.nonzero(np.asarray(hit)), strict=True):
                 base[target] = self.arithmetic.add(base[target], updates[place])
@@ -209,7 +210,7 @@ def _known_as(values: Values, variable) -> Any:
     """Return numbers that are known, for JAX."""
     if not Arithmetic.is_known(*values.flat):
         raise NotTranslatable("a place that depends on the numbers")
-    return jnp.asarray(np.array(values.tolist(), dtype=variable.aval.dtype))
+    return on_device(np.array(values.tolist(), dtype=variable.aval.dtype))
 
 
 def _elementwise(function: Callable[..., Value], *arrays: Values) -> Values:
@@ -229,7 +230,7 @@ def _moved(equation, inputs: list[Values], moving: Sequence[int]) -> Values:
         if i in moving:
             labels = np.arange(len(values), len(values) + array.size).reshape(array.shape)
             values += list(array.flat)
-            given.append(jnp.asarray(labels, float))
+            given.append(on_device(labels.astype(float)))
         else:
             given.append(_known_as(array, equation.invars[i]))
     places = np.asarray(equation.primitive.bind(*given, **equation.params)).astype(int)
