@@ -14,7 +14,8 @@ run, and never used to change anything: 20261130; since each set is fitted from 
 differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves are weighed in all
 runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve,
 20261214 for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one,
-20261216 for ``close-loop``.
+20261216 for ``close-loop``; since effects start from every multiple of their inner times, 20261217
+for ``close-loop`` and 20261218 for ``compare``.
 """
 
 from collections.abc import Callable

@@ -36,6 +36,7 @@ from discover.loop.by_quantity import (
     of_stress,
     with_unseen,
 )
+from discover.loop.parts import STRUCTURES
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import effect_title, effects_title, listed, percent_of, readable
@@ -65,16 +66,6 @@ LAW_OF_EFFECT = {
     "ptt_exponential": "ptt_exponential",
 }
 """Laws that an effect makes of an upper convected Maxwell fluid."""
-
-_STRUCTURES = (
-    "thixotropy",
-    "thixotropic_modulus",
-    "thixotropic_modulus_by_stress",
-    "thixotropic_relaxation",
-    "thixotropic_relaxation_by_stress",
-    "thixotropic_relaxation_two_times",
-)
-"""Effects that make a thixotropic fluid of an upper convected Maxwell fluid."""
 
 _NOT_TESTED = {
     "flows": "Fitted, not tested: no run was held out.",
@@ -239,8 +230,8 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
         known = [core]
         if core is not None:
             title = LAWS[LAW_OF_EFFECT[core]].title
-        elif is_ucm and any(name in _STRUCTURES for name in names):
-            title, known = "thixotropic Maxwell", [*_STRUCTURES]
+        elif is_ucm and any(name in STRUCTURES for name in names):
+            title, known = "thixotropic Maxwell", [*STRUCTURES]
         added = [_added_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)

@@ -11,6 +11,16 @@ from discover.equations import Equation, equation_to_json
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS
 
+STRUCTURES = (
+    "thixotropy",
+    "thixotropic_modulus",
+    "thixotropic_modulus_by_stress",
+    "thixotropic_relaxation",
+    "thixotropic_relaxation_by_stress",
+    "thixotropic_relaxation_two_times",
+)
+"""Effects that make a thixotropic fluid of an upper convected Maxwell fluid."""
+
 Verdict = Literal["effects_added", "no_effect_needed", "unexplained", "no_signal"]
 
 

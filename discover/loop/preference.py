@@ -14,6 +14,7 @@ from jaxtyping import Float
 
 from discover.answer.naming import named_law
 from discover.equations import Equation
+from discover.equations.parts import StatePart
 from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine import Posterior
@@ -24,7 +25,7 @@ from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, states_of
-from discover.loop.parts import NearestLaw
+from discover.loop.parts import STRUCTURES, NearestLaw
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
@@ -47,11 +48,11 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if posterior.verdict != "unexplained" or posterior.left is None or few:
         return posterior
     known = posterior.by_left_out or ((posterior.left.fit, 1.0),)
-    if law_of(posterior, known[0][0]):
+    if has_a_name(posterior, known[0][0]):
         return posterior
     leading = [fit for fit, _ in known]
     alive = posterior.search.alive()
-    named = list(islice((fit for fit in alive if law_of(posterior, fit)), _MOST))
+    named = list(islice((fit for fit in alive if has_a_name(posterior, fit)), _MOST))
     some = [*leading, *(fit for fit in named if fit not in leading)]
     asked = [fit for fit in some if "missed" not in fit.memory]
     for fit, missed in zip(asked, left_out(fitter, asked), strict=True):
@@ -59,8 +60,8 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     weights = weights_of(np.array([fit.memory["missed"] for fit in some]))
     at = first_of(weights, [fit in named for fit in some])
     if some[at] not in named:
-        if named:
-            best = max(named, key=lambda fit: weights[some.index(fit)])
+        if of_one := [fit for fit in named if law_of(posterior, fit)]:
+            best = max(of_one, key=lambda fit: weights[some.index(fit)])
             posterior.memory["named"] = _nearest(posterior, best)
         return posterior
     chosen = some[at]
@@ -100,13 +101,31 @@ def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
     return at if own[at] > 0.0 and np.log(own[at] / weights[best]) >= _AS_WELL else best
 
 
+def has_a_name(posterior: Posterior, fit: Fit) -> bool:
+    """Return whether the field has a name for a hypothesis: a law, or a thixotropic Maxwell fluid.
+
+    The latter is what a structure makes of it   [Mewis & Wagner 2009, Adv. Colloid Interface Sci.
+    147, 214].
+    """
+    states = _states(posterior, fit)
+    if states and {state.effect for state in states} <= {*STRUCTURES}:
+        found = _without_states(posterior, fit)
+        return found is not None and found[0] == "ucm"
+    return law_of(posterior, fit) is not None
+
+
 def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
     """Return the law of the field that the fluid of a hypothesis is, with its constants."""
-    model, fluid = posterior.problem.model, _fluid(posterior, fit)
-    if states_of(model, fit.theta, _present(posterior, fit)) != ():
-        return None
+    return _without_states(posterior, fit) if _states(posterior, fit) == () else None
+
+
+def _states(posterior: Posterior, fit: Fit) -> tuple[StatePart, ...] | None:
+    return states_of(posterior.problem.model, fit.theta, _present(posterior, fit))
+
+
+def _without_states(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
     try:
-        return named_law(Equation.of_fluid(fluid))
+        return named_law(Equation.of_fluid(_fluid(posterior, fit)))
     except InputError:
         return None
 
