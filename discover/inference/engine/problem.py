@@ -267,7 +267,7 @@ class Problem:
         return float(np.log(odds / self._odds))
 
     def constants_of(
-        self, theta: Float[np.ndarray, " p"], other: "Problem"
+        self, theta: Float[np.ndarray, " theirs"], other: "Problem"
     ) -> Float[np.ndarray, " p"]:
         """Return a vector of another problem as one of this, which differs in what may vary."""
         out = self.zero.copy()
