@@ -139,7 +139,7 @@ def test_a_damaged_result_is_an_empty_row(tmp_path, text):
 
 
 def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAGE_PAUSE", 0.01)
     summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     end = time.monotonic() + 60.0
@@ -155,7 +155,7 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch
 def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(
     tmp_path, monkeypatch, capfd
 ):
-    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAGE_PAUSE", 0.01)
     summary = Summary(tmp_path / "gone", [("a", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     timer = summary._timer
