@@ -340,7 +340,7 @@ for words in sys.argv[1:]:
 def test_completion_knows_commands_and_options():
     asked = ("close", "fit --held", "fit giese", "export results --format rheo", "zzz")
     command = [sys.executable, "-c", COMPLETED, *(f"discover {words}" for words in asked)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     close, held, giesekus, rheo, nothing, _ = (part.split() for part in done.stdout.split("|"))
     assert close == ["close-loop"]
     assert "--held-out" in held
