@@ -11,30 +11,18 @@ from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page
 from discover.words import effect_title
 
-GOOD = {
-    "learners": {
-        "tensor_sindy": {
-            "terms": [{"term": "sigma.sigma", "coefficient": 0.2}],
-            "errors": {
-                "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
-                "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
-            },
-            "details": {
-                "selectors": {"chosen": {"evidence": ["sigma.sigma"], "pysindy": ["sigma"]}}
-            },
-        },
-        "tbnn_ude": {
-            "terms": [
-                {
-                    "term": "(exp(epsilon*tr(sigma))-1)*sigma",
-                    "coefficient": 1.0,
-                    "inner": {"epsilon": 0.375},
-                }
-            ],
-            "errors": {},
-            "details": {},
-        },
+SPARSE = {
+    "terms": [{"term": "sigma.sigma", "coefficient": 0.2}],
+    "errors": {
+        "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
+        "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
     },
+    "details": {"selectors": {"chosen": {"evidence": ["sigma.sigma"], "pysindy": ["sigma"]}}},
+}
+EXPONENTIAL = {"term": "(exp(epsilon*tr(sigma))-1)*sigma", "inner": {"epsilon": 0.375}}
+NETWORK = {"terms": [EXPONENTIAL | {"coefficient": 1.0}], "errors": {}, "details": {}}
+GOOD = {
+    "learners": {"tensor_sindy": SPARSE, "tbnn_ude": NETWORK},
     "rivals": [{}, {}],
     "undetermined": ["N2"],
     "verdict": "no_signal",
