@@ -106,6 +106,9 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
     if not _leaves_tests_to_workers(config):
         _import_what_tests_need()
+        if _compiles_soon(config):
+            # of a law in three modes the code runs as fast, and takes half of the time to make
+            importlib.import_module("discover.programs.lanes.machine_code")._LEVELS = 0, 1
 
 
 def _leaves_tests_to_workers(config: pytest.Config) -> bool:

@@ -8,20 +8,22 @@ its first calls in each file.
 
 import functools
 import inspect
-from collections import Counter
 from collections.abc import Callable
+from types import CodeType
 
 import jaxtyping
 
 CALLS = 5
-"""How many calls of a function are checked in each file of tests."""
+"""How many calls of a function are checked in each file; one of a function inside another."""
 
-_seen: Counter = Counter()
+# by code, whose hash takes as long as a short call: it is looked up once for each function
+_seen: dict[CodeType, list[int]] = {}
 
 
 def begin_file() -> None:
     """Check the first calls again."""
-    _seen.clear()
+    for calls in _seen.values():
+        calls[0] = 0
 
 
 def install() -> None:
@@ -42,14 +44,15 @@ def _decorated(what, check: Callable):
         return what
     if not inspect.isfunction(what):
         return check(what)
-    # a function inside another is a new one at every call of that, of the same code
-    code, built = what.__code__, []
+    # one inside another is a new one at every call of that, and a check takes 1 ms to build
+    most = 1 if "<locals>" in what.__qualname__ else CALLS
+    calls, built = _seen.setdefault(what.__code__, [0]), []
 
     @functools.wraps(what)
     def on_first_calls(*args, **kwargs):
-        if _seen[code] >= CALLS or jaxtyping.config.jaxtyping_disable:
+        if calls[0] >= most or jaxtyping.config.jaxtyping_disable:
             return what(*args, **kwargs)
-        _seen[code] += 1
+        calls[0] += 1
         if not built:
             built.append(check(what))
         return built[0](*args, **kwargs)

@@ -11,30 +11,18 @@ from discover.effects.registry import named_effects
 from discover.report.batch_report import batch_page
 from discover.words import effect_title
 
-GOOD = {
-    "learners": {
-        "tensor_sindy": {
-            "terms": [{"term": "sigma.sigma", "coefficient": 0.2}],
-            "errors": {
-                "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
-                "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
-            },
-            "details": {
-                "selectors": {"chosen": {"evidence": ["sigma.sigma"], "pysindy": ["sigma"]}}
-            },
-        },
-        "tbnn_ude": {
-            "terms": [
-                {
-                    "term": "(exp(epsilon*tr(sigma))-1)*sigma",
-                    "coefficient": 1.0,
-                    "inner": {"epsilon": 0.375},
-                }
-            ],
-            "errors": {},
-            "details": {},
-        },
+SPARSE = {
+    "terms": [{"term": "sigma.sigma", "coefficient": 0.2}],
+    "errors": {
+        "a": {"sigma12": 0.01, "N1": 0.02, "N2": None},
+        "b": {"sigma12": 0.03, "N1": 0.001, "N2": None},
     },
+    "details": {"selectors": {"chosen": {"evidence": ["sigma.sigma"], "pysindy": ["sigma"]}}},
+}
+EXPONENTIAL = {"term": "(exp(epsilon*tr(sigma))-1)*sigma", "inner": {"epsilon": 0.375}}
+NETWORK = {"terms": [EXPONENTIAL | {"coefficient": 1.0}], "errors": {}, "details": {}}
+GOOD = {
+    "learners": {"tensor_sindy": SPARSE, "tbnn_ude": NETWORK},
     "rivals": [{}, {}],
     "undetermined": ["N2"],
     "verdict": "no_signal",
@@ -139,7 +127,7 @@ def test_a_damaged_result_is_an_empty_row(tmp_path, text):
 
 
 def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAGE_PAUSE", 0.01)
     summary = Summary(tmp_path, [("a", "compare"), ("b", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     end = time.monotonic() + 60.0
@@ -155,7 +143,7 @@ def test_the_page_is_there_while_the_next_study_still_runs(tmp_path, monkeypatch
 def test_a_page_that_cannot_be_written_is_told_at_the_end_and_not_by_a_traceback(
     tmp_path, monkeypatch, capfd
 ):
-    monkeypatch.setattr("discover.batch.status._PAUSE", 0.01)
+    monkeypatch.setattr("discover.batch.status._PAGE_PAUSE", 0.01)
     summary = Summary(tmp_path / "gone", [("a", "compare")])
     summary.add(0, StudyStatus("a", "compare", "failed", "the reason", True))
     timer = summary._timer

@@ -14,20 +14,15 @@ from discover.study import parse_study
 
 
 def fake_study(**compare_options):
-    return parse_study(
-        {
-            "data": {
-                "synthetic": {
-                    "law": "giesekus",
-                    "parameters": {"alpha": 0.2},
-                    "noise": 0.01,
-                    "samples": 21,
-                    "seed": 1,
-                }
-            },
-            "compare": {"high_deborah": [1.5], "library": {"degree": 0}, **compare_options},
-        }
-    )
+    made = {
+        "law": "giesekus",
+        "parameters": {"alpha": 0.2},
+        "noise": 0.01,
+        "samples": 21,
+        "seed": 1,
+    }
+    options = {"high_deborah": [1.5], "library": {"degree": 0}, **compare_options}
+    return parse_study({"data": {"synthetic": made}, "compare": options})
 
 
 def trained(learner, study, model, runs, seed=0, progress=None):

@@ -53,6 +53,28 @@ def csv(table):
     return "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)])
 
 
+def write_files(folder, files):
+    """Write texts or bytes by their names, and return the folder."""
+    folder.mkdir(exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content if isinstance(content, bytes) else content.encode())
+    return folder
+
+
+def write_runs(folder, *runs, sweep=None, **files):
+    """Write tables as r0.csv, r1.csv, ...; other files by their names, with __ for the dot."""
+    named = {f"r{i}.csv": csv(run) for i, run in enumerate(runs)}
+    named = {"runs.csv": "\n".join(["file", *named]), **named}
+    named |= {"lve.csv": csv(sweep)} if sweep else {}
+    return write_files(folder, named | {n.replace("__", "."): text for n, text in files.items()})
+
+
+def sweep_table(points):
+    """Return the moduli over four decades."""
+    omega = np.geomspace(1e-2, 1e2, points)
+    return {"omega_rad_s": omega, **dict(zip(("Gp_Pa", "Gpp_Pa"), moduli(omega), strict=True))}
+
+
 def columns(text):
     """Return the columns of such text."""
     head, *rows = text.splitlines()

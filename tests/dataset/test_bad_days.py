@@ -12,6 +12,7 @@ import pytest
 from harm import SANE, TOKENS, mutate_text
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from made_exports import write_files
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -55,10 +56,7 @@ sweep = { laws = ["ptt_linear"], parameter = "epsilon", values = [0.1] }
 
 
 def write(root, changes=None):
-    for name, content in {**FILES, **(changes or {})}.items():
-        raw = content if isinstance(content, bytes) else content.encode()
-        (root / name).write_bytes(raw)
-    return root
+    return write_files(root, {**FILES, **(changes or {})})
 
 
 def use(root) -> str | None:

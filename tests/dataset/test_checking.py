@@ -4,7 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from made_exports import csv
+from made_exports import LAMBDA as RELAXATION_TIME
+from made_exports import G as MODULUS
+from made_exports import sweep_table, write_runs
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -14,7 +16,6 @@ from discover.study import parse_study
 from discover.study.data import load_study_data
 from discover.study.declared_model import declared_model
 
-MODULUS, RELAXATION_TIME = 100.0, 2.0
 TIMES = np.concatenate([[0.0], np.geomspace(2e-3, 20.0, 120)])
 
 
@@ -31,28 +32,11 @@ def start_up(rate=1.0, time=TIMES, **changes):
     return table | {k: v(table[k]) if callable(v) else v for k, v in changes.items()}
 
 
-def sweep_table():
-    omega = np.geomspace(1e-2, 1e2, 30)
-    x = omega * RELAXATION_TIME
-    return {
-        "omega_rad_s": omega,
-        "Gp_Pa": MODULUS * x**2 / (1 + x**2),
-        "Gpp_Pa": MODULUS * x / (1 + x**2),
-    }
-
-
 @pytest.fixture
 def folder(tmp_path):
     def write(*runs, sweep=True, **files):
-        names = [f"r{i}.csv" for i in range(len(runs))]
-        (tmp_path / "runs.csv").write_text("\n".join(["file", *names]))
-        for name, run in zip(names, runs, strict=True):
-            (tmp_path / name).write_text(csv(run))
-        if sweep:
-            (tmp_path / "lve.csv").write_text(csv(sweep_table() if sweep is True else sweep))
-        for name, text in files.items():
-            (tmp_path / name.replace("__", ".")).write_text(text)
-        return tmp_path
+        table = sweep_table(30) if sweep is True else sweep
+        return write_runs(tmp_path, *runs, sweep=table, **files)
 
     return write
 
@@ -223,7 +207,7 @@ def test_runs_that_are_all_linear_teach_nothing(folder):
 
 
 def test_a_sweep_that_contradicts_itself_is_doubted(folder):
-    sweep = sweep_table()
+    sweep = sweep_table(30)
     sweep["Gp_Pa"] = sweep["Gp_Pa"] * sweep["omega_rad_s"]
     findings = check_folder(folder(start_up(), sweep=sweep))
     assert any("contradict each other" in f.text for f in findings)

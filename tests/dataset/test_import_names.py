@@ -1,7 +1,5 @@
 """Claims: names of quantities are known in many languages and spellings, and a user's own too."""
 
-import subprocess
-import sys
 import tomllib
 from typing import get_args
 
@@ -199,11 +197,6 @@ def test_a_wrong_file_of_names_is_one_message(tmp_path, text, said):
 def test_a_mapping_file_with_names_of_an_unknown_quantity_is_refused():
     with pytest.raises(InputError, match="Did you mean 'shear_rate'"):
         make_mapping({"names": {"shear_rte": ["a"]}}, "import.toml")
-
-
-def test_names_are_read_only_where_something_is_imported():
-    code = "import sys, discover.cli; sys.exit('discover.dataset.importing.names' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_a_number_of_the_interval_is_no_time_though_german_calls_that_intervallzeit():

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from made_exports import write_files
 
 import discover as dc
 from discover.dataset import check_folder, load_dataset
@@ -20,10 +21,8 @@ GOOD = {
 @pytest.fixture
 def folder(tmp_path):
     def write(**changes):
-        for name, text in (GOOD | {k.replace("__", "."): v for k, v in changes.items()}).items():
-            if text is not None:
-                (tmp_path / name).write_text(text)
-        return tmp_path
+        files = GOOD | {k.replace("__", "."): v for k, v in changes.items()}
+        return write_files(tmp_path, {k: v for k, v in files.items() if v is not None})
 
     return write
 
@@ -193,11 +192,7 @@ SOUND = "time_s,shear_rate_1_s,stress_Pa\n0,1,2\n1,1,3\n2,1,4\n"
 
 
 def folder_of(tmp_path, **files):
-    root = tmp_path / "melt"
-    root.mkdir()
-    for name, text in files.items():
-        (root / f"{name}.csv").write_text(text)
-    return root
+    return write_files(tmp_path / "melt", {f"{name}.csv": text for name, text in files.items()})
 
 
 def test_every_file_and_every_column_is_told_of(tmp_path):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from made_exports import write_files
 
 from discover.dataset import load_dataset
 from discover.dataset.checking.folder import check_folder
@@ -22,19 +23,13 @@ SWEEPS = {
 RUN = "time_s,shear_rate_1_s,stress_Pa\n0.1,1,9\n0.5,1,40\n1,1,63\n2,1,86\n"
 
 
-def write(folder, files):
-    for name, text in files.items():
-        (folder / name).write_text(text)
-    return folder
-
-
 def study(folder, **data):
     return parse_study({"data": {"folder": str(folder), **data}})
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
-    folder = write(tmp_path, {name: TABLES[name]})
+    folder = write_files(tmp_path, {name: TABLES[name]})
     assert len(load_dataset(folder)) == 0
     data = load_study_data(study(folder))
     assert data.fit.names == (name,)
@@ -45,13 +40,13 @@ def test_a_folder_of_one_table_is_a_data_set_which_is_fitted(tmp_path, name):
 
 @pytest.mark.parametrize("name", SWEEPS)
 def test_a_folder_of_one_sweep_is_a_data_set_of_two_moduli_which_are_fitted(tmp_path, name):
-    data = load_study_data(study(write(tmp_path, {name: SWEEPS[name]})))
+    data = load_study_data(study(write_files(tmp_path, {name: SWEEPS[name]})))
     assert data.fit.names == (f"{name} (storage_modulus)", f"{name} (loss_modulus)")
     assert load_dataset(tmp_path).with_material_functions().names == data.fit.names
 
 
 def test_an_amplitude_sweep_is_sorted_by_strain_and_converted(tmp_path):
-    run = load_dataset(write(tmp_path, SWEEPS)).material_functions["amplitude_sweep"]
+    run = load_dataset(write_files(tmp_path, SWEEPS)).material_functions["amplitude_sweep"]
     storage, loss = run.records
     np.testing.assert_allclose(run.strain, [0.01, 1.0])
     np.testing.assert_allclose(run.angular_frequency, [2.0, 2.0])
@@ -60,7 +55,7 @@ def test_an_amplitude_sweep_is_sorted_by_strain_and_converted(tmp_path):
 
 
 def test_an_amplitude_sweep_judges_and_the_linear_sweep_gives_modes_unless_asked(tmp_path):
-    folder = write(tmp_path, {**SWEEPS, "runs.csv": "file\na.csv\n", "a.csv": RUN})
+    folder = write_files(tmp_path, {**SWEEPS, "runs.csv": "file\na.csv\n", "a.csv": RUN})
     sweep = [f"amplitude_sweep.csv ({name})" for name in ("storage_modulus", "loss_modulus")]
     linear = [name.replace("amplitude_sweep", "lve") for name in sweep]
     plain = load_study_data(study(folder))
@@ -75,7 +70,7 @@ def test_an_amplitude_sweep_judges_and_the_linear_sweep_gives_modes_unless_asked
 
 
 def test_the_check_says_what_each_table_was_taken_for(tmp_path):
-    found = check_folder(write(tmp_path, {**TABLES, **SWEEPS}))
+    found = check_folder(write_files(tmp_path, {**TABLES, **SWEEPS}))
     said = " ".join(str(finding) for finding in found)
     assert "amplitude_sweep.csv is read as an amplitude sweep" in said
     assert "flow_curve.csv is read as a flow curve" in said
@@ -85,8 +80,8 @@ def test_the_check_says_what_each_table_was_taken_for(tmp_path):
 
 
 def test_an_amplitude_sweep_without_a_frequency_is_set_aside_until_one_is_given(tmp_path):
-    folder = write(tmp_path, {"amplitude_sweep.csv": "strain,Gp_Pa,Gpp_Pa\n0.1,5,4\n1,3,4\n"})
-    write(folder, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    folder = write_files(tmp_path, {"amplitude_sweep.csv": "strain,Gp_Pa,Gpp_Pa\n0.1,5,4\n1,3,4\n"})
+    write_files(folder, {"flow_curve.csv": TABLES["flow_curve.csv"]})
     assert "no column omega_rad_s" in load_dataset(folder).left_out
     with pytest.raises(InputError, match="write amplitude_sweep_rad_s"):
         load_study_data(study(folder, amplitude_sweep="fit"))
@@ -97,15 +92,15 @@ def test_an_amplitude_sweep_without_a_frequency_is_set_aside_until_one_is_given(
 def test_a_strain_in_per_cent_without_its_unit_is_doubted(tmp_path):
     rows = [f"{s},2,50,{40 - 0.1 * s}" for s in (1, 10, 100, 300)]
     text = "\n".join(["strain,omega_rad_s,Gp_Pa,Gpp_Pa", *rows])
-    doubts = check_folder(write(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
+    doubts = check_folder(write_files(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
     assert any("strain_percent" in str(doubt) for doubt in doubts)
     text = text.replace("strain,", "strain_percent,")
-    doubts = check_folder(write(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
+    doubts = check_folder(write_files(tmp_path, {"amplitude_sweep.csv": text})).of("warning")
     assert not any("strain_percent" in str(doubt) for doubt in doubts)
 
 
 def test_a_flow_curve_is_sorted_by_rate_and_converted(tmp_path):
-    run = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
+    run = load_dataset(write_files(tmp_path, TABLES)).material_functions["flow_curve"]
     np.testing.assert_allclose(run.rate, [0.1, 1.0, 10.0])
     np.testing.assert_allclose(run.stress, [3.0, 20.0, 100.0])
     np.testing.assert_allclose(run.observing("N1").recorded, [0.1, 5.0, 90.0])
@@ -113,7 +108,7 @@ def test_a_flow_curve_is_sorted_by_rate_and_converted(tmp_path):
 
 
 def test_creep_and_relaxation_are_looked_at_where_they_are_linear(tmp_path):
-    tables = load_dataset(write(tmp_path, TABLES)).material_functions
+    tables = load_dataset(write_files(tmp_path, TABLES)).material_functions
     creep, relaxation = tables["creep"], tables["relaxation"]
     assert creep.quantity == "strain"
     np.testing.assert_allclose(creep.strain / creep.stress, [0.01, 0.02, 0.11])
@@ -122,7 +117,7 @@ def test_creep_and_relaxation_are_looked_at_where_they_are_linear(tmp_path):
 
 
 def test_a_table_beside_runs_judges_unless_it_is_fitted(tmp_path):
-    folder = write(tmp_path, {**TABLES, "runs.csv": "file\na.csv\n", "a.csv": RUN})
+    folder = write_files(tmp_path, {**TABLES, "runs.csv": "file\na.csv\n", "a.csv": RUN})
     judging = load_study_data(study(folder))
     assert judging.fit.names == ("a.csv",)
     assert set(judging.held_out.names) == set(TABLES)
@@ -132,7 +127,7 @@ def test_a_table_beside_runs_judges_unless_it_is_fitted(tmp_path):
 
 
 def test_what_is_recorded_and_not_observed_judges(tmp_path):
-    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    folder = write_files(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
     data = load_study_data(study(folder, flow_curve="fit", observe=["N1"]))
     assert data.fit.names == ("flow_curve.csv (N1)",)
     assert data.held_out.names == ("flow_curve.csv",)
@@ -147,7 +142,7 @@ def test_what_is_recorded_and_not_observed_judges(tmp_path):
     ],
 )
 def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
-    folder = write(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
+    folder = write_files(tmp_path, {"flow_curve.csv": TABLES["flow_curve.csv"]})
     with pytest.raises(InputError, match=message):
         load_study_data(study(folder, **keys))
 
@@ -169,7 +164,7 @@ def test_what_the_data_do_not_hold_is_said(tmp_path, keys, message):
 )
 def test_a_wrong_table_is_refused_with_file_and_line(tmp_path, name, text, message):
     with pytest.raises(InputError, match=message):
-        load_dataset(write(tmp_path, {name: text}))
+        load_dataset(write_files(tmp_path, {name: text}))
 
 
 def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
@@ -177,7 +172,7 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
         "runs.csv": "file,control\ncreep.csv,stress\n",
         "creep.csv": "time_s,stress_Pa,strain\n0.1,5,0.01\n1,5,0.02\n10,5,0.11\n20,5,0.2\n",
     }
-    run = load_dataset(write(tmp_path, files))["creep.csv"]
+    run = load_dataset(write_files(tmp_path, files))["creep.csv"]
     assert run.quantity == "strain"
     np.testing.assert_allclose(run.recorded, [0.01, 0.02, 0.11, 0.2])
     assert load_dataset(tmp_path).table().loc[0, "flow"] == "creep"
@@ -186,7 +181,7 @@ def test_a_run_at_a_given_stress_has_its_strain_as_what_is_observed(tmp_path):
 def test_an_estimator_takes_creep_as_its_strain_and_a_sweep_as_its_moduli(tmp_path):
     from discover.learners.runs import as_runs
 
-    tables = load_dataset(write(tmp_path, TABLES | SWEEPS)).material_functions
+    tables = load_dataset(write_files(tmp_path, TABLES | SWEEPS)).material_functions
     taken = as_runs([tables["creep"], tables["amplitude_sweep"]])
     assert [run.quantity for run in taken] == ["strain", "storage_modulus", "loss_modulus"]
     # a second time nothing changes
@@ -196,7 +191,7 @@ def test_an_estimator_takes_creep_as_its_strain_and_a_sweep_as_its_moduli(tmp_pa
 def test_an_estimator_takes_a_flow_curve_as_it_is_and_imposes_a_given_stress(tmp_path):
     from discover.learners.runs import as_runs
 
-    curve = load_dataset(write(tmp_path, TABLES)).material_functions["flow_curve"]
+    curve = load_dataset(write_files(tmp_path, TABLES)).material_functions["flow_curve"]
     (taken,) = as_runs([curve])
     assert taken.protocol.control == "steady"
     np.testing.assert_array_equal(taken.stress, curve.stress)
@@ -204,7 +199,7 @@ def test_an_estimator_takes_a_flow_curve_as_it_is_and_imposes_a_given_stress(tmp
     rows = [f"{t},{np.sin(t)},{1.0 - np.cos(t)}" for t in times]
     files = {"runs.csv": "file,control\nwave.csv,stress\n"}
     files["wave.csv"] = "\n".join(["time_s,stress_Pa,strain", *rows])
-    wave = load_dataset(write(tmp_path, files))["wave.csv"]
+    wave = load_dataset(write_files(tmp_path, files))["wave.csv"]
     (imposed,) = as_runs([wave])
     # a rate derived from a noisy strain errs smoothly, and that looks like a missing term
     assert (imposed.protocol.control, imposed.quantity) == ("stress", "strain")

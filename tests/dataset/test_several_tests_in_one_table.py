@@ -240,18 +240,6 @@ def test_a_file_of_reptate_may_lack_its_first_line_and_have_more_columns(tmp_pat
     assert "columns not read: Intensity" in result.stdout
 
 
-def test_creep_and_recovery_in_one_table_stay_one_run(tmp_path):
-    rise = 0.2 + 0.1 * TIMES + 0.3 * (1 - np.exp(-TIMES))
-    fall = rise[-1] - 0.5 * (1 - np.exp(-TIMES))
-    columns = stacked((TIMES, 50.0, rise), (TIMES, 0.0, fall))
-    rows = ["Time (s),Stress (Pa),Strain (-)", *lines(*columns, mark=",")]
-    out, _ = imported(tmp_path, "a.csv", rows)
-    (test,) = load_dataset(out)
-    assert test.protocol.control == "stress"
-    assert test.strain is not None
-    np.testing.assert_allclose(test.strain, np.concatenate([rise, fall]), rtol=EXACT)
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

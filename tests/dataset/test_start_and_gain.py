@@ -5,30 +5,18 @@ Data: scipy's integration of a Giesekus fluid, and closed forms of a Maxwell flu
 
 import numpy as np
 import pytest
-from made_exports import csv
+from made_exports import LAMBDA as TIME
+from made_exports import G as MODULUS
+from made_exports import sweep_table, write_runs
 from scipy.integrate import solve_ivp
 
 from discover.dataset import check_folder
 
-MODULUS, TIME, MOBILITY = 100.0, 2.0, 0.3
-OMEGA = 1.5
-
-
-def sweep():
-    omega = np.geomspace(1e-2, 1e2, 40)
-    x = omega * TIME
-    moduli = MODULUS * np.array([x**2, x]) / (1 + x**2)
-    return {"omega_rad_s": omega, "Gp_Pa": moduli[0], "Gpp_Pa": moduli[1]}
+MOBILITY, OMEGA = 0.3, 1.5
 
 
 def write(folder, *runs, linear=True):
-    names = [f"r{i}.csv" for i in range(len(runs))]
-    (folder / "runs.csv").write_text("\n".join(["file", *names]))
-    for name, run in zip(names, runs, strict=True):
-        (folder / name).write_text(csv(run))
-    if linear:
-        (folder / "lve.csv").write_text(csv(sweep()))
-    return folder
+    return write_runs(folder, *runs, sweep=sweep_table(40) if linear else None)
 
 
 def about(folder, subject):

@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from made_exports import write_files
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -48,10 +49,7 @@ def test_digits_other_than_exponents_are_no_unit_and_none_is_worked_out(read, te
 
 
 def write(folder, table, sweep="omega_rad_s,Gp_Pa,Gpp_Pa\n0.1,1,5\n1,10,10\n10,15,5\n"):
-    (folder / "runs.csv").write_text("file\na.csv\n")
-    (folder / "a.csv").write_text(table)
-    (folder / "lve.csv").write_text(sweep)
-    return folder
+    return write_files(folder, {"runs.csv": "file\na.csv\n", "a.csv": table, "lve.csv": sweep})
 
 
 ROWS = "0.1,1,1\n0.2,1,2\n"

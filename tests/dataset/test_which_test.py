@@ -69,14 +69,14 @@ def test_creep_and_recovery_are_one_run_though_their_clock_starts_again(tmp_path
         np.testing.assert_allclose(back[-1], -0.2, rtol=0.03)
 
 
-def test_creep_and_recovery_without_a_word_are_a_run_at_given_stress(tmp_path):
-    columns = {
-        "Time [s]": np.append(TIMES, 10.0 + TIMES),
-        "Stress [Pa]": np.append(HELD, NONE),
-        "Strain [-]": np.append(CREEP, RECOVERY),
-    }
-    out, _ = export(tmp_path, columns)
-    assert load_dataset(out)[0].protocol.control == "stress"
+@pytest.mark.parametrize("starts", [0.0, 10.0])
+def test_creep_and_recovery_without_a_word_are_one_run_at_given_stress(tmp_path, starts):
+    strain = np.append(CREEP, RECOVERY)
+    columns = {"Time [s]": np.append(TIMES, starts + TIMES), "Stress [Pa]": np.append(HELD, NONE)}
+    out, _ = export(tmp_path, columns | {"Strain [-]": strain})
+    (test,) = load_dataset(out)
+    assert test.protocol.control == "stress"
+    np.testing.assert_allclose(test.recorded, strain, rtol=1e-12)
 
 
 RECOVERIES = {

@@ -1,10 +1,12 @@
 """What a text says, by what would run it: Python, UFL's evaluation, SymPy's LaTeX, rheoTool."""
 
 import functools
+import json
 import re
 
 import numpy as np
 import pytest
+import sympy
 from scipy.integrate import solve_ivp
 from sympy.parsing.latex import parse_latex
 
@@ -24,6 +26,17 @@ def module_of(text):
     module = {}
     exec(text, module)
     return module
+
+
+def sum_of_spelled(terms, stress, rate):
+    """Return the sum of terms (spelling, coefficient, inner), with the precedence of Python."""
+    names = {"sigma": stress, "gammadot": rate, "I": np.eye(3)}
+    names |= {"tr": np.trace, "exp": np.exp, "abs": abs}
+    total = np.zeros((3, 3))
+    for spelling, coefficient, inner in terms:
+        text = spelling.replace(".", " @ ").replace("^", "**")
+        total = total + coefficient * eval(text, names | dict(inner))
+    return total
 
 
 def in_ufl(tensor):
@@ -90,6 +103,81 @@ def shear_quantities(stress):
     """Return σ12, N1 and N2 of stresses, shape (3, n)."""
     s = np.asarray(stress)
     return np.array([s[:, 0, 1], s[:, 0, 0] - s[:, 1, 1], s[:, 1, 1] - s[:, 2, 2]])
+
+
+def states(number=3, seed=1):
+    """Return stresses of fluids that flow, I + σ positive definite, and gradients without trace."""
+    generator = np.random.default_rng(seed)
+    for _ in range(number):
+        root = 0.6 * generator.normal(size=(3, 3)) + np.eye(3)
+        gradient = generator.normal(size=(3, 3))
+        yield root @ root.T - np.eye(3), gradient - np.trace(gradient) / 3.0 * np.eye(3)
+
+
+# What a text says of one mode: `rates(mode, stress, variables, gradient)`, both in Pa and s.
+
+
+def by_python(text, variables=0):
+    """Return the rates by the functions of the text."""
+    module = module_of(text)
+    modes = len(module["MODULUS_PA"])
+
+    def rates(k, stress, y, gradient):
+        stresses, levels = np.zeros((modes, 3, 3)), np.zeros((modes, variables))
+        stresses[k], levels[k] = stress, y
+        if not variables:
+            return module["stress_rate"](stresses, gradient)[k], y
+        asked = stresses, gradient, levels
+        return module["stress_rate"](*asked)[k], module["variables_rate"](*asked)[k]
+
+    return rates
+
+
+def by_sympy(text):
+    """Return the rates by the expressions of the text."""
+    module = module_of(text)
+    symbols = [*module["stress_symbols"], *module["gradient_symbols"], *module.get("variables", ())]
+    told = [*module["stress_rate"], *module.get("variables_rate", ())]
+    functions = [
+        sympy.lambdify(symbols, [one.subs(values) for one in told], "math", cse=True)
+        for values in module.get("values", [{}] * len(module["modes"]))
+    ]
+
+    def rates(k, stress, y, gradient):
+        modulus, time = module["modes"][k]
+        s = stress / modulus
+        components = (s[0, 0], s[0, 1], s[0, 2], s[1, 1], s[1, 2], s[2, 2])
+        found = functions[k](*components, *(time * gradient).ravel(), *y)
+        return modulus / time * np.reshape(found[:9], (3, 3)), np.array(found[9:]) / time
+
+    return rates
+
+
+def by_json(text):
+    """Return the rates by the spelling of the terms."""
+    content = json.loads(text)
+    terms = [(term["term"], term["coefficient"], term["inner"]) for term in content["terms"]]
+
+    def rates(k, stress, y, gradient):
+        modulus, time = content["modes"][k].values()
+        s, scaled = stress / modulus, time * gradient
+        d = scaled + scaled.T
+        extra = sum_of_spelled(terms, s, d)
+        return modulus / time * (d + scaled @ s + s @ scaled.T - s - extra), y
+
+    return rates
+
+
+def integrated(rates, gradient, times, modes=2, variables=0, tolerance=1e-8):
+    """Return the stress of all modes at the times, from rest, of the rates of each."""
+    total = 0.0
+    for k in range(modes):
+        found = followed(
+            lambda y, flow, k=k: np.append(*rates(k, y[:9].reshape(3, 3), y[9:], flow)),
+            np.zeros(9 + variables), gradient, times, tolerance, tolerance,
+        )  # fmt: skip
+        total = total + found[:, :9].reshape(-1, 3, 3)
+    return total
 
 
 class RheoToolMode:

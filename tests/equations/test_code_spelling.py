@@ -6,7 +6,14 @@ import json
 import numpy as np
 import pytest
 import sympy
-from readers import in_ufl, module_of, product_of, rheotool_modes, ufl_number
+from readers import (
+    in_ufl,
+    module_of,
+    product_of,
+    rheotool_modes,
+    sum_of_spelled,
+    ufl_number,
+)
 from spelled_laws import BOTH_SIGNS, LIBRARY, LIBRARY_LAWS, NAMED_LAWS, STATES, agree, sum_of
 
 from discover.equations import Equation, equation_from_json, write_equation
@@ -59,17 +66,7 @@ def _by_json(equation):
     content = json.loads(write_equation(equation, "json"))
     assert equation_from_json(content) == equation
     terms = [(term["term"], term["coefficient"], term["inner"]) for term in content["terms"]]
-    return [_sum_of_spelled(terms, stress, rate) for stress, rate in STATES]
-
-
-def _sum_of_spelled(terms, stress, rate):
-    names = {"sigma": stress, "gammadot": rate, "I": np.eye(3)}
-    names |= {"tr": np.trace, "exp": np.exp, "abs": abs}
-    total = np.zeros((3, 3))
-    for spelling, coefficient, inner in terms:
-        text = spelling.replace(".", " @ ").replace("^", "**")
-        total = total + coefficient * eval(text, names | inner)
-    return total
+    return [sum_of_spelled(terms, stress, rate) for stress, rate in STATES]
 
 
 @pytest.mark.parametrize("read", [_by_python, _by_sympy_text, _by_sympy_expression, _by_json])
@@ -101,7 +98,7 @@ def _physical_rate(equation, stress, gradient):
     (modulus,), (time,) = equation.modulus, equation.relaxation_time
     s, d = stress / modulus, time * (gradient + gradient.T)
     terms = [(term.term, term.coefficient, dict(term.inner)) for term in equation.terms]
-    extra = _sum_of_spelled(terms, s, d)
+    extra = sum_of_spelled(terms, s, d)
     return modulus / time * (d - s - extra)
 
 

@@ -6,15 +6,24 @@ would run it, and integrated by scipy too.
 
 import json
 import re
-from functools import partial
 
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import sympy
 from independent import authors
 from independent.homogeneous import UNIT
-from readers import by_rheotool, followed, in_ufl, module_of, read_latex, ufl_number, value
+from readers import (
+    by_python,
+    by_rheotool,
+    by_sympy,
+    in_ufl,
+    integrated,
+    module_of,
+    read_latex,
+    states,
+    ufl_number,
+    value,
+)
 
 from discover.equations import (
     FORMATS,
@@ -64,57 +73,22 @@ def reference(name, gradient):
     return sum(g * authors.stress(law, c, gradient, TIMES, time) for g, time, c in modes)
 
 
-def integrated(rate, gradient):
-    """Return the stress of both modes, of d(stress)/dt = rate(mode, stress, gradient)."""
-    start = np.zeros((3, 3))
-    return sum(followed(partial(rate, k), start, gradient, TIMES) for k in range(2))
-
-
-def by_python(text):
-    module = module_of(text)
-
-    def rate(k, stress, gradient):
-        state = np.zeros((2, 3, 3))
-        state[k] = stress
-        return module["stress_rate"](state, gradient)[k]
-
-    return rate
-
-
-def by_sympy(text):
-    module = module_of(text)
-    symbols = [*module["stress_symbols"], *module["gradient_symbols"]]
-    functions = [
-        sympy.lambdify(symbols, [*module["stress_rate"].subs(values)], "math", cse=True)
-        for values in module["values"]
-    ]
-
-    def rate(k, stress, gradient):
-        modulus, time = module["modes"][k]
-        s = stress / modulus
-        components = (s[0, 0], s[0, 1], s[0, 2], s[1, 1], s[1, 2], s[2, 2])
-        found = functions[k](*components, *(time * gradient).ravel())
-        return modulus / time * np.reshape(found, (3, 3))
-
-    return rate
-
-
-def by_json(text):
+def by_name(text):
     """The name and the constants; the equation is the authors' in the stress, by A = I + σ."""
     content = json.loads(text)["named"]
     law = getattr(authors, content["law"])
 
-    def rate(k, stress, gradient):
+    def rates(k, stress, y, gradient):
         assert content["law"] != "rolie_poly_fene"  # where σ is not A − I
         scaled, s = gradient * TIME[k], stress / MODULUS[k]
         a = np.eye(3) + s
         change = scaled @ a + a @ scaled.T + law(a, scaled, **content["constants"][k])
-        return MODULUS[k] / TIME[k] * change
+        return MODULUS[k] / TIME[k] * change, y
 
-    return rate
+    return rates
 
 
-READERS = {"python": by_python, "sympy": by_sympy, "json": by_json}
+READERS = {"python": by_python, "sympy": by_sympy, "json": by_name}
 
 
 @every_law
@@ -129,7 +103,7 @@ def test_every_text_flows_as_the_law_in_shear_and_in_extension(name):
         wanted = reference(name, gradient)
         scale = np.max(np.abs(wanted))
         found = {
-            form: integrated(reader(texts[form]), gradient)
+            form: integrated(reader(texts[form]), gradient, TIMES)
             for form, reader in READERS.items()
             if not (form == "json" and name == "rolie_poly_fene")
         }
@@ -144,18 +118,12 @@ def test_constants_that_are_exchanged_between_modes_would_show():
     """Negative control of the test above."""
     other = equation("xpp", CONSTANTS["xpp"][::-1])
     wanted = reference("xpp", GRADIENTS["extension"])
-    found = integrated(by_python(write_equation(other, "python")), GRADIENTS["extension"])
+    found = integrated(by_python(write_equation(other, "python")), GRADIENTS["extension"], TIMES)
     assert np.max(np.abs(found - wanted)) > 1e-3 * np.max(np.abs(wanted))
 
 
-def states(seed=1, number=3):
-    """Return stresses of fluids that flow, I + σ positive definite, and rates without trace."""
-    generator = np.random.default_rng(seed)
-    for _ in range(number):
-        root = 0.6 * generator.normal(size=(3, 3)) + np.eye(3)
-        rate = generator.normal(size=(3, 3))
-        rate = rate + rate.T
-        yield root @ root.T - np.eye(3), rate - np.trace(rate) / 3 * np.eye(3)
+def symmetric_states():
+    return ((stress, gradient + gradient.T) for stress, gradient in states())
 
 
 def extra_of(name, constants, stress, rate):
@@ -168,8 +136,7 @@ def extra_of(name, constants, stress, rate):
 def test_ufl_says_every_law_that_has_a_name(name):
     pytest.importorskip("ufl")
     module = module_of(write_equation(equation(name, (starting_values(name),)), "ufl"))
-    for stress, rate in states():
-        gradient = 0.5 * rate + 0.3 * (UNIT["shear"] - UNIT["shear"].T)
+    for stress, gradient in states():
         arguments = (in_ufl(g * x) for g, x in ((MODULUS[1], stress), (1, gradient)))
         expression = module["stress_rate"](*arguments, 1)
         place = [(i, j) for i in range(3) for j in range(3)]
@@ -203,7 +170,7 @@ def test_latex_says_the_law_and_has_the_constants_of_each_mode(name):
         lines = [line.removesuffix(r" \\").split(" &= ") for line in where]
         # constants stand last
         numbers = [line for line in lines if re.fullmatch(r"[\d.]+", line[1])]
-        for stress, rate in states():
+        for stress, rate in symmetric_states():
             letters = {"sigma": stress, "gamma": rate, "I": np.eye(3), "e": np.e, **own}
             for left, right in [*numbers, *(line for line in lines if line not in numbers)]:
                 letters[read_latex(left).name] = value(read_latex(right), letters)
@@ -234,7 +201,7 @@ def test_terms_are_added_to_a_law_with_a_name():
     both = Equation((term,), named=law_parts(law)[0])
     again = equation_from_json(equation_to_json(both))
     module = module_of(write_equation(again, "python"))
-    for stress, rate in states():
+    for stress, rate in symmetric_states():
         wanted = extra_of("rolie_poly", CONSTANTS["rolie_poly"][0], stress, rate)
         wanted = wanted + 0.1 * (stress @ rate + rate @ stress)
         np.testing.assert_allclose(module["extra_term"](stress, rate), wanted, rtol=1e-12)

@@ -8,23 +8,21 @@ from discover.loop.waves import oscillation, read_wave
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 
 
+def record(name, time, strain, rate, measured, left, **options):
+    error = np.sqrt(np.mean(left**2) / np.mean(measured**2))
+    predicted = np.stack([measured + left])
+    values = strain, time, rate, measured, predicted, np.array([error])
+    return RunRecord(name, False, time, *values, **options)
+
+
 def start_up(rate, residual, seed=0, **options):
     """Return the record of a start-up whose residual is a function of time and strain."""
     time = np.geomspace(0.01, 20.0, 150)
     measured = rate * (1.0 - np.exp(-time))
     size = float(np.sqrt(np.mean(measured**2)))
     left = size * residual(time, rate * time, np.random.default_rng([seed, int(1000 * rate)]))
-    return RunRecord(
-        name=f"{rate:g}",
-        held_out=False,
-        time=time,
-        strain=rate * time,
-        instrument_time=time,
-        rate=np.full_like(time, rate),
-        measured=measured,
-        predicted=np.stack([measured + left]),
-        errors=np.array([float(np.sqrt(np.mean(left**2))) / size]),
-        **options,
+    return record(
+        f"{rate:g}", time, rate * time, np.full_like(time, rate), measured, left, **options
     )
 
 
@@ -34,17 +32,7 @@ def oscillating(residual, frequency=0.7, cycles=6.0, samples=400, noise=0.0, see
     phase = frequency * time
     measured = 2.0 * np.sin(phase) + np.cos(phase)
     left = residual(phase) + noise * np.random.default_rng(seed).normal(size=samples)
-    return RunRecord(
-        name="wave",
-        held_out=False,
-        time=time,
-        strain=np.sin(phase),
-        instrument_time=time,
-        rate=frequency * np.cos(phase),
-        measured=measured,
-        predicted=np.stack([measured + left]),
-        errors=np.array([float(np.sqrt(np.mean(left**2) / np.mean(measured**2)))]),
-    )
+    return record("wave", time, np.sin(phase), frequency * np.cos(phase), measured, left)
 
 
 @pytest.mark.parametrize(

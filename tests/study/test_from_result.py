@@ -20,32 +20,28 @@ from discover.study.declared_model import declared_model, forward_model
 LAW = {
     "format": "discover law 1",
     "terms": [{"term": "sigma.sigma", "coefficient": 0.3}],
-    "modes": [
-        {"modulus_Pa": 90.0, "relaxation_time_s": 1.0},
-        {"modulus_Pa": 40.0, "relaxation_time_s": 0.1},
-    ],
+    "modes": [{"modulus_Pa": g, "relaxation_time_s": t} for g, t in ((90.0, 1.0), (40.0, 0.1))],
 }
-GAIN = {
-    "effect": "stress_gain",
-    "kind": "signal",
-    "parameters": {"gain_error": {"value": -0.1, "ci95": [-0.12, -0.08], "unit": ""}},
-}
-MOBILITY = {
-    "effect": "ptt_linear",
-    "kind": "constitutive",
-    "parameters": {"epsilon": {"value": 0.2, "ci95": [0.1, 0.3], "unit": ""}},
-}
+
+
+def effect(name, kind, parameter, value, ci95, **more):
+    found = {"value": value, "ci95": ci95, "unit": "", **more}
+    return {"effect": name, "kind": kind, "parameters": {parameter: found}}
+
+
+def mobility_by_mode(modes):
+    more = {"degree": 1, "evidence": [0.0, 9.0], "modes": modes}
+    return effect("giesekus_mobility", "constitutive", "alpha", 0.2, [0.1, 0.3], **more)
+
+
+GAIN = effect("stress_gain", "signal", "gain_error", -0.1, [-0.12, -0.08])
+MOBILITY = effect("ptt_linear", "constitutive", "epsilon", 0.2, [0.1, 0.3])
 _MODES = [
     {"relaxation_time_s": t, "value": a, "ci95": [a, a], "left_open": False}
     for t, a in ((1.0, 0.1), (0.1, 0.5))
 ]
-_ALPHA = {"value": 0.2, "ci95": [0.1, 0.3], "unit": "", "degree": 1, "evidence": [0.0, 9.0]}
-MOBILITY_BY_MODE = {
-    "effect": "giesekus_mobility",
-    "kind": "constitutive",
-    "parameters": {"alpha": {**_ALPHA, "modes": _MODES}},
-}
-_OF_THREE = {**MOBILITY_BY_MODE, "parameters": {"alpha": {**_ALPHA, "modes": [*_MODES, _MODES[0]]}}}
+MOBILITY_BY_MODE = mobility_by_mode(_MODES)
+_OF_THREE = mobility_by_mode([*_MODES, _MODES[0]])
 LOOP = {
     "verdict": "effects_added",
     "declared": {"law": LAW, "effects": [GAIN]},

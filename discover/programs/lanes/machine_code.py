@@ -29,6 +29,9 @@ Place = Any
 # arrays of NumPy begin at any double
 _ALIGNED = 8
 
+# how far LLVM optimises what is written here, and the machine code that it makes of it, 0 to 3
+_LEVELS = 2, 2
+
 
 class Writing:
     """A function of counts and of arrays while it is being written.
@@ -105,7 +108,7 @@ class Writing:
         self.builder.ret_void()
         module, machine = llvm.parse_assembly(str(self.module)), _machine()
         module.verify()
-        tuning = llvm.create_pipeline_tuning_options(speed_level=2)
+        tuning = llvm.create_pipeline_tuning_options(speed_level=_LEVELS[0])
         # all is in lanes already, and the loops are long
         tuning.slp_vectorization = tuning.loop_vectorization = tuning.loop_unrolling = False
         passes = llvm.create_pass_builder(machine, tuning)
@@ -143,7 +146,7 @@ def kept(made_from: Any, write: Callable[[], bytes]) -> bytes:
     if folder is None:
         return write()
     try:
-        name = fingerprint(("lanes", *_processor(), made_from), False).hex()
+        name = fingerprint(("lanes", _LEVELS, *_processor(), made_from), False).hex()
     except (NotDescribable, TypeError, ValueError) as reason:
         _LOGGER.debug("machine code is made at every start: %s", reason)
         return write()
@@ -160,7 +163,7 @@ def _machine() -> llvm.TargetMachine:
     llvm.initialize_native_asmprinter()
     cpu, features = _processor()
     target = llvm.Target.from_default_triple()
-    return target.create_target_machine(cpu=cpu, features=features, opt=2)
+    return target.create_target_machine(cpu=cpu, features=features, opt=_LEVELS[1])
 
 
 @cache
