@@ -149,7 +149,7 @@ def _at_given_stress(
     dynamics: Dynamics, fixed: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> AtSamples:
     imposed = jax.vmap(protocol.rate)(grid.times)  # the table holds the stress
-    answer = answer_to_stress(dynamics, grid.times, imposed, 0.0, protocol.kinematics, fixed)
+    answer = answer_to_stress(dynamics, grid.times, imposed, protocol.kinematics, fixed)
     strain, states, rate = (part[grid.sample_index] for part in answer)
     s11, s22, s33, _ = jnp.tensordot(states[:, :4], dynamics.modes.modulus, axes=1).T
     observed = jnp.stack([strain, s11 - s22, s22 - s33], axis=-1)
@@ -174,10 +174,7 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
     return Dynamics(
         slope=over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1),
         linear_relaxation=law.linear_relaxation,
-        declared=Modes(fluid.modulus, fluid.relaxation_time),
-        extra=None,
-        states={},
-        series=None,
+        modes=Modes(fluid.modulus, fluid.relaxation_time),
         viscosity=jnp.asarray(fluid.solvent_viscosity * viscous),
         relaxations=of_modes("relaxations") if law.retracts else None,
         variables=law.variables,

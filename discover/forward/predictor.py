@@ -1,11 +1,9 @@
-"""Predictions of parameter vectors for each part of a batch, in one kernel where there is one."""
+"""Predictions of parameter vectors for each part of a batch, from one kernel."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -16,19 +14,14 @@ from discover.forward.batches import (
     PeriodicFlows,
     Places,
     Records,
-    StressFlows,
     TransientFlows,
 )
 from discover.forward.declared import DeclaredModel, Numbers
 from discover.forward.program import Program
 from discover.forward.side_by_side import Asked
-from discover.programs import in_threads, on_device
-from discover.protocols.kinematics import RecordedQuantity, kinematics_recording
 
 # Of the batches that were laid out for the program
 _KEPT = 8
-
-_NORMAL: tuple[RecordedQuantity, RecordedQuantity] = ("N1", "N2")
 
 
 class Trials(NamedTuple):
@@ -102,7 +95,7 @@ class Predictor:
         return found[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
-        """Return what predicts many vectors of a part at once; None where nothing does."""
+        """Return what predicts many vectors of a part at once."""
         return self.of_every_effect.side_by_side(self._numbers, part)
 
     def _of_piece(
@@ -111,65 +104,19 @@ class Predictor:
         program, (part, judging, runs) = self.program, piece
         judged = program.are_judged_by_modes(trials.thetas)
         trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
-        kernel = self.side_by_side(part)
-        if kernel is None:
-            return self._one_by_one(trials, part, normal)
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
         beside = trials._replace(thetas=vectors)
-        alone = np.zeros(len(vectors), bool)
-        if isinstance(part, PeriodicFlows):
-            alone = kernel.alone(vectors)
-        if np.all(alone):
-            return self._one_by_one(trials, part, normal)
-        some = beside.taken(~alone)
-        asked = Asked(self._numbers, *some, part=part, judging=judging, runs=runs, normal=normal)
-        found = kernel.predict(asked)
-        if not np.any(alone):
-            return found
-        out = np.empty((len(alone), *found.shape[1:]))
-        out[~alone], out[alone] = found, self._one_by_one(trials.taken(alone), part, normal)
-        return out
-
-    def _one_by_one(
-        self, trials: Trials, part: Flows, normal: bool
-    ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
-        """Return what vectors predict in calls of its own for each."""
-        if isinstance(part, PeriodicFlows):
-            return self._recorded_one_by_one(trials, part)
-        found = [self._recorded_one_by_one(trials, part)]
-        for quantity in _NORMAL if normal else ():
-            if isinstance(part, StressFlows):
-                found.append(np.full_like(found[0], np.nan))
-                continue
-            flow = kinematics_recording(part.kinematics, quantity, found[0].shape[1])
-            found.append(self._recorded_one_by_one(trials, replace(part, kinematics=flow)))
-        return np.stack(found, axis=-1)
-
-    def _recorded_one_by_one(
-        self, trials: Trials, part: Flows
-    ) -> Float[np.ndarray, "trials runs *columns"]:
-        program = self.program
-
-        def one(trial: tuple[np.ndarray, np.ndarray, np.float64]) -> np.ndarray:
-            theta, moduli, _ = trial
-            moduli, solvent = on_device(moduli[:-1]), jnp.asarray(float(moduli[-1]))
-            numbers = replace(self._numbers, modulus=moduli, solvent_viscosity=solvent)
-            return np.asarray(program.predict(numbers, program.fluid.in_use(theta), theta, part))
-
-        shape = (type(part), *(leaf.shape for leaf in jax.tree.leaves(part)))
-        found = in_threads(one, zip(*trials, strict=True), is_compiled=shape in program.met)
-        program.met.add(shape)
-        return np.stack(found)
+        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, normal=normal)
+        return self.side_by_side(part).predict(asked)
 
     def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
         """Return runs, and what judges them, as a program takes them, laid out once."""
         for known, records, piece in self._laid_out:
             if known is part and records is batch.records:
                 return piece
-        # a kernel passes over what is padding, and a program for each vector would not
-        flows = part if self.side_by_side(part) is None else part.in_shared_shape()
+        flows = part.in_shared_shape()
         judging = batch.records.of_runs(rows, part.sample_index.shape[1])
         piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
         self._laid_out.append((part, batch.records, piece))

@@ -1,6 +1,5 @@
-"""What is compiled of a model: predictions for one structure of law and effects."""
+"""What stands around the modes of a model: its rates, its signal, and the code that follows it."""
 
-import logging
 from collections.abc import Callable
 from functools import lru_cache, partial
 from typing import Any
@@ -15,7 +14,6 @@ from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffe
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.batches import Flows, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.declared import Numbers, Structure
-from discover.forward.integrators.stepping import answer_to_stress, integrate, strain_in_series
 from discover.forward.side_by_side import (
     Kernel,
     PeriodicCode,
@@ -28,22 +26,16 @@ from discover.forward.side_by_side import (
     code_of,
     intervals,
 )
-from discover.forward.starts.half_cycles import Cycle, first_harmonic
-from discover.forward.starts.periodic_states import PHASE, complex_modulus
-from discover.forward.starts.steady_states import steady_states
+from discover.forward.starts.periodic_states import PHASE, first_harmonic
 from discover.laws import LAWS
-from discover.programs import compiled
-from discover.programs.lanes import NotTranslatable
 from discover.protocols.kinematics import Kinematics
-
-_LOGGER = logging.getLogger(__name__)
 
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
 
 
 class Program:
-    """Predictions and residuals for one structure, compiled when first called."""
+    """What records of one structure of law and effects are predicted with, made when asked for."""
 
     def __init__(self, structure: Structure):
         self.fluid = AugmentedFluid(structure)
@@ -59,15 +51,12 @@ class Program:
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
-        self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
         self._known_parts: list[tuple[TransientFlows, bool]] = []
-        self.met: set[tuple] = set()
-        """Shapes of runs for which it is compiled."""
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
-        """Return what predicts many vectors at once; None where lanes do not know some code."""
+        """Return what predicts many vectors of runs of one control at once."""
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
@@ -85,11 +74,7 @@ class Program:
             *choices.values(),
         )
         if kind not in self._kernels:
-            try:
-                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
-            except NotTranslatable as reason:
-                _LOGGER.debug("vectors are predicted one by one: %s", reason)
-                self._kernels[kind] = None
+            self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
         return self._kernels[kind]
 
     def _in_lanes(
@@ -100,8 +85,10 @@ class Program:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
         if control is PeriodicFlows:
-            own = self._periodic_rates, self._moduli_recorded
-            return PeriodicSideBySide(self.fluid, code_of(PeriodicCode, *given), *own, made_from)
+            code, cycles = code_of(PeriodicCode, *given), {"chooses": False, "cycles": True}
+            own = self._periodic_rates, self._given_way, self._moduli_recorded
+            in_cycles = partial(code_of, Kernel, *given, **cycles)
+            return PeriodicSideBySide(self.fluid, code, in_cycles, *own, made_from)
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
@@ -122,32 +109,6 @@ class Program:
         after = (*self._signal, *self.fluid.series)
         at = [self.fluid.slices[effect.name].start for effect in after]
         return ~np.any(thetas[:, at], axis=1)
-
-    def _predict_all(self, numbers, used, theta, runs: Flows):
-        if isinstance(runs, PeriodicFlows):
-            return self._predict_moduli(numbers, used, theta, runs)
-        of_run: Any
-        if isinstance(runs, TransientFlows):
-            # of all runs, so that a step that is padding in each of them is not taken
-            steps = jnp.max(runs.last_step)
-            of_run = partial(self._predict_transient, numbers, used, theta, steps)
-        elif isinstance(runs, SteadyFlows):
-            of_run = partial(self._predict_steady_states, numbers, used, theta)
-        else:
-            of_run = partial(self._predict_strain, numbers, used, theta)
-        return jax.vmap(of_run)(runs)
-
-    def _predict_transient(self, numbers, used, theta, steps, run: TransientFlows):
-        flow = run.kinematics
-        present = self.fluid.present(theta)
-        rate, tool_rate = self._rates(theta, present, run)
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        cycle = None
-        if run.cycle_steps:
-            cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        stress, felt = integrate(dynamics, run.times[::2], rate, steps, flow, cycle)
-        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
     def _rates(self, theta, present, run: TransientFlows):
         """Return the felt rate at half steps and the tool's at steps, by the effects present."""
@@ -198,17 +159,6 @@ class Program:
             stress = self._if_present(theta, present, effect, distorted, stress)
         return stress[run.sample_index]
 
-    def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
-        flow = run.kinematics
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept, states_in_use=None)
-        present = self.fluid.present(theta)
-        rates = self._steady_rates(theta, present, run)
-        stress, felt = steady_states(dynamics, rates, flow)
-        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._recorded_steady(theta, present, run, stress, felt)
-
     def _steady_rates(self, theta, present, run: SteadyFlows):
         """Return the rates of a flow curve that the fluid feels where nothing slips."""
         places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
@@ -236,26 +186,6 @@ class Program:
                 stress = self._if_present(theta, present, effect, distorted, stress)
         return stress
 
-    def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
-        dynamics = self.fluid.dynamics(numbers, used, theta, None)
-        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept, states_in_use=None)
-        present = self.fluid.present(theta)
-
-        def beside(felt):
-            return self.fluid.beside(numbers, theta, felt, None)
-
-        def one(state):
-            rate, nominal, frequency, steps = state
-            found = complex_modulus(dynamics, rate / frequency, frequency, steps, beside)
-            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
-
-        rates = self._periodic_rates(theta, present, states)
-        commanded = states.frequency * states.strain
-        # not side by side: each in as many cycles, and as many steps of each, as it needs, which
-        # takes a quarter of the time of all in those of the largest
-        return jax.lax.map(one, (rates, commanded, states.frequency, states.steps))
-
     def _periodic_rates(self, theta, present, states: PeriodicFlows):
         """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
         places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
@@ -280,17 +210,34 @@ class Program:
             found = self._if_present(theta, present, effect, distorted, found)
         return jnp.stack([found.real, found.imag])
 
-    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, of_modes):
+    def _whole(self, numbers, theta, strain, frequency, of_modes):
+        """Return the modulus in Pa of all that is felt, and how far the tool turns over that."""
+        rate = strain * frequency * jnp.cos(PHASE)
+        beside = self.fluid.beside(numbers, theta, rate, None)
+        whole = of_modes + first_harmonic(beside, PHASE) / strain
+        series = self.fluid.in_series(theta, None)
+        if series is None:
+            return whole, jnp.ones((), dtype=complex)
+        return whole, 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
+
+    def _given_way(self, numbers, theta, states: PeriodicFlows, strain, of_modes):
+        """Return by how much the tool turns further than the fluid, in each of some states."""
+
+        def one(*of):
+            return self._whole(numbers, theta, *of)[1]
+
+        return jax.vmap(one)(strain, states.frequency, of_modes)
+
+    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, strain, of_modes):
         """Return both moduli of states as they are recorded, of those of the modes."""
         rates = self._periodic_rates(theta, present, states)
         commanded = states.frequency * states.strain
 
-        def one(rate, nominal, frequency, found):
-            beside = self.fluid.beside(numbers, theta, rate * jnp.cos(PHASE), None)
-            found = found + first_harmonic(beside, PHASE) / (rate / frequency)
-            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
+        def one(rate, nominal, frequency, strain, found):
+            whole, taken = self._whole(numbers, theta, strain, frequency, found)
+            return self._recorded_modulus(theta, present, whole / taken, rate, nominal, frequency)
 
-        return jax.vmap(one)(rates, commanded, states.frequency, of_modes)
+        return jax.vmap(one)(rates, commanded, states.frequency, strain, of_modes)
 
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.
@@ -312,13 +259,6 @@ class Program:
             for sign in (1.0, -1.0)
         )
         return first_harmonic(0.5 * (there - back), phase) / strain
-
-    def _predict_strain(self, numbers, used, theta, run: StressFlows):
-        flow = run.kinematics
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        imposed, inertia = self._driven(theta, run)
-        answer = answer_to_stress(dynamics, run.times, imposed, inertia, flow)
-        return answer.strain[run.sample_index]
 
     def _driven(self, theta, run: StressFlows):
         """Return the true stress of a run at a given one in Pa, and the tool's inertia in Pa s²."""
@@ -345,7 +285,7 @@ class Program:
         series = self.fluid.in_series(theta, run.kinematics)
         strain = jnp.zeros_like(imposed)
         if series is not None:
-            strain = strain_in_series(series, run.times, imposed)
+            strain = series.strain(run.times, imposed)
         return imposed, inertia, strain
 
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):

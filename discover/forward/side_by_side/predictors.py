@@ -35,6 +35,11 @@ class Asked(NamedTuple):
     runs: int
     normal: bool
 
+    def taken(self, which: np.ndarray) -> "Asked":
+        """Return what is asked of some of the vectors."""
+        own = (of[which] for of in (self.thetas, self.moduli, self.limits))
+        return self._replace(**dict(zip(("thetas", "moduli", "limits"), own, strict=True)))
+
 
 def in_whole_eights(count: int) -> Int[np.ndarray, " lanes"]:
     """Return places of so many lanes, the last again until the eights are full."""

@@ -1,4 +1,4 @@
-"""Periodic states of a fluid in oscillatory shear, and the moduli of their first harmonic."""
+"""Periodic states of modes: where an oscillation in steady alternation begins, and its moduli."""
 
 from collections.abc import Callable
 from functools import partial
@@ -7,15 +7,9 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Complex, Float, Int
+from jaxtyping import Array, Bool, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.starts.half_cycles import (
-    HalfCycle,
-    counted_half_cycle,
-    first_harmonic,
-    half_cycle,
-)
 from discover.forward.starts.steady_states import (
     FROM_REST,
     Approximation,
@@ -25,129 +19,70 @@ from discover.forward.starts.steady_states import (
     relative_change,
 )
 
-# Most iterations in all, and the relative change of what is followed by iteration below which the
-# next one would change nothing that is seen
-MOST_CYCLES, _TOLERANCE = 60, 1e-8
+# Most iterations for half a cycle, and the relative change below which the next step would change
+# nothing that is seen: Newton's error goes as its square
+MOST_CYCLES, NEWTON_STEP = 60, 1e-6
 
-# The same of the modes' steps: Newton's error goes as their square
-NEWTON_STEP = 1e-6
+# The same for a whole cycle with which a run begins
+MOST, TOLERANCE = 40, 1e-7
 
-# Bounds of the secant's slope
-_SECANT = 0.2, 5.0
+# Half a period later the flow is its own mirror image in the plane across it
+_MIRROR = (1.0, 1.0, 1.0, -1.0)
 
 # ωt at which what needs no steps is looked at: a stress beside the modes, a signal
 PHASE = np.linspace(0.0, np.pi, 161)
 
 
-class _Iterate(NamedTuple):
-    """An approximation to the state at zero strain, and what is felt there of the amplitude."""
-
-    modes: Approximation
-    levels: tuple[Float[Array, "..."], ...]
-    felt: Float[Array, ""]
-    felt_before: Float[Array, ""]
-    lacking_before: Float[Array, ""]
-    moved: Float[Array, ""]
-    change: Float[Array, ""]
-
-
-def complex_modulus(
-    dynamics: Dynamics,
-    strain: Float[Array, ""],
-    frequency: Float[Array, ""],
-    steps: Int[Array, ""],
-    beside: Callable[[Float[Array, " s"]], Float[Array, " s"]],
+def first_harmonic(
+    stress: Float[Array, " s"], phase: Float[Array | np.ndarray, " s"]
 ) -> Complex[Array, ""]:
-    """Return G′ + iG″ in Pa of the first harmonic at a strain γ₀ sin ωt of the tool.
-
-    The periodic state is solved for: the fixed point of half a cycle and the mirror image that half
-    a period is in simple shear. Newton's steps take the derivative along the components of each
-    mode   [shooting and the modified Newton method: Stoer & Bulirsch 2002, Introduction to
-    Numerical Analysis, sections 7.3 and 5.4]. Not finite where this does not converge.
+    """Return G′γ₀ + iG″γ₀ of a stress G′γ₀ sin ωt + G″γ₀ cos ωt + higher odd harmonics.
 
     G′ = (2/Tγ₀) ∫ σ sin ωt dt and G″ = (2/Tγ₀) ∫ σ cos ωt dt   [Hyun et al. 2011, Prog. Polym. Sci.
-    36, 1697]. Slip and compliance in series take their share of the first harmonic alone.
-
-    `steps`: over half a cycle. `beside`: recorded stress beside the modes in Pa, of rates in 1/s.
+    36, 1697]. `stress` in Pa over half a cycle, its ends included. `phase`: ωt there, 0 to π,
+    evenly spaced.
     """
-    half = counted_half_cycle(dynamics, frequency, steps)
+    # of a periodic function the trapezoidal rule over a period is exact to all orders
+    share = jnp.ones(stress.shape).at[jnp.array([0, -1])].set(0.5) / (len(stress) - 1)
+    return 2j * jnp.sum(share * jnp.exp(-1j * phase) * stress)
 
-    def modulus(found: HalfCycle, felt):
-        rate = felt * frequency * jnp.cos(PHASE)
-        return (found.recorded + first_harmonic(beside(rate), PHASE)) / felt
 
-    def taken(whole):
-        """Return by how much the tool turns further than the fluid."""
-        series = dynamics.series
-        if series is None:
-            return jnp.ones((), dtype=complex)
-        return 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
+def mirror(scalars: int, tensors: int) -> Float[np.ndarray, " s"]:
+    """Return the signs by which a state with so many tensors and scalars behind σ is mirrored."""
+    return np.concatenate([np.tile(_MIRROR, 1 + tensors), np.ones(scalars)])
 
-    def improved(now: _Iterate) -> _Iterate:
-        found, jacobian = _end_with_derivative(half, now.modes.stress, now.levels, now.felt)
-        modes, better = next_approximation(now.modes, found.stress, jacobian, now.moved)
-        return moved_to(now, found, modes, better)
 
-    def followed(_, now: _Iterate) -> _Iterate:
-        """Return where half a cycle ends: those from rest need no derivative."""
-        found = half(now.modes.stress, now.levels, now.felt)
-        modes = first_approximation(found.stress, FROM_REST)
-        return moved_to(now, found, modes, jnp.asarray(True))
+class HalfCycle(NamedTuple):
+    """Half a cycle: where it ends, mirrored, and σ12 in Pa at step ends, of all modes and each."""
 
-    def moved_to(now: _Iterate, found: HalfCycle, modes: Approximation, better) -> _Iterate:
-        levels = tuple(
-            # what a cycle adds and leaves decides where a level comes to rest
-            (after - left * before) / (1.0 - left)
-            for before, after, left in zip(now.levels, found.levels, found.left, strict=True)
-        )
-        felt, lacking = next_felt(now, found)
-        slowness = frequency * dynamics.modes.relaxation_time
-        changes = [
-            _TOLERANCE / NEWTON_STEP * relative_change(now.modes, modes, slowness, NEWTON_STEP),
-            jnp.abs(felt / now.felt - 1.0),
-            *(jnp.max(jnp.abs(a - b)) for a, b in zip(levels, now.levels, strict=True)),
-        ]
-        return _Iterate(
-            modes=modes,
-            levels=levels,
-            felt=felt,
-            felt_before=now.felt,
-            lacking_before=lacking,
-            moved=jnp.max(jnp.stack(changes[1:])),
-            change=jnp.where(jnp.all(better), jnp.max(jnp.stack(changes)), jnp.inf),
-        )
+    stress: Float[Array, "s k"]
+    recorded: Float[Array, " s"]
+    of_modes: Float[Array, "s k"]
 
-    def next_felt(now: _Iterate, found: HalfCycle):
-        """Return the next amplitude that the fluid feels, by the secant, and what it lacked."""
-        if dynamics.series is None:
-            return now.felt, now.lacking_before
-        lacking = jnp.log(strain / now.felt) - jnp.log(jnp.abs(taken(modulus(found, now.felt))))
-        lacking = jnp.where(jnp.isfinite(lacking), lacking, 0.0)
-        passed = jnp.log(now.felt / now.felt_before)
-        slope = (now.lacking_before - lacking) / jnp.where(passed == 0.0, 1.0, passed)
-        # 1 of a linear fluid; small of one that thins and gives way
-        slope = jnp.where(passed == 0.0, 1.0, jnp.clip(slope, *_SECANT))
-        return now.felt * jnp.exp(lacking / slope), lacking
 
-    stress, levels = dynamics.rest()
-    amplitude, zero = jnp.asarray(strain), jnp.zeros(())
-    start = _Iterate(
-        modes=first_approximation(stress),
-        levels=levels,
-        felt=amplitude,
-        felt_before=amplitude,
-        lacking_before=zero,
-        moved=zero,
-        change=jnp.asarray(jnp.inf),
-    )
-    end = jax.lax.while_loop(
-        lambda now: goes_on(now.modes, now.change, MOST_CYCLES, _TOLERANCE),
-        improved,
-        jax.lax.fori_loop(0, FROM_REST, followed, start),
-    )
-    whole = modulus(half(end.modes.stress, end.levels, end.felt), end.felt)
-    found = whole / taken(whole)
-    return jnp.where(end.change < _TOLERANCE, found, jnp.nan)
+def half_cycle(
+    dynamics: Dynamics, wave: Float[Array, " m"], width: Float[Array, ""]
+) -> Callable[[Float[Array, "s k"], Float[Array, ""]], HalfCycle]:
+    """Return the function from state and strain amplitude to what half a cycle makes of them.
+
+    `wave`: rate over strain amplitude at step ends and middles in turn. `width`: of a step in s.
+    """
+    weights = dynamics.weights(jnp.asarray(width)[None])[0]
+    back = mirror(dynamics.variables - 4 * dynamics.tensors, dynamics.tensors)
+
+    def half(stress, amplitude) -> HalfCycle:
+        rate = amplitude * wave
+
+        def step(stress, rates):
+            stress = dynamics.stepped(weights, stress, rates, None)
+            return stress, stress[3]
+
+        end, later = jax.lax.scan(step, stress, (rate[:-2:2], rate[1::2], rate[2::2]))
+        sheared = jnp.concatenate([stress[3][None], later])
+        of_modes = sheared * dynamics.modes.modulus
+        return HalfCycle(jnp.asarray(back)[:, None] * end, jnp.sum(of_modes, axis=-1), of_modes)
+
+    return half
 
 
 class _Solving(NamedTuple):
@@ -173,21 +108,26 @@ def periodic_state(
     frequency: Float[Array, ""],
     phase: Float[Array, " m"],
 ) -> PeriodicState:
-    """Return what `complex_modulus` solves for, of modes alone, with implicit derivatives.
+    """Return the state that half a cycle and the mirror image bring back, and its moduli.
 
-    `fixed`: the fluid once more, through which no derivative passes.
+    With the derivatives of the implicit function; not finite where none is found. Newton's steps
+    take the derivative along the components of each mode   [shooting and the modified Newton
+    method: Stoer & Bulirsch 2002, Introduction to Numerical Analysis, sections 7.3 and 5.4].
+
+    `fixed`: the fluid once more, through which no derivative passes. `phase`: ωt at step ends and
+    middles in turn over half a cycle.
     """
     wave = frequency * jnp.cos(phase)
     width = (phase[2] - phase[0]) / frequency
-    solve = half_cycle(fixed, wave, width, by_mode=True)
-    half = half_cycle(dynamics, wave, width, by_mode=True)
+    solve = half_cycle(fixed, wave, width)
+    half = half_cycle(dynamics, wave, width)
     slowness = frequency * fixed.modes.relaxation_time
 
     def turned(now, unit):
         """Return where half a cycle ends, its harmonics, and how a direction moves both."""
 
         def of(stress):
-            end = solve(stress, (), strain)
+            end = solve(stress, strain)
             of_mode = jax.vmap(first_harmonic, in_axes=(-1, None))
             return end.stress, of_mode(end.of_modes, phase[::2])
 
@@ -208,10 +148,10 @@ def periodic_state(
     def hopeful(now: _Solving):
         return goes_on(now.modes, now.change, MOST_CYCLES, NEWTON_STEP)
 
-    size, modes = fixed.rest()[0].shape
+    size, modes = fixed.rest().shape
     # the cycles from rest need no derivative
     begun = jax.lax.fori_loop(
-        0, FROM_REST, lambda _, stress: solve(stress, (), strain).stress, fixed.rest()[0]
+        0, FROM_REST, lambda _, stress: solve(stress, strain).stress, fixed.rest()
     )
     end = jax.lax.while_loop(
         hopeful,
@@ -224,7 +164,7 @@ def periodic_state(
         ),
     )
     end = jax.lax.stop_gradient(end)
-    found = half(end.modes.stress, (), strain)
+    found = half(end.modes.stress, strain)
     # Newton's step from a solution moves it by nothing, and by θ as the implicit function does
     matrix = jnp.eye(size) - jnp.swapaxes(end.jacobian, 1, 2)
     step = jnp.linalg.solve(matrix, (found.stress - end.modes.stress).T[:, :, None])[:, :, 0].T
@@ -234,13 +174,47 @@ def periodic_state(
     return PeriodicState(end.modes.stress + step, whole)
 
 
-def _end_with_derivative(half, stress, levels, felt) -> tuple[HalfCycle, Float[Array, "k s s"]]:
-    """Return half a cycle, and of each mode the derivative of its end: direction, component."""
+class _Iterate(NamedTuple):
+    """An approximation to the modes, and by how much they moved last."""
 
-    def along(unit):
-        direction = unit[:, None] * jnp.ones(stress.shape)
-        end, moved = jax.jvp(lambda stress: half(stress, levels, felt), (stress,), (direction,))
-        return end, moved.stress
+    modes: Approximation
+    change: Float[Array, ""]
 
-    found, tangents = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(stress)))
-    return found, jnp.moveaxis(tangents, 2, 0)
+
+def periodic_start(
+    after_cycle: Callable[[Float[Array, "s k"]], Float[Array, "s k"]],
+    rest: Float[Array, "s k"],
+    slowness: Float[Array, " k"],
+    is_periodic: Bool[Array, ""],
+) -> Float[Array, "s k"]:
+    """Return modes that a whole cycle brings back; not a number where none are found.
+
+    Solved for and not waited for, by Newton's steps along the components of each mode, which change
+    nearly by themselves   [shooting: Stoer & Bulirsch 2002, Introduction to Numerical Analysis,
+    section 7.3; `next_approximation`].
+
+    `after_cycle`: from modes to what they are a cycle later. `slowness`: relaxation times, in
+    cycles. `is_periodic`: where not, `rest` is returned.
+    """
+
+    def improved(now: _Iterate) -> _Iterate:
+        def along(unit):
+            direction = unit[:, None] * jnp.ones(rest.shape)
+            return jax.jvp(after_cycle, (now.modes.stress,), (direction,))
+
+        after, slopes = jax.vmap(along, out_axes=(None, 0))(jnp.eye(len(rest)))
+        jacobian = jnp.moveaxis(slopes, 2, 0)  # mode, direction, component
+        modes, better = next_approximation(now.modes, after, jacobian)
+        change = relative_change(now.modes, modes, slowness, TOLERANCE)
+        change = jnp.where(is_periodic, jnp.where(jnp.all(better), change, jnp.inf), 0.0)
+        return _Iterate(modes, change)
+
+    # the cycles from rest need no derivative
+    begun = jax.lax.fori_loop(0, FROM_REST, lambda _, stress: after_cycle(stress), rest)
+    end = jax.lax.while_loop(
+        lambda now: goes_on(now.modes, now.change, MOST, TOLERANCE),
+        improved,
+        _Iterate(first_approximation(begun, FROM_REST), jnp.asarray(jnp.inf)),
+    )
+    found = jnp.where(end.change < TOLERANCE, end.modes.stress, jnp.nan)
+    return jnp.where(is_periodic, found, rest)
