@@ -13,10 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
-from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
-from discover.forward.predictor import Predictor, Trials
-from discover.forward.program import program_of
+from discover.forward.flows import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
+from discover.forward.program import Predictor, Trials, program_of
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5

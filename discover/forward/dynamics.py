@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.forward.integrators.exponential_weights import StressWeights, krogstad_weights
+from discover.forward.exponential_weights import StressWeights, krogstad_weights
 from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 

@@ -14,18 +14,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Inexact
 
+from discover.forward.by_diffrax import solve_in_reverse
 from discover.forward.dynamics import Dynamics, Modes
-from discover.forward.grids.flow_batch import FlowBatch
-from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.integrators.by_diffrax import solve_in_reverse
-from discover.forward.integrators.stepping import (
+from discover.forward.flow_batch import FlowBatch
+from discover.forward.grid import IntegrationGrid
+from discover.forward.periodic_states import periodic_state
+from discover.forward.stepping import (
     Observe,
     answer_to_stress,
     begun,
     follow,
     without_derivatives,
 )
-from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
-from discover.forward.integrators.stepping import follow
+from discover.forward.stepping import follow
 from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations

@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import at_samples, dynamics_of_fluid, solve_batch
-from discover.forward.grids.flow_batch import lay_out
-from discover.forward.starts.periodic_states import first_harmonic, half_cycle
+from discover.forward.periodic_states import first_harmonic, half_cycle
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, oscillations, start_up
 from discover.simulate import simulate

@@ -8,8 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_on_grid
-from discover.forward.grids import lay_out
 from discover.laws import Fluid, make_law
 from discover.protocols import imposed_stress, start_up
 from tensor_library.algebra import contracted

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.forward.starts.periodic_states import MOST, TOLERANCE
-from discover.forward.starts.steady_states import (
+from discover.forward.periodic_states import MOST, TOLERANCE
+from discover.forward.steady_states import (
     FROM_REST,
     Approximation,
     goes_on,

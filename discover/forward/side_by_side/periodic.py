@@ -11,6 +11,7 @@ from jaxtyping import Float
 from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
+from discover.forward.periodic_states import MOST_CYCLES, NEWTON_STEP, mirror
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.cycles import approximation
 from discover.forward.side_by_side.kernel import Kernel
@@ -22,8 +23,7 @@ from discover.forward.side_by_side.predictors import (
     modes_in_use,
 )
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
-from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP, mirror
-from discover.forward.starts.steady_states import goes_on, next_approximation, relative_change
+from discover.forward.steady_states import goes_on, next_approximation, relative_change
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 
 from discover.effects import AbstractEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import Records
 from discover.forward.declared import Numbers
+from discover.forward.records import Records
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.step import Flags
 from discover.programs import compiled, in_threads

@@ -17,7 +17,7 @@ import numpy as np
 from discover.effects import ConstitutiveEffect, StateEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.declared import Numbers
-from discover.forward.integrators.exponential_weights import (
+from discover.forward.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,

@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.integrators.exponential_weights import KrogstadWeights
+from discover.forward.exponential_weights import KrogstadWeights
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if

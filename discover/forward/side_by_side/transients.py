@@ -13,9 +13,10 @@ from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import Records, TransientFlows
 from discover.forward.declared import Numbers
-from discover.forward.integrators.exponential_weights import krogstad_weights
+from discover.forward.exponential_weights import krogstad_weights
+from discover.forward.flows import TransientFlows
+from discover.forward.records import Records
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import WEIGHTS

@@ -76,7 +76,8 @@ class Arithmetic:
 
     def mark(self) -> Callable[[], None]:
         """Return what takes back all that is written from here on."""
-        block, blocks = self.builder.block, self.builder.function.blocks
+        block: Any = self.builder.block
+        blocks = self.builder.function.blocks
         count, instructions, known = len(blocks), len(block.instructions), dict(self._known)
         self.operations = 0
 

@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import llvmlite.ir as ir
 import numpy as np
+from jax.extend.core import jaxpr_as_fun
 
 from discover.programs.lanes.arithmetic import (
     DOUBLES,
@@ -100,7 +101,7 @@ class Translation:
                 for i in at:
                     flat = flat.at[i].set(next(read))
                 arguments.append(flat.reshape(leaf.shape).astype(variable.aval.dtype))
-            found = jax.core.eval_jaxpr(traced.jaxpr, traced.consts, *arguments)
+            found = jaxpr_as_fun(traced)(*arguments)
             return jnp.concatenate([jnp.ravel(jnp.asarray(each, float)) for each in found])
 
         axes = [None if one else 0 for one in shared]

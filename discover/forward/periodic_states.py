@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Complex, Float
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.starts.steady_states import (
+from discover.forward.steady_states import (
     FROM_REST,
     Approximation,
     first_approximation,

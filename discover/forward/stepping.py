@@ -10,9 +10,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from discover.forward.dynamics import Dynamics
-from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.starts.periodic_states import periodic_start
-from discover.forward.starts.steady_states import steady_state
+from discover.forward.grid import IntegrationGrid
+from discover.forward.periodic_states import periodic_start
+from discover.forward.steady_states import steady_state
 from discover.protocols.kinematics import Kinematics
 from discover.protocols.protocol import FlowProtocol
 from tensor_library.algebra import contracted
