@@ -4,6 +4,9 @@ Laws and effects say what they are, as everywhere; how modes, states of the flui
 in series move together is written out anew, and no step is the package's.
 """
 
+from copy import copy
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -16,80 +19,103 @@ from tensor_library.kinematics import rate_of_deformation
 # Samples of a run between which a rate that an instrument shapes is a straight line
 _DENSE = 801
 
+# A stress over its modulus from which on a law has run away
+_LOST = 1e5
+
 
 class ContinuousFluid:
-    """The fluid of a vector of parameters in shear, or in the flow of a run."""
+    """The fluids of vectors of parameters in shear, or in the flow of a run."""
 
     def __init__(self, model, theta, flow=None):
-        self._fluid, self._theta = model._predictor.program.fluid, jnp.asarray(theta)
-        self._numbers, self._flow = model._predictor._numbers, flow
+        self._fluid, self._numbers = model._predictor.program.fluid, model._predictor._numbers
+        self._flow = flow
         levels = [effect.levels for effect in self._fluid.states]
         self._ends = np.cumsum(levels) if levels else np.zeros(0, int)
-        _, declared, extra, _ = self._fluid.of_modes(self._numbers, self._theta)
-        pairs = [declared] if extra is None else [declared, extra]
-        modes = [np.concatenate([np.asarray(of) for of in column])
-                 for column in zip(*pairs, strict=True)]  # fmt: skip
-        self._modulus, self._time = modes
-        rest = [np.full(effect.levels, effect.rest) for effect in self._fluid.states]
-        self.rest = np.concatenate([np.zeros(4 * len(self._time)), *rest])
-        one = jnp.ones(1)
-        self.viscosity = float(self._fluid.beside(self._numbers, self._theta, one, flow)[0])
-        series = self._fluid.in_series(self._theta, flow)
-        self.slip, self.compliance = (0.0, 0.0) if series is None else map(float, series)
-        self.change, self.stress = jax.jit(self._change), jax.jit(self._stress)
-        self._slope = jax.jit(
-            lambda y, rate: jax.jvp(lambda y: self._stress(y), (y,), (self._change(y, rate),))[1]
+        self._changes, self._stresses = jax.jit(self._change), jax.jit(self._stress)
+        self._slopes = jax.jit(
+            lambda theta, y, rate: jax.jvp(
+                lambda y: self._stress(theta, y), (y,), (self._change(theta, y, rate),)
+            )[1]
         )
+        self._turn_to(theta)
 
-    def _values(self, effect):
-        return self._theta[self._fluid.slices[effect.name]]
+    def of(self, theta):
+        """Return the fluid of another vector, which shares what is compiled."""
+        other = copy(self)
+        other._turn_to(theta)
+        return other
 
-    def _parts(self, y):
-        modes = y[: 4 * len(self._time)].reshape(len(self._time), 4)
+    def _turn_to(self, theta):
+        self._theta = jnp.asarray(theta)
+        modes = self._modes(self._theta)[1]
+        rest = [np.full(effect.levels, effect.rest) for effect in self._fluid.states]
+        self.rest = np.concatenate([np.zeros(4 * len(modes)), *rest])
+        one = jnp.ones(1)
+        self.viscosity = float(self._fluid.beside(self._numbers, self._theta, one, self._flow)[0])
+        series = self._fluid.in_series(self._theta, self._flow)
+        self.slip, self.compliance = (0.0, 0.0) if series is None else map(float, series)
+
+    def stress(self, y):
+        """Return the recorded stress of the modes in Pa."""
+        return float(self._stresses(self._theta, y))
+
+    def _modes(self, theta):
+        """Return moduli in Pa and times in s."""
+        _, declared, extra, _ = self._fluid.of_modes(self._numbers, theta)
+        pairs = [declared] if extra is None else [declared, extra]
+        return [jnp.concatenate(column) for column in zip(*pairs, strict=True)]
+
+    def _values(self, effect, theta=None):
+        return (self._theta if theta is None else theta)[self._fluid.slices[effect.name]]
+
+    def _parts(self, theta, y):
+        times = self._modes(theta)[1]
+        modes = y[: 4 * len(times)].reshape(len(times), 4)
         levels = jnp.split(y[modes.size :], self._ends[:-1]) if len(self._ends) else []
         states = self._fluid.states
         return modes, [
             own if effect.levels > 1 else own[0] for effect, own in zip(states, levels, strict=True)
         ]
 
-    def _factor(self, name, levels):
+    def _factor(self, name, theta, levels):
         total = 1.0
         for effect, level in zip(self._fluid.states, levels, strict=True):
-            total = total * getattr(effect, name)(self._values(effect), level)
+            total = total * getattr(effect, name)(self._values(effect, theta), level)
         return total
 
-    def _stress(self, y):
-        """Return the recorded stress of the modes in Pa."""
-        modes, levels = self._parts(y)
+    def _stress(self, theta, y):
+        modes, levels = self._parts(theta, y)
         own = modes[:, 3] if self._flow is None else self._flow.stress(modes.T)
-        return self._factor("modulus_factor", levels) * jnp.sum(self._modulus * own)
+        return self._factor("modulus_factor", theta, levels) * jnp.sum(self._modes(theta)[0] * own)
 
-    def _change(self, y, rate):
-        modes, levels = self._parts(y)
-        flow, slow = self._flow, self._factor("time_factor", levels)
-        unit = jnp.array([0.0, 0.0, 0.0, 1.0]) if flow is None else flow.gradient
-        law = self._fluid.of_modes(self._numbers, self._theta).law
+    def _change(self, theta, y, rate):
+        modes, levels = self._parts(theta, y)
+        moduli, times = self._modes(theta)
+        flow, slow = self._flow, self._factor("time_factor", theta, levels)
+        unit = 1.0 if flow is None else flow.gradient
+        law = self._fluid.of_modes(self._numbers, theta).law
         effects = [e for e in self._fluid.constitutive if e.adds_term]
 
         def of_mode(stress, time):
-            gradient = slow * time * rate * (1.0 if flow is None else unit)
+            gradient = slow * time * rate * unit
             change = law.stress_rate(stress, gradient)
             deformation = rate_of_deformation(gradient)
             for effect in effects:
-                change = change - effect.extra_term(self._values(effect), stress, deformation)
+                values = self._values(effect, theta)
+                change = change - effect.extra_term(values, stress, deformation)
             return change / (slow * time)
 
         sheared = modes[:, 3] if flow is None else flow.equivalent_shear_stress(modes.T)
-        sheared = self._factor("modulus_factor", levels) * jnp.sum(self._modulus * sheared)
+        sheared = self._factor("modulus_factor", theta, levels) * jnp.sum(moduli * sheared)
         felt = rate if flow is None else flow.intensity * rate
         moved = []
         for effect, level in zip(self._fluid.states, levels, strict=True):
-            source, decay = effect.source_and_decay(self._values(effect), felt, sheared)
+            source, decay = effect.source_and_decay(self._values(effect, theta), felt, sheared)
             moved.append(jnp.ravel(source - decay * level))
-        return jnp.concatenate([jax.vmap(of_mode)(modes, jnp.asarray(self._time)).ravel(), *moved])
+        return jnp.concatenate([jax.vmap(of_mode)(modes, times).ravel(), *moved])
 
     def _seen(self, states, rates):
-        own = jax.vmap(self._stress)(jnp.asarray(states))
+        own = jax.vmap(partial(self._stress, self._theta))(jnp.asarray(states))
         beside = self._fluid.beside(self._numbers, self._theta, jnp.asarray(rates), self._flow)
         return np.asarray(own) + np.asarray(beside)
 
@@ -103,20 +129,24 @@ class ContinuousFluid:
         def felt(t, y):
             if soft:
                 return y[-1]
-            given = slip * float(self.stress(y)) if slip else 0.0
+            given = slip * self.stress(y) if slip else 0.0
             return (tool(t) - given) / (1.0 + slip * viscosity)
 
         def slope(t, y):
             rate, own = felt(t, y), y[:-1] if soft else y
-            moved = np.asarray(self.change(own, rate))
+            moved = np.asarray(self._changes(self._theta, own, rate))
             if not soft:
                 return moved
-            stress = float(self.stress(own)) + viscosity * rate
-            left = (tool(t) - rate - slip * stress) / soft - float(self._slope(own, rate))
+            stress = self.stress(own) + viscosity * rate
+            left = (tool(t) - rate - slip * stress) / soft - float(
+                self._slopes(self._theta, own, rate)
+            )
             return np.append(moved, left / viscosity)
 
         start = np.append(self.rest, 0.0) if soft else self.rest
-        reached = solve_ivp(slope, (0.0, times[-1]), start, "LSODA", times, rtol=1e-8, atol=1e-9)
+        reached = solve_ivp(
+            slope, (0.0, times[-1]), start, "LSODA", times, events=lost, rtol=1e-8, atol=1e-9
+        )
         found = reached.y.T
         rates = np.array([felt(*each) for each in zip(reached.t, found, strict=True)])
         stress = self._seen(found[:, : self.rest.size], rates)
@@ -128,9 +158,9 @@ class ContinuousFluid:
         size = self.rest.size
 
         def slope(t, y):
-            own, left = y[:size], imposed(t) - float(self.stress(y[:size]))
+            own, left = y[:size], imposed(t) - self.stress(y[:size])
             rate = y[-1] if inertia else left / self.viscosity
-            moved = [*np.asarray(self.change(own, rate)), rate, imposed(t)]
+            moved = [*np.asarray(self._changes(self._theta, own, rate)), rate, imposed(t)]
             return [*moved, (left - self.viscosity * rate) / inertia] if inertia else moved
 
         start = np.append(self.rest, np.zeros(2 + bool(inertia)))

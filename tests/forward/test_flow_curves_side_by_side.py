@@ -84,13 +84,13 @@ def test_a_state_that_no_flow_reaches_is_told_and_spoils_none_beside_it(asked):
 def test_effects_on_flow_curves_are_where_a_start_up_ends(asked):
     model, batch, vectors = asked
     found = model.predictions(vectors, batch)
-    long = np.array([100.0])
+    long, any_of_them = np.array([100.0]), ContinuousFluid(model, vectors[0])
     for number, theta in enumerate(vectors):
         for place in (2, 7, 10):
             rate = RATES[place]
             run = Run("long", long, start_up(rate), np.full(1, rate), np.ones(1))
             # what is still to come after fifty of the longest time, to scipy's tolerance
-            exact = ContinuousFluid(model, theta).recorded(run)
+            exact = any_of_them.of(theta).recorded(run)
             np.testing.assert_allclose(found[number, 0, place], exact[0], rtol=1e-5)
     # and not because effects do nothing
     assert np.all(np.max(np.abs(found[1:, 0] / found[0, 0] - 1.0), axis=1) > 1e-3)

@@ -122,18 +122,17 @@ def test_what_gives_way_takes_its_share_of_the_closed_moduli(asked):
         assert np.all(np.abs(own / bare - 1.0) > 1e-4)
 
 
-STATES = [
-    ({"thixotropy": 1.0}, 40),
-    ({"viscous_heating": 1.0}, 40),
-    ({"giesekus_mobility": 0.3, "thixotropy": 1.0}, 40),
-    ({"giesekus_mobility": 0.3, "wall_slip": 1.0}, 20),
+TRIALS = [
+    {"thixotropy": 5.0},
+    {"giesekus_mobility": 1.0, "wall_slip": 1.0},
+    {"giesekus_mobility": 1.0, "wall_slip": 1.0, "thixotropy": 5.0},
 ]
 
 
-@pytest.mark.parametrize(("trial", "cycles"), STATES)
-def test_states_of_the_fluid_come_to_where_scipy_ends(asked, trial, cycles):
+@pytest.mark.parametrize("trial", TRIALS)
+def test_what_couples_the_modes_comes_to_where_scipy_ends(asked, trial):
     model, _ = asked
-    names = "giesekus_mobility", "thixotropy", "viscous_heating", "wall_slip"
+    names = "giesekus_mobility", "thixotropy", "wall_slip"
     model = AugmentedModel(model.declared, list(map(make_effect, names)))
     strain, frequency = np.array([0.3, 3.0]), np.array([2.0, 1.0])
     run = Run(
@@ -149,7 +148,7 @@ def test_states_of_the_fluid_come_to_where_scipy_ends(asked, trial, cycles):
     (storage, loss), still = model.predict(theta, batch), model.predict(model.zero(), batch)
     fluid = ContinuousFluid(model, theta)
     pairs = zip(strain, frequency, strict=True)
-    exact = np.array([fluid.modulus(*pair, cycles) for pair in pairs])
+    exact = np.array([fluid.modulus(*pair, 40) for pair in pairs])
     # the steps of a cycle, and of what slips its first harmonic alone
     np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-3)
     assert np.max(np.abs(exact / (still[0] + 1j * still[1]) - 1.0)) > 2e-2
