@@ -143,6 +143,11 @@ class ContinuousFluid:
             )
             return np.append(moved, left / viscosity)
 
+        def lost(_t, y):
+            return _LOST - np.max(np.abs(y))
+
+        lost.terminal = True
+
         start = np.append(self.rest, 0.0) if soft else self.rest
         reached = solve_ivp(
             slope, (0.0, times[-1]), start, "LSODA", times, events=lost, rtol=1e-8, atol=1e-9
