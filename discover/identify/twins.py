@@ -310,7 +310,7 @@ def _arrivals(law, protocols, grids):
             return jnp.concatenate([value[:, None], along], axis=1)
 
         beside = alone._replace(slope=slope, columns=3)
-        start = beside.rest()[0].at[:3, 1:, 0].set(jnp.eye(3))
+        start = beside.rest().at[:3, 1:, 0].set(jnp.eye(3))
         return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
 
     return jax.vmap(one)(protocols, grids)

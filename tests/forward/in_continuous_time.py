@@ -19,9 +19,6 @@ from tensor_library.kinematics import rate_of_deformation
 # Samples of a run between which a rate that an instrument shapes is a straight line
 _DENSE = 801
 
-# A stress over its modulus from which on a law has run away
-_LOST = 1e5
-
 
 class ContinuousFluid:
     """The fluids of vectors of parameters in shear, or in the flow of a run."""
@@ -119,7 +116,7 @@ class ContinuousFluid:
         beside = self._fluid.beside(self._numbers, self._theta, jnp.asarray(rates), self._flow)
         return np.asarray(own) + np.asarray(beside)
 
-    def at_rate(self, tool, times):
+    def at_rate(self, tool, times, method="LSODA"):
         """Return the recorded stress and the felt rate at times after rest; NaN where none is.
 
         `tool`: its rate in 1/s, of time. The strain of what gives way is C σ + ∫ s σ dt.
@@ -143,15 +140,9 @@ class ContinuousFluid:
             )
             return np.append(moved, left / viscosity)
 
-        def lost(_t, y):
-            return _LOST - np.max(np.abs(y))
-
-        lost.terminal = True
-
         start = np.append(self.rest, 0.0) if soft else self.rest
-        reached = solve_ivp(
-            slope, (0.0, times[-1]), start, "LSODA", times, events=lost, rtol=1e-8, atol=1e-9
-        )
+        close = {"rtol": 1e-8, "atol": 1e-9}
+        reached = solve_ivp(slope, (0.0, times[-1]), start, method, times, **close)
         found = reached.y.T
         rates = np.array([felt(*each) for each in zip(reached.t, found, strict=True)])
         stress = self._seen(found[:, : self.rest.size], rates)

@@ -91,13 +91,13 @@ def test_a_trial_that_runs_away_is_told_from_the_sample_on_that_scipy_does_not_r
     found, calm = model.predictions([away, vectors[1]], batch)
     for own, run in zip(found, runs(), strict=True):
         exact, _ = ContinuousFluid(model, away, run.protocol.kinematics).at_rate(
-            lambda t, run=run: shear_rates(run.protocol, np.array([t]))[0], run.time
+            lambda t, run=run: shear_rates(run.protocol, np.array([t]))[0], run.time, "RK45"
         )
         # within a step of the integration, some tenth of a sample's interval
-        off = np.sum(np.abs(own[: len(run)]) < 1e6) - np.sum(np.isfinite(exact))
+        off = np.sum(np.abs(own[: len(run)]) < 1e6) - np.sum(np.abs(exact) < 1e6)
         assert abs(off) <= 1
         if run.name != "extension":
-            assert 0 < np.sum(np.isfinite(exact)) < len(run)
+            assert 0 < np.sum(np.abs(exact) < 1e6) < len(run)
     np.testing.assert_allclose(calm, model.predictions(vectors[1:2], batch)[0], rtol=1e-12)
     assert np.all(np.isinf(model.residuals([away], batch, np.array([1e9]))))
 
