@@ -116,7 +116,7 @@ class ContinuousFluid:
         beside = self._fluid.beside(self._numbers, self._theta, jnp.asarray(rates), self._flow)
         return np.asarray(own) + np.asarray(beside)
 
-    def at_rate(self, tool, times, method="LSODA"):
+    def at_rate(self, tool, times):
         """Return the recorded stress and the felt rate at times after rest; NaN where none is.
 
         `tool`: its rate in 1/s, of time. The strain of what gives way is C σ + ∫ s σ dt.
@@ -142,7 +142,7 @@ class ContinuousFluid:
 
         start = np.append(self.rest, 0.0) if soft else self.rest
         close = {"rtol": 1e-8, "atol": 1e-9}
-        reached = solve_ivp(slope, (0.0, times[-1]), start, method, times, **close)
+        reached = solve_ivp(slope, (0.0, times[-1]), start, "LSODA", times, **close)
         found = reached.y.T
         rates = np.array([felt(*each) for each in zip(reached.t, found, strict=True)])
         stress = self._seen(found[:, : self.rest.size], rates)
