@@ -24,8 +24,8 @@ from independent.named import CONSTANTS, material
 from scipy.integrate import solve_ivp
 
 from discover.first_use import enable_x64
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_in_batch
-from discover.forward.grids.flow_batch import lay_out
 from discover.laws import Fluid, make_law
 from discover.protocols import FlowProtocol, imposed_stress, in_flow, oscillatory_shear, start_up
 

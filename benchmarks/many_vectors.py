@@ -42,9 +42,10 @@ if not find_spec("discover.loop"):  # an older tree
 
 def problem(name: str, modes: dict):
     """Return the model with every candidate of a loop, the fitted runs of shear, and the modes."""
+    from discover.forward.batches import data_scales
+
     from discover.effects import make_effect
     from discover.forward import AugmentedModel
-    from discover.forward.batches import data_scales
     from discover.study import read_study
     from discover.study.data import load_study_data
     from discover.study.declared_model import declared_model, forward_model

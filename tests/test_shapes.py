@@ -5,7 +5,7 @@ import jaxtyping
 import numpy as np
 import pytest
 
-from discover.forward.grids.grid import make_grid
+from discover.forward.grid import make_grid
 from discover.protocols import start_up
 
 

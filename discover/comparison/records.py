@@ -23,7 +23,7 @@ from discover.effects import (
 )
 from discover.errors import InputError
 from discover.forward import TransientFlows
-from discover.forward.batches.flows import transients
+from discover.forward.flows import transients
 from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import UpperConvectedMaxwell

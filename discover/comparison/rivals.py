@@ -12,7 +12,7 @@ from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relat
 from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
 from discover.forward import make_batch
-from discover.forward.grids.flow_batch import lay_out
+from discover.forward.flow_batch import lay_out
 from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid

@@ -11,18 +11,16 @@ from discover.forward.augmented_model import (
     linearised,
     widths_of,
 )
-from discover.forward.batches import (
+from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
+from discover.forward.flows import Batch, TransientFlows, make_batch
+from discover.forward.records import (
     OBSERVED,
-    Batch,
     Records,
-    TransientFlows,
     data_scales,
     even,
-    make_batch,
     make_records,
     names_of_loadings,
 )
-from discover.forward.declared import MODULUS, RELAXATION_TIME, DeclaredModel, FreeParameter
 
 __all__ = [
     "MODULUS",

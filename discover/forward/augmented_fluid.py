@@ -1,5 +1,6 @@
 """The fluid that a vector of parameters is: a declared law with effects, as integrators take it."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -10,16 +11,59 @@ from jaxtyping import Array, Float
 from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
+    LibraryTerm,
     ModeEffect,
     SeriesElement,
     StateEffect,
 )
-from discover.forward.added_terms import AddedTerms, InUse
 from discover.forward.declared import DEGREE, Structure, constants_of_modes, decades
-from discover.forward.dynamics import Dynamics, Modes, Series
+from discover.forward.dynamics import Modes
 from discover.laws import LAWS, AbstractConstitutiveLaw
-from discover.laws.each_mode import LawOfEachMode, of_each_mode, over_modes, with_modes
+from discover.laws.each_mode import LawOfEachMode, with_modes
 from discover.protocols.kinematics import Kinematics
+from tensor_library.algebra import scalar_invariants
+
+
+class LibraryMatrix:
+    """Coefficients of library terms, basis tensors × monomials of the invariants."""
+
+    def __init__(self, terms: Sequence[LibraryTerm], positions: Sequence[int]):
+        self.positions = np.asarray(positions, dtype=int)
+        self.powers = tuple(dict.fromkeys(term.term.powers for term in terms))
+        self.rows = np.array([term.term.tensor for term in terms], dtype=int)
+        self.columns = np.array([self.powers.index(t.term.powers) for t in terms], dtype=int)
+        self.tensors = tuple(sorted(set(self.rows.tolist())))
+        """Basis tensors that occur."""
+
+    def matrix(self, theta: Float[Array, " p"]) -> Float[Array, "8 m"]:
+        """Return the coefficients as a matrix."""
+        empty = jnp.zeros((8, len(self.powers)))
+        return empty.at[self.rows, self.columns].add(theta[self.positions])
+
+    def monomials(self, stress, rate) -> Float[Array, " m"]:
+        """Return the monomials of the invariants, in the order of the columns."""
+        invariants = scalar_invariants(stress, rate)
+        values = []
+        for powers in self.powers:
+            value = jnp.ones(())
+            for i, power in enumerate(powers):
+                for _ in range(power):
+                    value = value * invariants[i]
+            values.append(value)
+        return jnp.stack(values)
+
+
+class Series(NamedTuple):
+    """Elements in series with the fluid: slip in 1/(Pa s) and compliance in 1/Pa."""
+
+    slip: Float[Array, ""]
+    compliance: Float[Array, ""]
+
+    def strain(self, times: Float[Array, " s"], imposed: Float[Array, " s"]) -> Float[Array, " s"]:
+        """Return their strain at times in s under a given stress in Pa."""
+        slipped = jnp.cumsum(0.5 * (imposed[1:] + imposed[:-1]) * jnp.diff(times))
+        given = self.compliance * (imposed - imposed[0])
+        return given + self.slip * jnp.concatenate([jnp.zeros(1), slipped])
 
 
 class OfModes(NamedTuple):
@@ -38,7 +82,8 @@ class OfModes(NamedTuple):
 class AugmentedFluid:
     """What a structure makes of a vector: the fluid, and what gives way in series with it.
 
-    `slices`, `of_effects`, `instants`: where in the vector the parameters of each effect, of all of
+    `library`, `other_terms`: what effects add to the law of each mode. `slices`, `of_effects`,
+    `instants`: where in the vector the parameters of each effect, of all of
     them, and the instants of steps of the rate stand. `size`: its length.
     """
 
@@ -66,8 +111,15 @@ class AugmentedFluid:
         self.varying_effects = {
             e: slots[e.name] for e in self.constitutive if e.name in slots and e.name not in free
         }
-        of_effects = {e.name: at for e, at in self.varying_effects.items()}
-        self.added = AddedTerms(self.constitutive, self.slices, of_effects)
+        plain = [
+            e
+            for e in self.constitutive
+            if isinstance(e, LibraryTerm)
+            and e.term.closed_form is None
+            and e not in self.varying_effects
+        ]
+        self.library = LibraryMatrix(plain, [self.slices[term.name].start for term in plain])
+        self.other_terms = [e for e in self.constitutive if e.adds_term and e not in plain]
         self._modes = [e for e in effects if isinstance(e, ModeEffect)]
         self.states = [e for e in effects if isinstance(e, StateEffect)]
         self.series = [e for e in effects if isinstance(e, SeriesElement)]
@@ -79,15 +131,6 @@ class AugmentedFluid:
     def present(self, thetas: Float[Array, "*trials p"] | np.ndarray) -> Any:
         """Return of each effect whether its amplitude is not zero, in one of several vectors."""
         return (thetas.reshape(-1, self.size)[:, self._amplitudes] != 0.0).any(axis=0)
-
-    def in_use(self, theta: np.ndarray) -> InUse:
-        """Return the branches that a parameter vector takes."""
-        states = [i for i, e in enumerate(self.states) if theta[self.slices[e.name].start] != 0.0]
-        several = len(self.states) + 1
-        return self.added.in_use(theta)._replace(
-            states=np.int32(0 if not states else states[0] + 1 if len(states) == 1 else several),
-            times=np.int32(any(self.states[i].changes_times for i in states)),
-        )
 
     def beside(self, numbers, theta, rate, flow: Kinematics | None):
         """Return the recorded stress of the solvent and of what effects add beside the modes.
@@ -163,65 +206,16 @@ class AugmentedFluid:
         }
         return OfModes(law, Modes(modulus, relaxation_time), extra, amplitudes)
 
-    def dynamics(self, numbers, used, theta, flow: Kinematics | None) -> Dynamics:
-        """Return the fluid and what gives way in series with it, in a flow; None is simple shear.
-
-        `used`: the branches that the vector takes.
-        """
-        law, declared, extra, amplitudes = self.of_modes(numbers, theta)
-        of_law = over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1)
-        added = self.added.rate(theta, used, amplitudes)
-
-        def modes_rate(stress, gradient):
-            return of_law(stress, gradient) - added(stress, gradient)
-
-        return Dynamics(
-            modes_rate,
-            law.linear_relaxation,
-            declared,
-            extra,
-            {effect: self.values(theta, effect) for effect in self.states},
-            self.in_series(theta, flow),
-            self.beside(numbers, theta, jnp.ones(1), flow and flow.driven)[0],
-            self._of_modes_at_rest("relaxations", law, declared.modulus, extra)
-            if law.retracts
-            else None,
-            used.times,
-            used.states,
-            law.variables,
-            self._of_modes_at_rest("shares", law, declared.modulus, extra) if law.tensors else None,
-        )
-
     def in_series(self, theta, flow: Kinematics | None) -> Series | None:
-        """Return what gives way in series with the fluid; None where there is no such effect."""
+        """Return what gives way in series with the fluid; None where there is no such effect.
+
+        Slip that depends on the stress is left out.
+        """
         if not self.series:
             return None
         pairs = [e.slip_and_compliance(self.values(theta, e)) for e in self.series]
         both = jnp.stack([jnp.asarray(sum(column)) for column in zip(*pairs, strict=True)])
-        slip, compliance = where_in_shear(flow, both, jnp.zeros(2))
-        return Series(slip, compliance, self._slip_by_stress(theta, flow))
-
-    def _slip_by_stress(self, theta, flow: Kinematics | None):
-        """Return what slip depends on the stress, as a function of it; None where nothing does."""
-        elements = [e for e in self.series if e.slips_by_stress]
-        if not elements:
-            return None
-
-        def slip(stress):
-            found = jnp.zeros(())
-            for element in elements:
-                found = found + element.slip_at(self.values(theta, element), stress)
-            return where_in_shear(flow, found, jnp.zeros(()))
-
-        return slip
-
-    def _of_modes_at_rest(
-        self, name: str, law: AbstractConstitutiveLaw, modulus, extra: Modes | None
-    ):
-        """Return what decides how modes are stepped through; no gradient passes through that."""
-        count = len(modulus) + (0 if extra is None else len(extra.modulus))
-        values = of_each_mode(lambda law: getattr(law, name)(), law, count)
-        return jax.lax.stop_gradient(jnp.moveaxis(values, 0, -1))
+        return Series(*where_in_shear(flow, both, jnp.zeros(2)))
 
 
 def where_in_shear(flow: Kinematics | None, changed, unchanged):

@@ -1,8 +1,7 @@
 """One model that holds the declared law and every candidate effect, compiled once.
 
 An effect at zero amplitude changes nothing, so a subset of effects is a vector with zeros, never
-another program. All trial vectors go through one kernel (`discover.forward.side_by_side`); where
-there is none each vector is a call of its own, which leaves out the terms it has at zero.
+another program. All trial vectors go through one kernel (`discover.forward.side_by_side`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,10 +13,9 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import AbstractEffect, ModeEffect
-from discover.forward.batches import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
 from discover.forward.declared import LARGEST, DeclaredModel, FreeParameter, Structure, decades
-from discover.forward.predictor import Predictor, Trials
-from discover.forward.program import program_of
+from discover.forward.flows import Batch, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
+from discover.forward.program import Predictor, Trials, program_of
 
 # Of the upper end of its range, to which the first trial of a parameter is kept
 _TRIAL_SHARE = 0.5
@@ -216,8 +214,7 @@ class AugmentedModel:
     ) -> Float[np.ndarray, "trials runs n 3"]:
         """Return the predicted records, N1 = σ11 − σ22 and N2 = σ22 − σ33 in Pa, as in `OBSERVED`.
 
-        All come from one integration. N1 and N2 are NaN where a test has none, as a sweep, and at a
-        given stress with a user's own effect that lanes do not know.
+        All come from one integration. N1 and N2 are NaN where a test has none, as a sweep.
         """
         return self._predicted(thetas, batch, moduli, normal=True)
 

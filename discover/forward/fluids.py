@@ -14,18 +14,18 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Inexact
 
+from discover.forward.by_diffrax import solve_in_reverse
 from discover.forward.dynamics import Dynamics, Modes
-from discover.forward.grids.flow_batch import FlowBatch
-from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.integrators.by_diffrax import solve_in_reverse
-from discover.forward.integrators.stepping import (
+from discover.forward.flow_batch import FlowBatch
+from discover.forward.grid import IntegrationGrid
+from discover.forward.periodic_states import periodic_state
+from discover.forward.stepping import (
     Observe,
     answer_to_stress,
     begun,
     follow,
     without_derivatives,
 )
-from discover.forward.starts.periodic_states import periodic_state
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
 from discover.programs import compiled
@@ -149,7 +149,7 @@ def _at_given_stress(
     dynamics: Dynamics, fixed: Dynamics, protocol: FlowProtocol, grid: IntegrationGrid
 ) -> AtSamples:
     imposed = jax.vmap(protocol.rate)(grid.times)  # the table holds the stress
-    answer = answer_to_stress(dynamics, grid.times, imposed, 0.0, protocol.kinematics, fixed)
+    answer = answer_to_stress(dynamics, grid.times, imposed, protocol.kinematics, fixed)
     strain, states, rate = (part[grid.sample_index] for part in answer)
     s11, s22, s33, _ = jnp.tensordot(states[:, :4], dynamics.modes.modulus, axes=1).T
     observed = jnp.stack([strain, s11 - s22, s22 - s33], axis=-1)
@@ -174,10 +174,7 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
     return Dynamics(
         slope=over_modes(lambda law, *flow: law.stress_rate(*flow), law, -1),
         linear_relaxation=law.linear_relaxation,
-        declared=Modes(fluid.modulus, fluid.relaxation_time),
-        extra=None,
-        states={},
-        series=None,
+        modes=Modes(fluid.modulus, fluid.relaxation_time),
         viscosity=jnp.asarray(fluid.solvent_viscosity * viscous),
         relaxations=of_modes("relaxations") if law.retracts else None,
         variables=law.variables,

@@ -1,9 +1,8 @@
-"""What is compiled of a model: predictions for one structure of law and effects."""
+"""Predictions of parameter vectors: rates and signal in JAX, and the code that follows modes."""
 
-import logging
-from collections.abc import Callable
-from functools import lru_cache, partial
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cached_property, lru_cache, partial
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -13,10 +12,20 @@ from jaxtyping import Float
 
 from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
-from discover.forward.batches import Flows, PeriodicFlows, SteadyFlows, StressFlows, TransientFlows
-from discover.forward.declared import Numbers, Structure
-from discover.forward.integrators.stepping import answer_to_stress, integrate, strain_in_series
+from discover.forward.declared import DeclaredModel, Numbers, Structure
+from discover.forward.flows import (
+    Batch,
+    Flows,
+    PeriodicFlows,
+    Places,
+    SteadyFlows,
+    StressFlows,
+    TransientFlows,
+)
+from discover.forward.periodic_states import PHASE, first_harmonic
+from discover.forward.records import Records
 from discover.forward.side_by_side import (
+    Asked,
     Kernel,
     PeriodicCode,
     PeriodicSideBySide,
@@ -28,22 +37,15 @@ from discover.forward.side_by_side import (
     code_of,
     intervals,
 )
-from discover.forward.starts.half_cycles import Cycle, first_harmonic
-from discover.forward.starts.periodic_states import PHASE, complex_modulus
-from discover.forward.starts.steady_states import steady_states
 from discover.laws import LAWS
-from discover.programs import compiled
-from discover.programs.lanes import NotTranslatable
 from discover.protocols.kinematics import Kinematics
-
-_LOGGER = logging.getLogger(__name__)
 
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
 
 
 class Program:
-    """Predictions and residuals for one structure, compiled when first called."""
+    """What records of one structure of law and effects are predicted with, made when asked for."""
 
     def __init__(self, structure: Structure):
         self.fluid = AugmentedFluid(structure)
@@ -59,15 +61,12 @@ class Program:
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
-        self.predict = compiled(self._predict_all, made_from=(structure, build))
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
         self._known_parts: list[tuple[TransientFlows, bool]] = []
-        self.met: set[tuple] = set()
-        """Shapes of runs for which it is compiled."""
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
-        """Return what predicts many vectors at once; None where lanes do not know some code."""
+        """Return what predicts many vectors of runs of one control at once."""
         flow = None
         if not isinstance(part, PeriodicFlows):
             flow = jax.tree.map(lambda leaf: np.asarray(leaf)[0], part.kinematics)
@@ -85,11 +84,7 @@ class Program:
             *choices.values(),
         )
         if kind not in self._kernels:
-            try:
-                self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
-            except NotTranslatable as reason:
-                _LOGGER.debug("vectors are predicted one by one: %s", reason)
-                self._kernels[kind] = None
+            self._kernels[kind] = self._in_lanes(numbers, type(part), flow, choices)
         return self._kernels[kind]
 
     def _in_lanes(
@@ -100,8 +95,10 @@ class Program:
             own = self._steady_rates, self._recorded_steady
             return SteadySideBySide(self.fluid, code_of(SteadyCode, *given), *own, made_from)
         if control is PeriodicFlows:
-            own = self._periodic_rates, self._moduli_recorded
-            return PeriodicSideBySide(self.fluid, code_of(PeriodicCode, *given), *own, made_from)
+            code, cycles = code_of(PeriodicCode, *given), {"chooses": False, "cycles": True}
+            own = self._periodic_rates, self._given_way, self._moduli_recorded
+            in_cycles = partial(code_of, Kernel, *given, **cycles)
+            return PeriodicSideBySide(self.fluid, code, in_cycles, *own, made_from)
         if control is StressFlows:
             code = code_of(StressCode, *given)
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
@@ -122,32 +119,6 @@ class Program:
         after = (*self._signal, *self.fluid.series)
         at = [self.fluid.slices[effect.name].start for effect in after]
         return ~np.any(thetas[:, at], axis=1)
-
-    def _predict_all(self, numbers, used, theta, runs: Flows):
-        if isinstance(runs, PeriodicFlows):
-            return self._predict_moduli(numbers, used, theta, runs)
-        of_run: Any
-        if isinstance(runs, TransientFlows):
-            # of all runs, so that a step that is padding in each of them is not taken
-            steps = jnp.max(runs.last_step)
-            of_run = partial(self._predict_transient, numbers, used, theta, steps)
-        elif isinstance(runs, SteadyFlows):
-            of_run = partial(self._predict_steady_states, numbers, used, theta)
-        else:
-            of_run = partial(self._predict_strain, numbers, used, theta)
-        return jax.vmap(of_run)(runs)
-
-    def _predict_transient(self, numbers, used, theta, steps, run: TransientFlows):
-        flow = run.kinematics
-        present = self.fluid.present(theta)
-        rate, tool_rate = self._rates(theta, present, run)
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        cycle = None
-        if run.cycle_steps:
-            cycle = Cycle(run.cycle[0], run.cycle[1], run.cycle_steps)
-        stress, felt = integrate(dynamics, run.times[::2], rate, steps, flow, cycle)
-        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._at_samples(theta, present, run, stress, felt, tool_rate)
 
     def _rates(self, theta, present, run: TransientFlows):
         """Return the felt rate at half steps and the tool's at steps, by the effects present."""
@@ -198,17 +169,6 @@ class Program:
             stress = self._if_present(theta, present, effect, distorted, stress)
         return stress[run.sample_index]
 
-    def _predict_steady_states(self, numbers, used, theta, run: SteadyFlows):
-        flow = run.kinematics
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept, states_in_use=None)
-        present = self.fluid.present(theta)
-        rates = self._steady_rates(theta, present, run)
-        stress, felt = steady_states(dynamics, rates, flow)
-        stress = stress + self.fluid.beside(numbers, theta, felt, flow)
-        return self._recorded_steady(theta, present, run, stress, felt)
-
     def _steady_rates(self, theta, present, run: SteadyFlows):
         """Return the rates of a flow curve that the fluid feels where nothing slips."""
         places, rate = jnp.arange(run.rate.shape[0], dtype=run.rate.dtype), run.rate
@@ -236,26 +196,6 @@ class Program:
                 stress = self._if_present(theta, present, effect, distorted, stress)
         return stress
 
-    def _predict_moduli(self, numbers, used, theta, states: PeriodicFlows):
-        dynamics = self.fluid.dynamics(numbers, used, theta, None)
-        kept = {e: values for e, values in dynamics.states.items() if e.acts_on_steady_states}
-        dynamics = dynamics._replace(states=kept, states_in_use=None)
-        present = self.fluid.present(theta)
-
-        def beside(felt):
-            return self.fluid.beside(numbers, theta, felt, None)
-
-        def one(state):
-            rate, nominal, frequency, steps = state
-            found = complex_modulus(dynamics, rate / frequency, frequency, steps, beside)
-            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
-
-        rates = self._periodic_rates(theta, present, states)
-        commanded = states.frequency * states.strain
-        # not side by side: each in as many cycles, and as many steps of each, as it needs, which
-        # takes a quarter of the time of all in those of the largest
-        return jax.lax.map(one, (rates, commanded, states.frequency, states.steps))
-
     def _periodic_rates(self, theta, present, states: PeriodicFlows):
         """Return the amplitudes of the rate that the fluid feels where nothing gives way."""
         places = jnp.arange(len(states.strain), dtype=states.strain.dtype)
@@ -280,17 +220,34 @@ class Program:
             found = self._if_present(theta, present, effect, distorted, found)
         return jnp.stack([found.real, found.imag])
 
-    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, of_modes):
+    def _whole(self, numbers, theta, strain, frequency, of_modes):
+        """Return the modulus in Pa of all that is felt, and how far the tool turns over that."""
+        rate = strain * frequency * jnp.cos(PHASE)
+        beside = self.fluid.beside(numbers, theta, rate, None)
+        whole = of_modes + first_harmonic(beside, PHASE) / strain
+        series = self.fluid.in_series(theta, None)
+        if series is None:
+            return whole, jnp.ones((), dtype=complex)
+        return whole, 1.0 + (series.compliance + series.slip / (1j * frequency)) * whole
+
+    def _given_way(self, numbers, theta, states: PeriodicFlows, strain, of_modes):
+        """Return by how much the tool turns further than the fluid, in each of some states."""
+
+        def one(*of):
+            return self._whole(numbers, theta, *of)[1]
+
+        return jax.vmap(one)(strain, states.frequency, of_modes)
+
+    def _moduli_recorded(self, numbers, theta, present, states: PeriodicFlows, strain, of_modes):
         """Return both moduli of states as they are recorded, of those of the modes."""
         rates = self._periodic_rates(theta, present, states)
         commanded = states.frequency * states.strain
 
-        def one(rate, nominal, frequency, found):
-            beside = self.fluid.beside(numbers, theta, rate * jnp.cos(PHASE), None)
-            found = found + first_harmonic(beside, PHASE) / (rate / frequency)
-            return self._recorded_modulus(theta, present, found, rate, nominal, frequency)
+        def one(rate, nominal, frequency, strain, found):
+            whole, taken = self._whole(numbers, theta, strain, frequency, found)
+            return self._recorded_modulus(theta, present, whole / taken, rate, nominal, frequency)
 
-        return jax.vmap(one)(rates, commanded, states.frequency, of_modes)
+        return jax.vmap(one)(rates, commanded, states.frequency, strain, of_modes)
 
     def _modulus_as_recorded(self, theta, effect, found, nominal, frequency):
         """Return G′ + iG″ in Pa after an effect of the torque's signal.
@@ -312,13 +269,6 @@ class Program:
             for sign in (1.0, -1.0)
         )
         return first_harmonic(0.5 * (there - back), phase) / strain
-
-    def _predict_strain(self, numbers, used, theta, run: StressFlows):
-        flow = run.kinematics
-        dynamics = self.fluid.dynamics(numbers, used, theta, flow)
-        imposed, inertia = self._driven(theta, run)
-        answer = answer_to_stress(dynamics, run.times, imposed, inertia, flow)
-        return answer.strain[run.sample_index]
 
     def _driven(self, theta, run: StressFlows):
         """Return the true stress of a run at a given one in Pa, and the tool's inertia in Pa s²."""
@@ -345,7 +295,7 @@ class Program:
         series = self.fluid.in_series(theta, run.kinematics)
         strain = jnp.zeros_like(imposed)
         if series is not None:
-            strain = strain_in_series(series, run.times, imposed)
+            strain = series.strain(run.times, imposed)
         return imposed, inertia, strain
 
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
@@ -355,3 +305,113 @@ class Program:
 
 
 program_of = lru_cache(maxsize=16)(Program)
+
+
+class Trials(NamedTuple):
+    """Parameter vectors side by side, and the moduli and the limit of each."""
+
+    thetas: Float[np.ndarray, "trials p"]
+    moduli: Float[np.ndarray, "trials c"]
+    limits: Float[np.ndarray, " trials"]
+
+    def taken(self, which: np.ndarray) -> "Trials":
+        """Return some of them."""
+        return Trials(*(each[which] for each in self))
+
+
+_Piece = tuple[Flows, Records | None, int]
+"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
+no padding."""
+
+
+class Predictor:
+    """Predictions of a declared model with effects, part by part of a batch.
+
+    `program`, `of_every_effect`: compiled of the effects that there are, and of all there may be.
+    """
+
+    def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
+        self._declared = declared
+        self.program, self.of_every_effect = program, of_every_effect
+        self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
+
+    @cached_property
+    def _numbers(self) -> Numbers:
+        declared = self._declared
+        return Numbers(
+            declared.law,
+            on_device(declared.modulus),
+            on_device(declared.relaxation_time),
+            on_device(float(declared.solvent_viscosity)),
+        )
+
+    @cached_property
+    def _beside_every_effect(self) -> tuple[list[int], list[int], np.ndarray]:
+        """What of a vector counts, where it stands beside all effects, and all of them at rest."""
+        own, every = self.program.fluid, self.of_every_effect.fluid
+        at_rest = np.zeros(every.size)
+        for effect in every.structure.effects:
+            inner = [parameter.first_trial for parameter in effect.parameters[1:]]
+            at_rest[every.slices[effect.name]] = [0.0, *inner]
+        # no trial passes through a factor on the moduli that is not fitted
+        here = [*range(0 if self._declared.fit_modulus else 1, own.of_effects.start)]
+        there = [*here, *range(every.instants.start, every.instants.stop)]
+        here += range(own.instants.start, own.instants.stop)
+        for name, at in own.slices.items():
+            here += range(at.start, at.stop)
+            there += range(every.slices[name].start, every.slices[name].stop)
+        return here, there, at_rest
+
+    def of_part(
+        self, trials: Trials, batch: Batch, number: int, normal: bool = False
+    ) -> Float[np.ndarray, "trials rows n kinds"]:
+        """Return the records of a part, and if `normal` N1 and N2: NaN where a test has none."""
+        part = batch.parts[number]
+        if isinstance(part, PeriodicFlows):
+            found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)
+            found = found[..., None]
+            return np.pad(found, [*[(0, 0)] * 3, (0, 2 * normal)], constant_values=np.nan)
+        if not isinstance(part, TransientFlows):
+            return self._of_piece(trials, (part, None, 0), normal)
+        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), normal)
+        runs, samples = part.sample_index.shape
+        return found[:, :runs, :samples]
+
+    def side_by_side(self, part: Flows) -> Any:
+        """Return what predicts many vectors of a part at once."""
+        return self.of_every_effect.side_by_side(self._numbers, part)
+
+    def _of_piece(
+        self, trials: Trials, piece: _Piece, normal: bool
+    ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
+        program, (part, judging, runs) = self.program, piece
+        judged = program.are_judged_by_modes(trials.thetas)
+        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
+        here, there, at_rest = self._beside_every_effect
+        vectors = np.tile(at_rest, (len(trials.thetas), 1))
+        vectors[:, there] = trials.thetas[:, here]
+        beside = trials._replace(thetas=vectors)
+        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, normal=normal)
+        return self.side_by_side(part).predict(asked)
+
+    def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
+        """Return runs, and what judges them, as a program takes them, laid out once."""
+        for known, records, piece in self._laid_out:
+            if known is part and records is batch.records:
+                return piece
+        flows = part.in_shared_shape()
+        judging = batch.records.of_runs(rows, part.sample_index.shape[1])
+        piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
+        self._laid_out.append((part, batch.records, piece))
+        del self._laid_out[:-_KEPT]
+        return piece
+
+
+def _of_sweeps(
+    found: Float[np.ndarray, "trials states 2"], runs: Sequence[Places]
+) -> Float[np.ndarray, "trials rows n"]:
+    """Return the moduli of each run, of those of all states; zero behind a shorter run's last."""
+    out = np.zeros((len(found), len(runs), max(len(places) for _, places in runs)))
+    for row, (modulus, places) in enumerate(runs):
+        out[:, row, : len(places)] = found[:, list(places), modulus]
+    return out

@@ -9,8 +9,8 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
+from discover.forward.flow_batch import FlowBatch
 from discover.forward.fluids import in_enough_steps
-from discover.forward.grids.flow_batch import FlowBatch
 from discover.identify import physics_flows
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from discover.equations.equation import mean_relaxation_time
+from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import at_samples, in_enough_steps, solve_batch
-from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
 from discover.programs import compiled

@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
-from discover.forward.grids.grid import IntegrationGrid, make_grids
+from discover.forward.grid import IntegrationGrid, make_grids
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
 from discover.programs import compiled, on_device
 from discover.protocols.protocol import (

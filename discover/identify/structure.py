@@ -16,8 +16,8 @@ import pandas as pd
 from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
+from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import in_enough_steps, observed_on_grid
-from discover.forward.grids.flow_batch import FlowBatch, lay_out
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
     Direction,

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
-from discover.forward.integrators.stepping import follow
+from discover.forward.stepping import follow
 from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
@@ -310,7 +310,7 @@ def _arrivals(law, protocols, grids):
             return jnp.concatenate([value[:, None], along], axis=1)
 
         beside = alone._replace(slope=slope, columns=3)
-        start = beside.rest()[0].at[:3, 1:, 0].set(jnp.eye(3))
+        start = beside.rest().at[:3, 1:, 0].set(jnp.eye(3))
         return follow(beside, alone, protocol, grid, lambda state, _: state[3, 1:, 0], start)
 
     return jax.vmap(one)(protocols, grids)

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from discover.dataset import Run
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import Batch
+from discover.forward.flows import Batch
 from discover.inference.least_squares import Fit
 from discover.protocols.between_samples import sampling_interval
 from discover.statistics import (

@@ -14,8 +14,9 @@ from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
 from discover.forward.augmented_model import AugmentedModel
-from discover.forward.batches import data_scales, make_batch
 from discover.forward.declared import DeclaredModel
+from discover.forward.flows import make_batch
+from discover.forward.records import data_scales
 from discover.inference.least_squares import fit_batch
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of

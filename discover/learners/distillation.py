@@ -15,7 +15,7 @@ from scipy.stats import qmc
 
 from discover.errors import InputError
 from discover.forward.fluids import solve_on_grid
-from discover.forward.grids.grid import IntegrationGrid, make_grids
+from discover.forward.grid import IntegrationGrid, make_grids
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, starting_values

@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import in_enough_steps, observed_in_batch
-from discover.forward.grids.flow_batch import lay_out
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal

@@ -14,9 +14,9 @@ from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.first_use import require_double
 from discover.forward import Records, make_records
-from discover.forward.batches.records import Mean
+from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import in_enough_steps
-from discover.forward.grids.flow_batch import FlowBatch, lay_out
+from discover.forward.records import Mean
 from discover.laws.multimode import Fluid
 from discover.learners.settings import PerMode
 from discover.programs import on_device

@@ -8,10 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
+from discover.forward.by_diffrax import exponential_steps, stress_of, vector_field
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_in_batch, solve_batch
-from discover.forward.grids.flow_batch import lay_out
-from discover.forward.grids.grid import had_gone_on
-from discover.forward.integrators.by_diffrax import exponential_steps, stress_of, vector_field
+from discover.forward.grid import had_gone_on
 from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid

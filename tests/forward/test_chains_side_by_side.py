@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 from discover.dataset import Run
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.program import Program
 from discover.laws import make_law
 from discover.protocols import start_up
 from discover.protocols.protocol import in_flow
@@ -28,15 +27,13 @@ def runs():
 
 @pytest.fixture(scope="module")
 def predicted():
-    """Return a function from a law to predictions of nine vectors, none by the other program."""
+    """Return a function from a law to predictions of nine vectors."""
 
     def of(law):
         model = AugmentedModel(DeclaredModel(law, MODULI, TIMES, fit_modulus=True), [])
         thetas = np.tile(model.zero(), (9, 1))
         thetas[:, 0] = np.linspace(0.0, 0.8, 9)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Program, "_predict_all", None)
-            return model.predictions(thetas, make_batch(runs()))
+        return model.predictions(thetas, make_batch(runs()))
 
     return of
 

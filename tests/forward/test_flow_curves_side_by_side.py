@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
+from in_continuous_time import ContinuousFluid
 from scipy.optimize import brentq
 
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.program import Program
-from discover.protocols import steady_rates
+from discover.protocols import start_up, steady_rates
 from discover.protocols.protocol import in_flow
 
 MODULI, TIMES, SOLVENT = np.array([60.0, 20.0]), np.array([0.1, 2.0]), 1.0
@@ -43,13 +43,6 @@ def asked():
     return model, batch, np.array(vectors)
 
 
-def alone(model, vectors, batch, moduli=None):
-    """Return predictions of which none is left to the other program."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Program, "_predict_all", None)
-        return model.predictions(vectors, batch, moduli)
-
-
 def ptt(rate, time, epsilon, extends):
     """Return the recorded stress over the modulus: f = exp(ε tr σ) is the one unknown."""
     flow = rate * time
@@ -65,7 +58,7 @@ def ptt(rate, time, epsilon, extends):
 
 def test_ptt_has_its_closed_flow_curve_in_shear_and_extension(asked):
     model, batch, vectors = asked
-    found = alone(model, vectors, batch)[1]
+    found = model.predictions(vectors, batch)[1]
     epsilon = vectors[1][model.positions("ptt_exponential")[0]]
     for row, (rates, extends) in enumerate([(RATES, False), (SLOW, True)]):
         modes = [[g * ptt(r, t, epsilon, extends) for r in rates]
@@ -78,7 +71,7 @@ def test_a_state_that_no_flow_reaches_is_told_and_spoils_none_beside_it(asked):
     model, batch, vectors = asked
     away = model.zero()
     away[model.positions("ptt_exponential")[0]] = -0.5
-    found, calm = alone(model, [away, vectors[0]], batch)
+    found, calm = model.predictions([away, vectors[0]], batch)
     # f² ln f = 2 ε Wi² is nowhere less than −1/(2 e)
     none = (TIMES[1] * RATES) ** 2 > 1.0 / (2.0 * np.e)
     newtonian = (MODULI @ TIMES + SOLVENT) * RATES
@@ -88,13 +81,17 @@ def test_a_state_that_no_flow_reaches_is_told_and_spoils_none_beside_it(asked):
     np.testing.assert_allclose(calm[0], newtonian, rtol=1e-12)
 
 
-def test_effects_on_flow_curves_agree_with_the_other_program(asked):
+def test_effects_on_flow_curves_are_where_a_start_up_ends(asked):
     model, batch, vectors = asked
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Program, "side_by_side", lambda *_: None)
-        other = model.predictions(vectors, batch)
-    found = alone(model, vectors, batch)
-    np.testing.assert_allclose(found, other, rtol=1e-10)  # roundings alone
+    found = model.predictions(vectors, batch)
+    long, any_of_them = np.array([100.0]), ContinuousFluid(model, vectors[0])
+    for number, theta in enumerate(vectors):
+        for place in (2, 7, 10):
+            rate = RATES[place]
+            run = Run("long", long, start_up(rate), np.full(1, rate), np.ones(1))
+            # what is still to come after fifty of the longest time, to scipy's tolerance
+            exact = any_of_them.of(theta).recorded(run)
+            np.testing.assert_allclose(found[number, 0, place], exact[0], rtol=1e-5)
     # and not because effects do nothing
     assert np.all(np.max(np.abs(found[1:, 0] / found[0, 0] - 1.0), axis=1) > 1e-3)
 
@@ -102,10 +99,10 @@ def test_effects_on_flow_curves_agree_with_the_other_program(asked):
 def test_moduli_and_solvent_of_each_vector_are_those_of_a_model_that_declares_them(asked):
     model, batch, vectors = asked
     factors = np.array([1.0, 2.0, 0.5, 3.0])[:, None]
-    found = alone(model, vectors, batch, factors * model.moduli)
+    found = model.predictions(vectors, batch, factors * model.moduli)
     # all stresses of modes and solvent grow alike, where nothing slips or rubs
-    np.testing.assert_allclose(found[1], 2.0 * alone(model, vectors, batch)[1], rtol=1e-9)
+    np.testing.assert_allclose(found[1], 2.0 * model.predictions(vectors, batch)[1], rtol=1e-9)
     other = AugmentedModel(
         DeclaredModel.maxwell(3.0 * MODULI, TIMES, solvent_viscosity=3.0 * SOLVENT), model.effects
     )
-    np.testing.assert_allclose(found[3], alone(other, vectors[3:], batch)[0], rtol=1e-12)
+    np.testing.assert_allclose(found[3], other.predictions(vectors[3:], batch)[0], rtol=1e-12)

@@ -1,4 +1,4 @@
-"""Many vectors at once are predicted as each is by the program that takes them one by one."""
+"""Many vectors at once are predicted as their equations say, whatever code these ask for."""
 
 from dataclasses import dataclass, replace
 
@@ -6,13 +6,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from in_continuous_time import ContinuousFluid
 
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, EffectParameter, make_effect
 from discover.effects.library_term import library_effects
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.program import Program
 from discover.forward.side_by_side import code
 from discover.programs.program_cache import Compiled
 from discover.protocols import oscillatory_shear, start_up
@@ -55,22 +55,24 @@ def asked():
     return model, make_batch(runs()), np.array(vectors)
 
 
-def one_by_one(model, vectors, batch, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(Program, "side_by_side", lambda *_: None)
-        return model.predictions(vectors, batch)
-
-
-def test_effects_of_every_kind_agree_with_the_other_program(asked, monkeypatch):
+def test_effects_of_every_kind_follow_their_equations(asked):
     model, batch, vectors = asked
     found = model.predictions(vectors, batch)
-    other = one_by_one(model, vectors, batch, monkeypatch)
-    largest = np.max(np.abs(other), axis=2, keepdims=True)
-    assert np.all(np.isfinite(other))
-    # the same scheme in the same steps: roundings alone
-    np.testing.assert_allclose(found / largest, other / largest, atol=1e-11)
+    largest = np.max(np.abs(found), axis=2, keepdims=True)
+    assert np.all(np.isfinite(found))
+    shaped = [model.positions(name)[0] for name in ("rate_rise_time", "transducer_lag")]
+    for row, run in enumerate(runs()[1:], start=1):
+        any_of_them = ContinuousFluid(model, vectors[0], run.protocol.kinematics)
+        for number in range(1, len(vectors), 2):  # those with one effect
+            fluid = any_of_them.of(vectors[number])
+            own = found[number, row, : len(run)] / largest[number, row]
+            # the error of the steps: what gives way, and what the instrument shapes, is of second
+            # order in them, the modes of fourth
+            slow = fluid.slip or fluid.compliance or np.any(vectors[number][shaped])
+            exact = fluid.recorded(run) / largest[number, row]
+            np.testing.assert_allclose(own, exact, atol=4e-3 if slow else 2e-5)
     # and not because effects do nothing
-    assert np.min(np.max(np.abs(other[1:] - other[0]) / largest[0], axis=(1, 2))) > 1e-6
+    assert np.min(np.max(np.abs(found[1:] - found[0]) / largest[0], axis=(1, 2))) > 1e-6
 
 
 def test_a_vector_does_not_depend_on_those_beside_it(asked):
@@ -82,16 +84,16 @@ def test_a_vector_does_not_depend_on_those_beside_it(asked):
         np.testing.assert_allclose(together[i], alone, atol=1e-12 * largest)
 
 
-def test_a_trial_that_runs_away_is_told_from_the_same_sample_on(asked, monkeypatch):
+def test_a_trial_that_runs_away_is_told_from_the_sample_on_where_shorter_steps_tell_it(asked):
     model, batch, vectors = asked
     away = model.zero()
     away[model.positions(TERMS[0])] = -5.0
     found, calm = model.predictions([away, vectors[1]], batch)
-    other = one_by_one(model, [away], batch, monkeypatch)[0]
-    assert np.any(~np.isfinite(other))
-    # what is too large by far in the one may be no number in the other
-    bounded = [np.abs(stress) < 1e6 for stress in (found, other)]
-    np.testing.assert_array_equal(*bounded)
+    exact = model.predict(away, make_batch(runs(), strain_step=0.02))
+    samples = np.sum(np.abs(found) < 1e6, axis=1), np.sum(np.abs(exact) < 1e6, axis=1)
+    # within a step of the integration, some tenth of a sample's interval
+    np.testing.assert_allclose(*samples, atol=1)
+    assert 0 < samples[0][0] < len(runs()[0])
     np.testing.assert_allclose(calm, model.predictions(vectors[1:2], batch)[0], rtol=1e-12)
     assert np.all(np.isinf(model.residuals([away], batch, np.array([1e9]))))
 
@@ -101,10 +103,15 @@ class Iterated(ConstitutiveEffect):
     """An effect of a user's own that asks for what lanes do not know."""
 
     def extra_term(self, values, stress, rate):
-        """Return c times σ, found by adding it up in a loop."""
+        """Return c times σ, found by adding it up as long as less than two halves are there."""
         del rate
-        total = jax.lax.fori_loop(0, 2, lambda _, x: x + 0.5 * stress, jnp.zeros_like(stress))
-        return values[0] * total
+
+        def more(state):
+            count, total = state
+            return count + 1, total + 0.5 * stress
+
+        start = 0, jnp.zeros_like(stress)
+        return values[0] * jax.lax.while_loop(lambda state: state[0] < 2, more, start)[1]
 
 
 def test_an_effect_that_lanes_do_not_know_is_predicted_all_the_same():

@@ -9,7 +9,6 @@ from independent.homogeneous import GiesekusFluid
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.program import Program
 from discover.protocols import oscillations, oscillatory_shear, start_up
 from discover.protocols.control import steady_rates
 from discover.protocols.kinematics import RecordedQuantity
@@ -104,13 +103,6 @@ def test_normal_stresses_are_those_of_runs_that_record_them(model):
         np.testing.assert_allclose(found[..., i], other, rtol=1e-10, atol=1e-9)
     # negative control: effects do something to what is recorded
     assert np.all(np.ptp(found[1:, 0, :, 0], axis=0) > 0.0)
-
-
-def test_one_by_one_they_are_the_same(model, monkeypatch):
-    batch, thetas = make_batch(TRANSIENTS), vectors(model, ("thixotropy",))
-    found = model.observables(thetas, batch)
-    monkeypatch.setattr(Program, "side_by_side", lambda *_: None)
-    np.testing.assert_allclose(found, model.observables(thetas, batch), rtol=1e-9, atol=1e-9)
 
 
 def test_a_sweep_has_no_normal_stresses(model):

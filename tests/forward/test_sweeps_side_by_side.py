@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from in_continuous_time import ContinuousFluid
 from scipy.integrate import solve_ivp
 
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, make_batch
 from discover.forward.declared import DeclaredModel
-from discover.forward.program import Program
 from discover.protocols import oscillations
 
 MODULI, TIMES, SOLVENT = np.array([60.0, 20.0]), np.array([0.1, 2.0]), 1.0
@@ -30,15 +30,13 @@ def asked():
 
 
 def predicted(asked, amplitudes):
-    """Return complex moduli of vectors, none of which is left to the other program."""
+    """Return complex moduli of vectors."""
     model, batch = asked
     thetas = np.tile(model.zero(), (len(amplitudes), 1))
     for theta, values in zip(thetas, amplitudes, strict=True):
         for name, value in values.items():
             theta[model.positions(name)[0]] = value
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Program, "_predict_all", None)
-        storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
+    storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
     return storage + 1j * loss
 
 
@@ -101,27 +99,56 @@ def test_moduli_of_each_vector_and_its_solvent_are_its_own(asked):
     model, batch = asked
     theta = model.zero()
     theta[model.positions("giesekus_mobility")[0]] = 0.3
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Program, "_predict_all", None)
-        # one mode at a time, and the solvent alone
-        found = model.predictions(
-            [theta] * 4, batch, np.vstack([model.moduli, np.diag(model.moduli)])
-        )
+    # one mode at a time, and the solvent alone
+    found = model.predictions([theta] * 4, batch, np.vstack([model.moduli, np.diag(model.moduli)]))
     # the record is linear in the moduli, each mode's own and the solvent's
     np.testing.assert_allclose(np.sum(found[1:], axis=0), found[0], rtol=1e-12)
     np.testing.assert_allclose(found[3, 1], FREQUENCIES * SOLVENT, rtol=1e-12)
 
 
-def test_what_gives_way_in_a_sweep_is_predicted_by_the_other_program_in_its_place(asked):
+def test_what_gives_way_takes_its_share_of_the_closed_moduli(asked):
     model, batch = asked
-    model = AugmentedModel(model.declared, [*model.effects, make_effect("wall_slip")])
+    names = "wall_slip", "tool_compliance"
+    model = AugmentedModel(model.declared, list(map(make_effect, names)))
     thetas = np.tile(model.zero(), (3, 1))
-    thetas[[0, 2], model.positions("giesekus_mobility")[0]] = 0.3
-    at = model.positions("wall_slip")
-    thetas[1:, at] = model.first_trial[at]
-    found = model.predictions(thetas, batch)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Program, "side_by_side", lambda *_: None)
-        other = model.predictions(thetas, batch)
-    np.testing.assert_allclose(found, other, rtol=1e-5)  # where Newton's method ends
-    assert np.all(np.abs(found[2, 0] / found[0, 0] - 1.0) > 1e-4)
+    for theta, name in zip(thetas[1:], names, strict=True):
+        theta[model.positions(name)] = model.first_trial[model.positions(name)]
+    slip, compliance = (thetas[i, model.positions(name)[0]] for i, name in enumerate(names, 1))
+    storage, loss = np.moveaxis(model.predictions(thetas, batch), 1, 0)
+    bare, *found = storage + 1j * loss
+    # the tool turns by the strain of the fluid and σ (C + s/iω)
+    for own, series in zip(found, (slip / (1j * FREQUENCIES), compliance), strict=True):
+        np.testing.assert_allclose(own, bare / (1.0 + series * bare), rtol=1e-7)
+        assert np.all(np.abs(own / bare - 1.0) > 1e-4)
+
+
+TRIALS = [
+    {"thixotropy": 5.0},
+    {"giesekus_mobility": 1.0, "wall_slip": 1.0},
+    {"giesekus_mobility": 1.0, "wall_slip": 1.0, "thixotropy": 5.0},
+]
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+def test_what_couples_the_modes_comes_to_where_scipy_ends(asked, trial):
+    model, _ = asked
+    names = "giesekus_mobility", "thixotropy", "wall_slip"
+    model = AugmentedModel(model.declared, list(map(make_effect, names)))
+    strain, frequency = np.array([0.3, 3.0]), np.array([2.0, 1.0])
+    run = Run(
+        "sweep", np.arange(1.0, 3.0), oscillations(strain, frequency), strain * frequency,
+        np.ones(2), strain=strain, storage_modulus=np.ones(2), loss_modulus=np.ones(2),
+    )  # fmt: skip
+    theta = model.zero()
+    for name, share in trial.items():
+        at = model.positions(name)
+        theta[at] = model.first_trial[at]
+        theta[at[0]] *= share
+    batch = make_batch(run.records)
+    (storage, loss), still = model.predict(theta, batch), model.predict(model.zero(), batch)
+    fluid = ContinuousFluid(model, theta)
+    pairs = zip(strain, frequency, strict=True)
+    exact = np.array([fluid.modulus(*pair, 40) for pair in pairs])
+    # the steps of a cycle, and of what slips its first harmonic alone
+    np.testing.assert_allclose(storage + 1j * loss, exact, rtol=2e-3)
+    assert np.max(np.abs(exact / (still[0] + 1j * still[1]) - 1.0)) > 2e-2

@@ -8,7 +8,7 @@ from independent.sweeps import giesekus_modulus
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches import PeriodicFlows
+from discover.forward.flows import PeriodicFlows
 from discover.inference.least_squares import fit_batch
 from discover.protocols import oscillations, start_up
 from discover.protocols.control import steady_rates

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.forward.grids import lay_out
+from discover.forward.flow_batch import lay_out
 from discover.identify.physics import check_physics
 from discover.identify.physics_flows import (
     is_stable,

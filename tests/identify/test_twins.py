@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from discover.forward.grids import make_grids
+from discover.forward.grid import make_grids
 from discover.identify import side_by_side
 from discover.identify.exact_series import compare_series
 from discover.identify.twins import find_twins, hidden_stresses

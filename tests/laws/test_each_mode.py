@@ -13,8 +13,8 @@ from discover.effects import make_effect
 from discover.equations import AugmentedLaw, law_parts
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import at_samples
-from discover.forward.grids import lay_out
 from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes

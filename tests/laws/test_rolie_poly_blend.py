@@ -14,9 +14,9 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import at_samples, dynamics_of_fluid, solve_batch
-from discover.forward.grids.flow_batch import lay_out
-from discover.forward.starts.half_cycles import first_harmonic, half_cycle
+from discover.forward.periodic_states import first_harmonic, half_cycle
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, oscillations, start_up
 from discover.simulate import simulate
@@ -151,7 +151,7 @@ def test_half_a_cycle_from_where_scipy_ends_ends_in_its_mirror_image():
     phase = jnp.linspace(0.0, np.pi, 161)
     dynamics = dynamics_of_fluid(fluid(), in_flow(start_up(1.0), "shear"))
     wave, width = frequency * jnp.cos(phase), (phase[2] - phase[0]) / frequency
-    half = jax.jit(lambda state: half_cycle(dynamics, wave, width, True)(state, (), strain))
+    half = jax.jit(lambda state: half_cycle(dynamics, wave, width)(state, strain))
     found = half(state)
     np.testing.assert_allclose(found.stress, state, atol=1e-3 * np.max(np.abs(state)))
     modulus = first_harmonic_of(times, stress[:, 0, 1], frequency)

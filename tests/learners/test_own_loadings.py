@@ -13,7 +13,7 @@ import discover as dc
 from discover.dataset import Run
 from discover.dataset.run import Loading
 from discover.forward import make_records
-from discover.forward.batches import Loadings
+from discover.forward.records import Loadings
 from discover.learners.tbnn_ude.problem import make_problem as network_problem
 from discover.protocols import start_up as protocol
 from tensor_library.library import build_library

@@ -5,8 +5,8 @@ import pytest
 from independent import Giesekus, steps
 
 import discover as dc
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_in_batch
-from discover.forward.grids import lay_out
 from discover.learners.runs import with_shorter_holds
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, step_rates
 from tensor_library.library import build_library

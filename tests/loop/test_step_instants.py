@@ -15,7 +15,7 @@ from independent.instruments import Instrument
 
 import discover as dc
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches.flows import RateSteps
+from discover.forward.flows import RateSteps
 from discover.inference.step_instants import with_places, with_rate_steps
 from discover.report.loop.tables import loop_verdict
 

@@ -8,7 +8,6 @@ import pytest
 from discover.programs.lanes import (
     LANES,
     Arithmetic,
-    NotTranslatable,
     Translation,
     Writing,
     callable_of,
@@ -23,12 +22,14 @@ def in_lanes(function, *arguments):
     """Return a function of numbers for eight sets of them, by machine code."""
     w = Writing((), ("x", "y"), ("x", "y"), ())
     given = [w.load("x", i) for i in range(len(arguments))]
-    found = Translation(Arithmetic(w.builder))(function, *given)
+    translation = Translation(Arithmetic(w.builder))
+    found = translation(function, *given)
     leaves = [value for leaf in jax.tree.leaves(found) for value in np.atleast_1d(leaf).flat]
     for i, value in enumerate(leaves):
         w.store(Arithmetic(w.builder).lanes(value), "y", i)
     x, y = np.array(arguments, dtype=float), np.empty((len(leaves), LANES))
     callable_of(w.compiled(), 0, 2)(x.ctypes.data, y.ctypes.data)
+    assert translation.calls is not None  # they live as long as the code
     return y if len(leaves) > 1 else y[0]
 
 
@@ -105,11 +106,15 @@ def test_arrays_are_moved_summed_and_multiplied():
     np.testing.assert_allclose(in_lanes(function, x, y), np.transpose(wanted), rtol=1e-14)
 
 
-def test_what_is_not_known_in_lanes_is_refused():
-    with pytest.raises(NotTranslatable, match="while"):
-        in_lanes(
-            lambda x: jax.lax.while_loop(lambda v: v < 1.0, lambda v: 2.0 * v, x), np.ones(LANES)
-        )
+def test_what_is_not_known_in_lanes_is_computed_by_jax_for_each_of_them():
+    def doubled(x, y):
+        reached = jax.lax.while_loop(lambda v: v < 1.0, lambda v: 2.0 * v, x)
+        return reached, jnp.stack([x, jnp.sin(y)]), y > reached
+
+    x, y = np.linspace(0.1, 2.0, LANES), np.linspace(0.0, 3.0, LANES)
+    reached = x * 2.0 ** np.maximum(np.ceil(-np.log2(x)), 0.0)
+    wanted = [reached, x, np.sin(y), y > reached]
+    np.testing.assert_allclose(in_lanes(doubled, x, y), wanted, rtol=1e-15)
 
 
 def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
@@ -126,9 +131,10 @@ def test_systems_of_equations_are_solved_lane_by_lane_whatever_their_pivots():
     np.testing.assert_allclose(found, exact, rtol=1e-11)
 
 
-def test_a_decomposition_alone_is_refused():
-    with pytest.raises(NotTranslatable):
-        in_lanes(lambda x: jax.lax.linalg.lu(jnp.eye(2) * x)[0][0], np.ones(LANES))
+def test_a_decomposition_alone_is_computed_by_jax():
+    x = np.linspace(1.0, 2.0, LANES)
+    found = in_lanes(lambda x: jax.lax.linalg.lu(jnp.eye(2) * x)[0][0], x)
+    np.testing.assert_array_equal(found, [x, np.zeros(LANES)])
 
 
 def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users(
@@ -137,9 +143,9 @@ def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users
     monkeypatch.setattr(machine_code, "program_folder", lambda: tmp_path)
     made = []
 
-    def written(value=b"machine code"):
+    def written(value=b"machine code", stands_alone=True):
         made.append(value)
-        return value
+        return value, stands_alone
 
     assert kept(("this test", 1), written) == kept(("this test", 1), written) == b"machine code"
     assert len(made) == 1
@@ -150,3 +156,6 @@ def test_machine_code_is_kept_for_the_next_start_unless_it_is_altered_or_a_users
     for _ in range(2):  # what a function of this module does may change, and no version tells
         kept(("this test", in_lanes), written)
     assert len(made) == 4
+    for _ in range(2):  # nor is what calls functions of this process there at the next start
+        kept(("this test", 2), lambda: written(stands_alone=False))
+    assert len(made) == 6

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from discover.errors import InputError
-from discover.forward.grids.grid import stress_grid
+from discover.forward.grid import stress_grid
 from discover.protocols import (
     imposed_stress,
     measured_rate,

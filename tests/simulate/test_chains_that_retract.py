@@ -7,9 +7,9 @@ from independent import RoliePoly
 from independent.homogeneous import UNIT
 from scipy.integrate import solve_ivp
 
+from discover.forward.exponential_weights import turned
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import in_enough_steps, solve_batch
-from discover.forward.grids.flow_batch import lay_out
-from discover.forward.integrators.exponential_weights import turned
 from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.grids.grid import stress_grid
+from discover.forward.grid import stress_grid
 from discover.protocols import imposed_stress, start_up, steady_rates
 
 MODULUS, TIME = 100.0, 1.0

@@ -10,8 +10,8 @@ from independent import multimode_giesekus
 from independent.sweeps import modulus_of, strain_at
 
 from discover.errors import InputError
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import dynamics_of_fluid, observed_on_grid, solved_on_grid
-from discover.forward.grids import lay_out
 from discover.laws.multimode import Fluid
 from discover.laws.textbook.classical import Giesekus
 from discover.protocols import imposed_stress, oscillations, start_up, steady_rates

@@ -9,8 +9,8 @@ from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import solve_batch
-from discover.forward.grids import lay_out
 from discover.laws import Fluid, make_law
 from discover.protocols import (
     after_alternation,

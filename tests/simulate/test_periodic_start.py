@@ -9,8 +9,8 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import solve_batch
-from discover.forward.grids.flow_batch import lay_out
 from discover.laws import Fluid, Giesekus
 from discover.protocols import (
     after_alternation,

@@ -9,7 +9,7 @@ from discover.dataset.material_functions import linear_sweep_as_run
 from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.batches import PeriodicFlows
+from discover.forward.flows import PeriodicFlows
 from discover.protocols import oscillations, start_up
 
 MODULUS, TIME, MOBILITY = 100.0, 1.0, 0.3

@@ -9,8 +9,9 @@ from independent import Giesekus, JohnsonSegalman, Structured, WhiteMetzner, ste
 from discover.dataset import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import solve_batch
-from discover.forward.grids import lay_out, make_grid
+from discover.forward.grid import make_grid
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up, step_rates

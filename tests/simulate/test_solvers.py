@@ -6,9 +6,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from discover.errors import InputError
+from discover.forward.exponential_weights import phi_functions
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import solve_batch, solve_on_grid
-from discover.forward.grids import lay_out, make_grid, make_grids
-from discover.forward.integrators.exponential_weights import phi_functions
+from discover.forward.grid import make_grid, make_grids
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell, make_law
 from discover.protocols import (
     oscillatory_shear,

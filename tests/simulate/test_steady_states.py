@@ -11,8 +11,9 @@ from scipy.optimize import brentq
 
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
+from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import solve_batch, solve_on_grid
-from discover.forward.grids import lay_out, make_grid
+from discover.forward.grid import make_grid
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import Giesekus

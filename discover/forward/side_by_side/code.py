@@ -123,17 +123,18 @@ class Code:
         laid = [np.ascontiguousarray(arrays[name]) for name in self.arrays]
         self._call(*counts, *(array.ctypes.data for array in laid))
 
-    def _written(self) -> bytes:
+    def _written(self) -> tuple[bytes, bool]:
         known = set(vars(self))
         self._w = Writing(self.counts, self.arrays, self.wide, self.whole)
         self._arithmetic = Arithmetic(self._w.builder)
         self._write = Translation(self._arithmetic)
         self._body()
-        code = self._w.compiled()
+        code, calls = self._w.compiled(), self._write.calls
         # what was written is large, and the code is made
         for name in set(vars(self)) - known:
             delattr(self, name)
-        return code
+        self._calls = calls
+        return code, not calls
 
     def _body(self) -> None:
         raise NotImplementedError
@@ -217,10 +218,7 @@ def code_of(
     flow: Kinematics | None,
     **choices: bool,
 ) -> _Kind:
-    """Return the machine code of a kind for a fluid, made once for all whose constants differ.
-
-    Raises NotTranslatable if a law or an effect does what lanes do not know.
-    """
+    """Return the machine code of a kind for a fluid, made once for all whose constants differ."""
     theta = jax.ShapeDtypeStruct((fluid.size,), float)
     found = eqx.filter_eval_shape(laid_out, fluid, numbers, theta)
     structure = fluid.structure.without_constants()

@@ -1,7 +1,7 @@
 """The state in which a run begins whose oscillation had gone on for ever, for lanes.
 
-Solved for as in `starts.periodic_start`, with derivatives by differences: a cycle is followed from
-the approximation, and from each component of all modes and each state moved a little. All passes,
+Solved for as in `periodic_states.periodic_start`, by differences: a cycle is followed from the
+approximation, and from each component of all modes and each state moved a little. All passes,
 and the run itself, share the code of one step.
 """
 
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import jax.numpy as jnp
 import numpy as np
 
-from discover.forward.starts.half_cycles import MOST, TOLERANCE
-from discover.forward.starts.steady_states import (
+from discover.forward.periodic_states import MOST, TOLERANCE
+from discover.forward.steady_states import (
     FROM_REST,
     Approximation,
     goes_on,

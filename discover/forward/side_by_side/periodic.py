@@ -6,18 +6,24 @@ from dataclasses import replace
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from discover.effects import KinematicEffect
 from discover.forward.augmented_fluid import AugmentedFluid
 from discover.forward.declared import Numbers
+from discover.forward.periodic_states import MOST_CYCLES, NEWTON_STEP, mirror
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.cycles import approximation
-from discover.forward.side_by_side.predictors import Asked, Eights, StatePredictor, lanes_last
+from discover.forward.side_by_side.kernel import Kernel
+from discover.forward.side_by_side.predictors import (
+    Asked,
+    StatePredictor,
+    flows_of,
+    lanes_last,
+    modes_in_use,
+)
 from discover.forward.side_by_side.step import WEIGHTS, Mode, Shared, Step
-from discover.forward.starts.half_cycles import mirror
-from discover.forward.starts.periodic_states import MOST_CYCLES, NEWTON_STEP
-from discover.forward.starts.steady_states import goes_on, next_approximation, relative_change
+from discover.forward.steady_states import goes_on, next_approximation, relative_change
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
 from discover.protocols.kinematics import Kinematics
@@ -69,7 +75,7 @@ class PeriodicStep(Step):
 
 
 class PeriodicCode(Code):
-    """Machine code for periodic states: no state of the fluid changes, nothing gives way."""
+    """Machine code for periodic states of modes that nothing couples."""
 
     counts, arrays, wide, whole = _COUNTS, _ARRAYS, _WIDE, _WHOLE
 
@@ -192,53 +198,148 @@ class PeriodicCode(Code):
 # Eights of states that one call of the code takes
 _AT_ONCE = 2
 
+# Of the secant most steps, the relative change of the strain that ends it, and its bounds
+_MOST_SECANTS, _TOLERANCE, _SECANT = 40, 1e-8, (0.2, 5.0)
+
 
 class PeriodicSideBySide(StatePredictor):
     """Predictions of moduli for one structure of law and effects.
 
-    `recorded`: of numbers, a vector, the effects present, states and moduli of the modes: those
-    recorded.
+    `cycles`: makes the code of transients that begin with a cycle, for vectors whose states change
+    in it. `rates`, `given_way`, `recorded`: the felt rate; of a vector, states, felt strains and
+    moduli of the modes, by how much the tool turns further than the fluid; and what is recorded.
     """
 
     def __init__(
         self,
         fluid: AugmentedFluid,
         code: PeriodicCode,
+        cycles: Callable[[], Kernel],
         rates: Callable,
+        given_way: Callable,
         recorded: Callable,
         made_from: tuple,
     ):
         acting = [e for e in fluid.structure.effects if e.acts_on_steady_states]
         shaping = [e for e in acting if isinstance(e, KinematicEffect)]
         super().__init__(fluid, code, made_from, shaping, rates, (0, None, None))
-        coupling = [*fluid.series, *(e for e in fluid.states if e.acts_on_steady_states)]
-        self._coupling = self._amplitudes(coupling)
+        self._cycles = cycles
+        self._packed_last = code.packing(fluid, made_from, -1)
+        self._states = self._amplitudes(e for e in fluid.states if e.acts_on_steady_states)
+        self._series = self._amplitudes(fluid.series)
+        still = [*self._amplitudes(e for e in fluid.states), *self._series]
+        self._still = [at for at in still if at not in self._states]
 
-        def of_solvent(numbers: Numbers, solvent, *others):
-            return recorded(replace(numbers, solvent_viscosity=solvent), *others)
+        def of_solvent(function: Callable) -> Callable:
+            def of(numbers: Numbers, solvent, *others):
+                return function(replace(numbers, solvent_viscosity=solvent), *others)
 
-        self._recorded = self._program("moduli", of_solvent, (None, 0, 0, None, None, 0))
+            return of
 
-    def alone(self, thetas: Float[np.ndarray, "trials p"]) -> Bool[np.ndarray, " trials"]:
-        """Return which vectors are left to the other program: states or series act."""
-        return np.any(thetas[:, self._coupling], axis=1)
+        self._given_way = self._program(
+            "given way", of_solvent(given_way), (None, 0, 0, None, 0, 0)
+        )
+        self._recorded = self._program(
+            "moduli", of_solvent(recorded), (None, 0, 0, None, None, 0, 0)
+        )
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials states 2"]:
         """Return both moduli; limits say nothing here."""
-        part, eights = asked.part, self._eights(asked)
+        part, eights, count = asked.part, self._eights(asked), len(asked.thetas)
         frequency = np.asarray(part.frequency)
-        rate = self._felt(asked, eights, frequency * np.asarray(part.strain))
-        found = self._solved(asked, eights, rate / frequency)
+        rate = self._felt(asked, eights, frequency * np.asarray(part.strain))[:count]
+        strain, of_modes = self._answered(asked, rate / frequency)
         present = self._fluid.present(asked.thetas)
-        recorded = [
-            self._recorded(asked.numbers, own[:, -1], eight, present, part, found[at])
+        found = [
+            self._recorded(
+                asked.numbers, own[:, -1], eight, present, part, strain[at], of_modes[at]
+            )
             for (eight, own), at in zip(eights.pairs, eights.places, strict=True)
         ]
-        return np.concatenate(recorded)[: len(asked.thetas)]
+        return np.concatenate(found)[:count]
 
-    def _solved(self, asked: Asked, eights: Eights, strain) -> np.ndarray:
+    def _answered(self, asked: Asked, strain: Float[np.ndarray, "trials states"]):
+        """Return the strain that the fluid feels of the tool's, and the moduli of its modes.
+
+        What gives way in series takes its share of the first harmonic alone. The secant finds the
+        amplitude that is left, along the logarithms of both.
+        """
+        felt, of_modes = strain.copy(), self._of_modes(asked, strain)
+        trials = np.flatnonzero(np.any(asked.thetas[:, self._series], axis=1))
+        before, lacked = felt.copy(), np.zeros(felt.shape)
+        for _ in range(_MOST_SECANTS):
+            if not len(trials):
+                break
+            own = asked.taken(trials)
+            now, eights = felt[trials], self._eights(own)
+            taken = np.concatenate(
+                [
+                    self._given_way(own.numbers, moduli[:, -1], eight, own.part, now[at],
+                                    of_modes[trials][at])
+                    for (eight, moduli), at in zip(eights.pairs, eights.places, strict=True)
+                ]
+            )[: len(trials)]  # fmt: skip
+            lacking = np.log(strain[trials] / now) - np.log(np.abs(taken))
+            passed = np.log(now / before[trials])
+            moved = passed != 0.0
+            slope = (lacked[trials] - lacking) / np.where(moved, passed, 1.0)
+            # 1 of a linear fluid; small of one that thins and gives way
+            slope = np.where(moved, np.clip(slope, *_SECANT), 1.0)
+            change = lacking / slope
+            before[trials], lacked[trials] = now, lacking
+            felt[trials] = now * np.exp(change)
+            trials = trials[np.any(np.abs(change) > _TOLERANCE, axis=1)]
+            if len(trials):
+                of_modes[trials] = self._of_modes(asked.taken(trials), felt[trials])
+        of_modes[trials] = np.nan
+        return felt, of_modes
+
+    def _of_modes(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
         """Return the complex moduli of the modes, shape (trials, states)."""
-        part, declared = asked.part, len(asked.numbers.modulus)
+        out = np.empty(strain.shape, complex)
+        changing = np.any(asked.thetas[:, self._states], axis=1)
+        for which, solve in ((changing, self._in_cycles), (~changing, self._of_each_mode)):
+            if np.any(which):
+                out[which] = solve(asked.taken(which), strain[which])
+        return out
+
+    def _in_cycles(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
+        """Return the moduli of modes that states of the fluid couple, each state a run."""
+        part, steps = asked.part, 2 * np.asarray(asked.part.steps).astype(np.int64)
+        frequency, most = np.asarray(part.frequency), int(np.max(steps))
+        thetas = asked.thetas.copy()
+        thetas[:, self._still] = 0.0
+        width = np.repeat((2.0 * np.pi / (frequency * steps))[:, None], most, axis=1)
+        phase = np.arange(2 * most + 1) * (np.pi / steps[:, None])
+        wave, none = frequency[:, None] * np.cos(phase), np.zeros((len(steps), most + 1))
+        # of what is periodic the sum over a period is exact to all orders
+        ends = np.arange(1, most + 1) <= steps[:, None]
+        harmonic = np.where(ends, 2j * np.exp(-1j * phase[:, 2::2]), 0.0) / steps[:, None]
+        declared = len(asked.numbers.modulus)
+
+        def eight(lanes: np.ndarray, _, used: np.ndarray) -> np.ndarray:
+            packed = self._packed_last(asked.numbers, thetas[lanes], asked.moduli[lanes])
+            modes, shared = (np.asarray(array) for array in packed)
+            amplitude = strain[lanes].T
+            given = {
+                "rate": wave[:, :, None] * amplitude[:, None], "shared": shared,
+                "mode": modes[modes_in_use(modes[:, 0].T, declared)],
+                "limit": np.full(LANES, np.inf), "table": np.zeros(WEIGHTS), "last": steps,
+                "held": np.ones(width.shape, np.int64),
+                "cycle": np.stack([np.zeros_like(steps), steps], axis=1),
+                "width": width, "whole": width, "least": width, "period": 2.0 * np.pi / frequency,
+                "jump": np.zeros(len(steps)), "flow": flows_of(None), "weight": none,
+                "recorded": none,
+            }  # fmt: skip
+            _, _, of_modes, _ = self._cycles()(len(steps), 0, used, given, normal=True)
+            stress = np.where(ends[:, :, None], of_modes[:, 1:, 3], 0.0)
+            return (np.sum(harmonic[:, :, None] * stress, axis=1) / amplitude).T
+
+        return self._by_eights(thetas, (), eight)
+
+    def _of_each_mode(self, asked: Asked, strain: Float[np.ndarray, "trials states"]) -> np.ndarray:
+        """Return the moduli of modes each of which is solved for by itself."""
+        part, declared, eights = asked.part, len(asked.numbers.modulus), self._eights(asked)
         frequency, steps = np.asarray(part.frequency), np.asarray(part.steps).astype(np.int64)
         out = np.empty((len(asked.thetas), len(frequency)), complex)
 

@@ -9,8 +9,8 @@ from jaxtyping import Bool, Float, Int
 
 from discover.effects import AbstractEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import Records
 from discover.forward.declared import Numbers
+from discover.forward.records import Records
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.step import Flags
 from discover.programs import compiled, in_threads
@@ -34,6 +34,11 @@ class Asked(NamedTuple):
     judging: Records | None
     runs: int
     normal: bool
+
+    def taken(self, which: np.ndarray) -> "Asked":
+        """Return what is asked of some of the vectors."""
+        own = (of[which] for of in (self.thetas, self.moduli, self.limits))
+        return self._replace(**dict(zip(("thetas", "moduli", "limits"), own, strict=True)))
 
 
 def in_whole_eights(count: int) -> Int[np.ndarray, " lanes"]:

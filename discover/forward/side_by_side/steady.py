@@ -18,7 +18,7 @@ from discover.forward.side_by_side.predictors import (
     lanes_last,
 )
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
-from discover.forward.starts.steady_states import (
+from discover.forward.steady_states import (
     MOST_STEPS,
     Approach,
     approach_step,

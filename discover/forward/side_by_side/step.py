@@ -1,7 +1,7 @@
 """A step of one mode of one vector, as functions of numbers from which lanes are written.
 
-The scheme of `stepping.integrate`, taken apart where a loop over the modes stands. A branch by a
-flag that all vectors of a call share costs nothing where it is not taken.
+Krogstad's method, taken apart where a loop over the modes stands. A branch by a flag that all
+vectors of a call share costs nothing where it is not taken.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,7 +17,7 @@ import numpy as np
 from discover.effects import ConstitutiveEffect, StateEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.declared import Numbers
-from discover.forward.integrators.exponential_weights import (
+from discover.forward.exponential_weights import (
     KrogstadWeights,
     StressWeights,
     krogstad_weights,
@@ -83,7 +83,7 @@ class Flags:
             e.name: [at.start] for e in fluid.structure.effects for at in [fluid.slices[e.name]]
         }
         varied = {e.name: [*range(at.start, at.stop)] for e, at in fluid.varying_effects.items()}
-        library = fluid.added.library
+        library = fluid.library
         setting: dict[str, list[int]] = {
             f"tensor {tensor}": [
                 int(at)
@@ -93,7 +93,7 @@ class Flags:
             for tensor in library.tensors
         }
         setting["library"] = [at for positions in setting.values() for at in positions]
-        others = fluid.added.others
+        others = fluid.other_terms
         of_others = {e.name: first[e.name] + varied.get(e.name, []) for e in others}
         setting["terms"] = sum(of_others.values(), list(setting["library"]))
         setting |= {f"term {name}": at for name, at in of_others.items()}
@@ -146,11 +146,11 @@ class Step:
         return change - (added if len(change) == 4 else jnp.pad(added, (0, len(change) - 4)))
 
     def _added(self, shared: Shared, mode: Mode, on, stress, rate):
-        library, values = self.fluid.added.library, self.fluid.values
+        library, values = self.fluid.library, self.fluid.values
         total: Any = jnp.zeros(4)
         if library.tensors:
             total = _if(on["library"], lambda: self._of_library(shared, on, stress, rate), total)
-        for effect in self.fluid.added.others:
+        for effect in self.fluid.other_terms:
             own = values(shared.theta, effect)
             if effect.name in mode.amplitudes:
                 own = jnp.concatenate([mode.amplitudes[effect.name][None], own[1:]])
@@ -162,7 +162,7 @@ class Step:
         return total
 
     def _of_library(self, shared: Shared, on, stress, rate):
-        library = self.fluid.added.library
+        library = self.fluid.library
         monomials, basis = library.monomials(stress, rate), integrity_basis(stress, rate)
         matrix = library.matrix(shared.theta)
         total: Any = jnp.zeros(4)
@@ -177,7 +177,7 @@ class Step:
         return total
 
     def _remainder(self, shared, mode, on, flow, w, slow, stress, rate, now):
-        """Return what of the change is not relaxation; see `Dynamics.stage`."""
+        """Return what of the change is not relaxation."""
         gradient = now * mode.relaxation_time * rate
         if flow is not None:
             gradient = gradient * flow.gradient
@@ -202,7 +202,7 @@ class Step:
         return jnp.stack([own(), *(own(rate) for rate in rates[1:])])
 
     def _of_step(self, mode: Mode, weights) -> StressWeights:
-        """Return weights as the integrators take them; see `Dynamics.weights_of_step`."""
+        """Return weights as a step takes them."""
         rows = weights.reshape(-1, self.kept)
         more = jnp.zeros((len(rows), len(KrogstadWeights._fields) - self.kept))
         rows = jnp.concatenate([rows, more], axis=1)
@@ -255,7 +255,7 @@ class Step:
         return total
 
     def _factor(self, name: str, shared, on, levels):
-        """Return the product of a factor of all states; see `Dynamics.combined`."""
+        """Return the product of a factor of all states."""
         total: Any = jnp.ones(())
         for effect, level in zip(self.states, levels, strict=True):
             if getattr(type(effect), name) is getattr(StateEffect, name):
@@ -273,7 +273,7 @@ class Step:
         return self._factor("modulus_factor", shared, on, levels)
 
     def _later(self, shared, on, levels, rate, stress, widths):
-        """Return the states after steps of several widths; see `Dynamics.later`."""
+        """Return the states after steps of several widths, source and decay constant in each."""
         after = []
         for effect, level in zip(self.states, levels, strict=True):
 
@@ -329,7 +329,12 @@ class Step:
     def taken(
         self, shared, on, flow, rates, width, jump, before, missing, earlier, scale, foreseen
     ):
-        """Return the rate that series elements take; see `with_effects`."""
+        """Return the rate that series elements take.
+
+        Their strain at the end must be −C σ − ∫ s σ dt. The stress there is predicted by one
+        exponential Euler step, linear in the rate; what this misses is taken to the next step in
+        `missing`.
+        """
         slip, compliance = self._series(shared, flow, before)
         viscous = self.beside(shared, on, flow and flow.driven, jnp.ones(()))
         predicted, stiffness = scale * foreseen[0], scale * foreseen[1]

@@ -10,8 +10,7 @@ from jaxtyping import Float
 
 from discover.effects import SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.integrators.exponential_weights import KrogstadWeights
-from discover.forward.integrators.stepping import RATE_OF_RATE
+from discover.forward.exponential_weights import KrogstadWeights
 from discover.forward.side_by_side.code import Code
 from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
@@ -30,6 +29,11 @@ _ARRAYS = (*_WIDE, *_WHOLE, *_SCALAR)
 # rates in the middle and at the end with the inverse of the slopes, and states of the fluid
 _BEFORE, _BEND, _STRAIN, _SHEARED = range(4)
 _FELT, _SLOPES, _RATES, _INVERSE, _LEVELS = 4, 6, 10, 12, 16
+
+
+RATE_OF_RATE = np.array([[0.0, 1.0], [-4.0, 3.0]])
+"""dγ̇/dt in the middle and at the end of a step, over 1/h, of the rates there less that before: of
+the parabola through all three."""
 
 
 class StressStep(Step):

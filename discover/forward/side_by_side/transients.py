@@ -13,10 +13,10 @@ from jaxtyping import Float
 
 from discover.effects import KinematicEffect, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid
-from discover.forward.batches import Records, TransientFlows
 from discover.forward.declared import Numbers
-from discover.forward.integrators.exponential_weights import krogstad_weights
-from discover.forward.integrators.stepping import JUMP
+from discover.forward.exponential_weights import krogstad_weights
+from discover.forward.flows import TransientFlows
+from discover.forward.records import Records
 from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import WEIGHTS
@@ -32,6 +32,9 @@ _KEPT = 8
 # Steps of the grid from which on vectors choose their own, and as how many of them a step may
 # always be long: two halves, extrapolated, err no more than two steps of the grid
 _FEWEST, _ALWAYS = 8, 2.0
+
+# Below this fraction of the run a step only marks a jump of the rate, and nothing gives way in it
+JUMP = 1e-9
 
 _OF_RUNS = (
     "last", "held", "cycle", "width", "whole", "least", "period", "jump", "flow", "weight",

@@ -10,8 +10,8 @@ from discover.dataset import Run
 from discover.effects import AbstractEffect, EffectParameter, make_effect
 from discover.effects.library_term import LibraryTerm
 from discover.forward import AugmentedModel, DeclaredModel
-from discover.forward.batches import data_scales
 from discover.forward.declared import LARGEST
+from discover.forward.records import data_scales
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.slip import SLIP_CURVE

@@ -12,8 +12,8 @@ from jaxtyping import Array, Float
 
 from discover.dataset.run import Run
 from discover.forward import Records
+from discover.forward.flow_batch import FlowBatch
 from discover.forward.fluids import observed_on_grid
-from discover.forward.grids.flow_batch import FlowBatch
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork, UpperConvectedMaxwell
 from discover.learners.runs import laid_out
 from discover.programs import on_device

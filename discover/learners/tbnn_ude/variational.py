@@ -19,8 +19,8 @@ from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
 from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
-from discover.forward.integrators.stepping import follow
-from discover.forward.starts.steady_states import steady_state
+from discover.forward.steady_states import steady_state
+from discover.forward.stepping import follow
 from discover.laws.each_mode import over_modes
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem

@@ -29,7 +29,7 @@ _ROUNDING = ("contract", "nsz", "arcp")
 _TO_INTEGER = 6755399441055744.0
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 
-# Past this many operations a function is no small one, and XLA is better at it
+# Past so many operations a function is no small one, and JAX is better at it
 _MOST = 60_000
 
 
@@ -73,6 +73,21 @@ class Arithmetic:
         return self.builder.shuffle_vector(
             first, blank, ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
         )
+
+    def mark(self) -> Callable[[], None]:
+        """Return what takes back all that is written from here on."""
+        block: Any = self.builder.block
+        blocks = self.builder.function.blocks
+        count, instructions, known = len(blocks), len(block.instructions), dict(self._known)
+        self.operations = 0
+
+        def undo() -> None:
+            del blocks[count:], block.instructions[instructions:]
+            block.terminator = None
+            self.builder.position_at_end(block)
+            self._known = known
+
+        return undo
 
     @contextmanager
     def apart(self) -> Iterator[None]:

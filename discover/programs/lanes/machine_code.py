@@ -136,25 +136,27 @@ def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
     return call
 
 
-def kept(made_from: Any, write: Callable[[], bytes]) -> bytes:
+def kept(made_from: Any, write: Callable[[], tuple[bytes, bool]]) -> bytes:
     """Return machine code that an earlier start made of the same, or write and keep it.
 
     It lies with the programs (`discover.programs.store`). `made_from`: what tells it from other
-    code; what no digest describes, a user's own code, is not kept.
+    code; what no digest describes, a user's own code, is not kept. `write`: returns the code, and
+    whether it stands alone: what calls functions of this process is not kept either.
     """
     folder = program_folder()
     if folder is None:
-        return write()
+        return write()[0]
     try:
         name = fingerprint(("lanes", _LEVELS, *_processor(), made_from), False).hex()
     except (NotDescribable, TypeError, ValueError) as reason:
         _LOGGER.debug("machine code is made at every start: %s", reason)
-        return write()
+        return write()[0]
     found = load_program(folder / name)
     if found is not None:
         return found[1]
-    code = write()
-    save_program(folder / name, None, code)
+    code, stands_alone = write()
+    if stands_alone:
+        save_program(folder / name, None, code)
     return code
 
 

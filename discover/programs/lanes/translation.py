@@ -4,6 +4,8 @@ An array is an array of NumPy whose elements are values of `Arithmetic`. Whateve
 about is done by NumPy, or by JAX on their places, while code is written, and costs nothing later.
 """
 
+import ctypes
+import logging
 from collections.abc import Callable, Sequence
 from functools import partial, reduce
 from typing import Any
@@ -12,12 +14,25 @@ import jax
 import jax.numpy as jnp
 import llvmlite.ir as ir
 import numpy as np
+from jax.extend.core import jaxpr_as_fun
 
-from discover.programs.lanes.arithmetic import DOUBLES, Arithmetic, NotTranslatable, Value
+from discover.programs.lanes.arithmetic import (
+    DOUBLES,
+    INTEGER,
+    LANES,
+    TRUTH,
+    Arithmetic,
+    NotTranslatable,
+    Value,
+)
 from discover.programs.threads import on_device
+
+_LOGGER = logging.getLogger(__name__)
 
 Values = np.ndarray
 """An array of values."""
+
+_CALL = ctypes.CFUNCTYPE(None, *[ctypes.POINTER(ctypes.c_double)] * 2)
 
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "ne": "!="}
 
@@ -38,21 +53,89 @@ def as_values(array: Any) -> Values:
 
 
 class Translation:
-    """Functions of JAX, written down through an `Arithmetic` where its builder stands."""
+    """Functions of JAX, written down through an `Arithmetic` where its builder stands.
+
+    `calls`: functions that the code calls, which have to live as long as it does.
+    """
 
     def __init__(self, arithmetic: Arithmetic):
         self.arithmetic = arithmetic
+        self.calls: list[Any] = []
 
     def __call__(self, function: Callable, *arguments: Any) -> Any:
-        """Return what a function makes of trees of arrays of values, as a tree of such arrays."""
+        """Return what a function makes of trees of arrays of values, as a tree of such arrays.
+
+        One that does what lanes do not know is called as JAX compiles it, for all lanes at once.
+        """
         leaves, tree = jax.tree.flatten(arguments, is_leaf=lambda x: isinstance(x, np.ndarray))
         leaves = [as_values(leaf) for leaf in leaves]
         shapes = [jax.ShapeDtypeStruct(leaf.shape, _kind(leaf)) for leaf in leaves]
         traced, shape = jax.make_jaxpr(function, return_shape=True)(
             *jax.tree.unflatten(tree, shapes)
         )
-        found = self.jaxpr(traced.jaxpr, traced.consts, leaves)
+        undo = self.arithmetic.mark()
+        try:
+            found = self.jaxpr(traced.jaxpr, traced.consts, leaves)
+            if any(value is None for array in found for value in array.flat):
+                raise NotTranslatable("a decomposition by itself")
+        except NotTranslatable as reason:
+            _LOGGER.debug("%s is left to JAX: %s", getattr(function, "__name__", "it"), reason)
+            undo()
+            found = self._by_jax(traced, leaves)
         return jax.tree.unflatten(jax.tree.structure(shape), found)
+
+    def _by_jax(self, traced: Any, leaves: list[Values]) -> list[Values]:
+        """Return the outputs of a function that is called on its way, for all lanes at once."""
+        arithmetic, b = self.arithmetic, self.arithmetic.builder
+        unknown = [[i for i, v in enumerate(leaf.flat) if not arithmetic.is_known(v)]
+                   for leaf in leaves]  # fmt: skip
+        given = [leaf.flat[i] for leaf, at in zip(leaves, unknown, strict=True) for i in at]
+        # truths that all lanes share stay one, so that branches are taken and not chosen from
+        shared = [Arithmetic.is_truth(v) and v.type == TRUTH for v in given]
+        outputs = [variable.aval for variable in traced.jaxpr.outvars]
+
+        def of_lane(values):
+            read, arguments = iter(values), []
+            for leaf, at, variable in zip(leaves, unknown, traced.jaxpr.invars, strict=True):
+                known = [0.0 if i in at else value for i, value in enumerate(leaf.flat)]
+                flat = jnp.asarray(known, float)
+                for i in at:
+                    flat = flat.at[i].set(next(read))
+                arguments.append(flat.reshape(leaf.shape).astype(variable.aval.dtype))
+            found = jaxpr_as_fun(traced)(*arguments)
+            return jnp.concatenate([jnp.ravel(jnp.asarray(each, float)) for each in found])
+
+        axes = [None if one else 0 for one in shared]
+        shapes = [jax.ShapeDtypeStruct(() if one else (LANES,), float) for one in shared]
+        program = jax.jit(jax.vmap(of_lane, (axes,), 1)).lower(shapes).compile()
+        size = sum(int(np.prod(aval.shape, dtype=int)) for aval in outputs)
+
+        def call(inputs, results):
+            rows = np.ctypeslib.as_array(inputs, (max(len(given), 1), LANES))
+            values = [row[0] if one else row for row, one in zip(rows, shared, strict=False)]
+            np.ctypeslib.as_array(results, (size, LANES))[:] = program(values)
+
+        kept = _CALL(call)
+        self.calls.append(kept)
+        address = ctypes.cast(kept, ctypes.c_void_p).value
+        with b.goto_entry_block():
+            inputs, results = (
+                b.alloca(DOUBLES, INTEGER(max(count, 1))) for count in (len(given), size)
+            )
+        for i, value in enumerate(given):
+            b.store(arithmetic.lanes(value), b.gep(inputs, [INTEGER(i)]))
+        kind = ir.FunctionType(ir.VoidType(), [DOUBLES.as_pointer()] * 2)
+        b.call(b.inttoptr(INTEGER(address), kind.as_pointer()), [inputs, results])
+        found = iter([b.load(b.gep(results, [INTEGER(i)])) for i in range(size)])
+        arrays = []
+        for aval in outputs:
+            values = np.empty(aval.shape, object)
+            for place in np.ndindex(aval.shape):
+                value = next(found)
+                is_truth = aval.dtype == jnp.bool_
+                values[place] = arithmetic.compare("!=", value, 0.0) if is_truth else value
+            arrays.append(values)
+        return arrays
 
     def jaxpr(self, jaxpr, constants: Sequence[Any], arguments: Sequence[Values]) -> list[Values]:
         """Return the outputs of a traced function."""

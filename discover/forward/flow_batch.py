@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from discover.forward.grids.grid import IntegrationGrid, make_grids
+from discover.forward.grid import IntegrationGrid, make_grids
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, STATES, RecordedQuantity
 from discover.protocols.protocol import FlowProtocol, stack_protocols

@@ -1,4 +1,4 @@
-"""Steady states of a fluid, one for each rate of a flow curve."""
+"""Newton's steps towards states that a flow keeps, and steady states of modes."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from discover.forward.dynamics import Dynamics, Levels
+from discover.forward.dynamics import Dynamics
 from discover.protocols.kinematics import Kinematics
 
 FROM_REST = 2
@@ -189,18 +189,12 @@ def approach_step(
 
 
 def moves(
-    before: Approach,
-    after: Approach,
-    weissenberg_number: Float[Array, " k"],
-    beside: Sequence[tuple[Array, Array]] = (),
+    before: Approach, after: Approach, weissenberg_number: Float[Array, " k"]
 ) -> Bool[Array, ""]:
-    """Return whether another step may change anything: one of Newton's from here did, or none was.
-
-    `beside`: what else is on the way, before and after the step.
-    """
+    """Return whether another step may change anything: one of Newton's did, or none was."""
     width = pseudo_time_step(before.number, weissenberg_number)
     newton = jnp.all((after.number >= before.number) & (width > _LONG))
-    return ~(newton & are_still([(before.stress, after.stress), *beside]))
+    return ~(newton & are_still([(before.stress, after.stress)]))
 
 
 def are_still(pairs: Sequence[tuple[Array, Array]]) -> Bool[Array, ""]:
@@ -277,34 +271,11 @@ def _solved(matrix: Float[Array, "k s s"], change: Float[Array, "s k"]) -> Float
 
 
 class _Way(NamedTuple):
-    """A way towards a steady state, with the states of the fluid and the rate that it feels."""
+    """A way towards a steady state, and the number of steps taken."""
 
     index: Float[Array, ""]
     way: Approach
-    levels: Levels
-    felt: Float[Array, ""]
     moving: Bool[Array, ""]
-
-
-def steady_states(
-    dynamics: Dynamics, rates: Float[Array, " n"], flow: Kinematics | None = None
-) -> tuple[Float[Array, " n"], Float[Array, " n"]]:
-    """Return the recorded stress of the modes in Pa and the felt rate in 1/s in steady flow.
-
-    Each state is approached from rest by linearly implicit Euler steps in pseudo-time that grow
-    until they are Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]: of several the
-    one that a start-up leads to. Where there is none, or the flow diverges, values are not finite
-    or far off.
-
-    `rates`: of the tool, in 1/s; zero is rest. Of elements in series only slip acts.
-    """
-
-    def one(rate):
-        stress, levels, felt = _approach(dynamics, rate, flow)
-        scale = dynamics.combined("modulus_factor", levels)
-        return scale * dynamics.recorded(stress, flow), felt
-
-    return jax.vmap(one)(rates)
 
 
 def steady_state(
@@ -312,55 +283,26 @@ def steady_state(
 ) -> Float[Array, "s k"]:
     """Return the dimensionless modes in one steady flow, with derivatives of the implicit function.
 
-    Not finite where none is reached. `fixed`: the fluid once more, through which no derivative
-    passes.
+    Approached from rest by linearly implicit Euler steps in pseudo-time that grow until they are
+    Newton's   [Kelley & Keyes 1998, SIAM J. Numer. Anal. 35, 508]: of several states the one that a
+    start-up leads to. Not finite, or far off, where none is reached. `fixed`: the fluid once more,
+    through which no derivative passes.
     """
-    reached, _, _ = jax.lax.stop_gradient(_approach(fixed, rate, flow))
-    return newton_step(lambda stress: dynamics.change(stress, rate, 1.0, flow), reached)
-
-
-def _approach(dynamics: Dynamics, rate, flow):
-    """Return modes and states of the fluid in steady flow, and the rate that it feels."""
-    modes = dynamics.modes
-    stress, levels = dynamics.rest()
     intensity = 1.0 if flow is None else flow.intensity
-    weissenberg = intensity * jnp.abs(rate) * modes.relaxation_time
-    scalars = dynamics.variables - 4 * dynamics.tensors
+    weissenberg = intensity * jnp.abs(rate) * fixed.modes.relaxation_time
+    scalars = fixed.variables - 4 * fixed.tensors
 
-    def changes(levels, felt):
-        slow = dynamics.combined("time_factor", levels)
-        return lambda state: dynamics.change(state, felt, slow, flow)
+    def change(stress):
+        return fixed.change(stress, rate, flow)
 
     def step(now: _Way) -> _Way:
-        index, way, levels, felt = now.index, now.way, now.levels, now.felt
-        change = changes(levels, felt)
-        way = approach_step(change, way, index, weissenberg, scalars)
-        sheared, sheared_rate = dynamics.sheared(way.stress, felt, flow)
-        sheared = dynamics.combined("modulus_factor", levels) * sheared
-        levels = tuple(
-            _steady_level(effect, values, sheared_rate, sheared)
-            for effect, values in dynamics.states.items()
-        )
-        if dynamics.series is not None:
-            # σ/γ̇ changes more slowly than σ: the iteration converges however strong the slip
-            viscosity = dynamics.viscosity + sheared / jnp.where(felt == 0.0, 1.0, felt)
-            felt = rate / (1.0 + dynamics.series.slip * viscosity)
-        beside = [(now.felt, felt), *zip(now.levels, levels, strict=True)]
-        moving = moves(now.way, way, weissenberg, beside)
-        return _Way(index + 1.0, way, levels, felt, moving)
+        way = approach_step(change, now.way, now.index, weissenberg, scalars)
+        return _Way(now.index + 1.0, way, moves(now.way, way, weissenberg))
 
-    start = _Way(
-        jnp.zeros(()),
-        approach(stress),
-        levels,
-        jnp.asarray(rate, dtype=stress.dtype),
-        jnp.asarray(True),
+    end = jax.lax.while_loop(
+        lambda now: now.moving & (now.index < MOST_STEPS),
+        step,
+        _Way(jnp.zeros(()), approach(fixed.rest()), jnp.asarray(True)),
     )
-    end = jax.lax.while_loop(lambda now: now.moving & (now.index < MOST_STEPS), step, start)
-    way, levels, felt = end.way, end.levels, end.felt
-    return arrived(changes(levels, felt), way, weissenberg), levels, felt
-
-
-def _steady_level(effect, values, rate, stress):
-    source, decay = effect.source_and_decay(values, rate, stress)
-    return source / decay
+    reached = jax.lax.stop_gradient(arrived(change, end.way, weissenberg))
+    return newton_step(lambda stress: dynamics.change(stress, rate, flow), reached)

@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from discover.forward.grids.grid import IntegrationGrid
-from discover.forward.integrators.exponential_weights import krogstad_weights, turned, with_shares
+from discover.forward.exponential_weights import krogstad_weights, turned, with_shares
+from discover.forward.grid import IntegrationGrid
 from discover.laws.multimode import Fluid
 from discover.protocols.protocol import FlowProtocol
 

@@ -12,8 +12,8 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
-from discover.forward.batches.records import Records, make_records
-from discover.forward.grids.grid import make_grid, steps_of_half_cycle, stress_grid
+from discover.forward.grid import make_grid, steps_of_half_cycle, stress_grid
+from discover.forward.records import Records, make_records
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
 from discover.protocols.protocol import shear_rates
