@@ -38,6 +38,7 @@ from discover.forward.side_by_side import (
     intervals,
 )
 from discover.laws import LAWS
+from discover.programs.threads import on_device
 from discover.protocols.kinematics import Kinematics
 
 # Runs of which it is known whether vectors choose their steps in them
