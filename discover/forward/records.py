@@ -321,7 +321,7 @@ def _looked_at(seen: Any, values: Any) -> Any:
     return values.__array_namespace__().where(seen, values, 0.0)
 
 
-def _by_numpy(function: Callable[[np.ndarray], np.ndarray], values: Values) -> Any:
+def _by_numpy(function: Callable[[np.ndarray], np.ndarray], values: Array | np.ndarray) -> Any:
     """Return what a function makes of values, by NumPy, which compiles nothing; of their kind."""
     found = function(np.asarray(values))
     return found if isinstance(values, np.ndarray) else on_device(found)

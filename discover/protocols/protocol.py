@@ -160,8 +160,11 @@ def require_flow(protocol: object, name: str) -> None:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
-    parts = times, rates, amplitudes, frequencies, phases
-    return FlowProtocol(*(on_device(np.asarray(part, float)) for part in parts))
+    table_times, table_rates, *waves = (
+        on_device(np.asarray(part, float))
+        for part in (times, rates, amplitudes, frequencies, phases)
+    )
+    return FlowProtocol(table_times, table_rates, waves[0], waves[1], waves[2])
 
 
 def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> FlowProtocol:

@@ -93,7 +93,7 @@ def band(quantity, inside):
 
 
 def curve(quantity, off):
-    return {"source": "tensor_sindy", "run": "e", "quantity": quantity, "off": off}
+    return {"source": "posterior", "run": "e", "quantity": quantity, "off": off}
 
 
 LOOPS = [

@@ -28,6 +28,9 @@ _SURE, _LONGEST, _SHORTEST, _ORDER = 0.9, 3e-4, 0.2, 5.0
 # Of what is left of an interval, the longest step that is taken however much its halves differ
 _OF_THE_REST = 0.1
 
+# Of an interval, the time within which its end is reached
+_ROUNDING = 1e-13
+
 # By how much a state may still change until the end of an interval of constant rate, where it is
 # taken to be steady
 _STEADY = 1e-10
@@ -181,6 +184,8 @@ class OwnWidths:
         arrived = a.compare("==", self._kept(at["slope"]), 0.0)
         arrived = a.both("and", arrived, a.compare("<=", ahead, _STEADY))
         arrived = a.both("or", arrived, a.compare(">=", width, left))
+        # a time that is left within rounding is never reached by parts of it
+        arrived = a.both("or", arrived, a.compare("<=", left, a.multiply(_ROUNDING, whole)))
         elapsed = a.chosen(taken, a.chosen(arrived, whole, a.add(elapsed, width)), elapsed)
         self._keep(elapsed, at["elapsed"])
         factor = a.multiply(_SURE, a.power(a.add(off, _LONGEST), -1.0 / _ORDER))
