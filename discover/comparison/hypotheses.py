@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
+from discover.equations.parts import combined
 from discover.inference.engine.fits import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.learners.results import RecoveredTerm
@@ -169,7 +170,10 @@ def _refitted(terms: Sequence[RecoveredTerm], fit: Fit, found: Found) -> tuple[R
 
 
 def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
-    """Return what a hypothesis adds to the law as library terms; None if it is no such sum."""
+    """Return what a hypothesis adds to the law as library terms; None if it is no such sum.
+
+    Of two effects with a term in common the coefficients are added up.
+    """
     problem, terms = found.posterior.problem, []
     for name in fit.names:
         effect = problem.effects[name]
@@ -179,7 +183,9 @@ def terms_of(fit: Fit, found: Found) -> tuple[LawTerm, ...] | None:
         if added is None:
             return None
         terms += added
-    return tuple(terms)
+    terms = combined(tuple(terms))
+    # a sum has one inner constant of a name
+    return terms if len({term.term for term in terms}) == len(terms) else None
 
 
 R = TypeVar("R")

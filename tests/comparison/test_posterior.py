@@ -1,6 +1,7 @@
 """A comparison of a Giesekus fluid by scipy, behind a transducer that reads 10 % too much."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from independent.instruments import Instrument
 from independent.noise import white
 
 import discover as dc
+from discover.comparison.hypotheses import terms_of
+from discover.effects import make_effect
 
 MODULUS, MOBILITY, GAIN, NOISE = 100.0, 0.3, 1.1, 0.01
 FLOWS = {
@@ -92,3 +95,14 @@ def test_json_names_the_answer_and_what_the_learner_is_worth(found):
     assert told["use"]["law"] == "giesekus"
     assert told["learners"]["tensor_sindy"]["intervals_hold"] == "if_the_law_is_in_the_library"
     assert told["learners"]["tensor_sindy"]["probability"] > 0.5
+
+
+def test_two_effects_with_a_term_in_common_are_one_law():
+    effects = {e.name: e for e in (make_effect("ptt_linear"), make_effect("tr(sigma)*sigma"))}
+    theta = np.array([0.2, 0.1])
+    positions = {"ptt_linear": [0], "tr(sigma)*sigma": [1]}
+    problem = SimpleNamespace(effects=effects, model=SimpleNamespace(positions=positions.get))
+    found = SimpleNamespace(posterior=SimpleNamespace(problem=problem))
+    (term,) = terms_of(SimpleNamespace(names=tuple(effects), theta=theta), found)
+    # ε tr(σ) σ of linear PTT, Phan-Thien & Tanner 1977
+    assert (term.term, term.coefficient) == ("tr(sigma)*sigma", pytest.approx(0.3))
