@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,8 @@ from independent.noise import white
 import discover as dc
 from discover.comparison.hypotheses import terms_of
 from discover.effects import make_effect
+from discover.inference.engine.fits import Fit
+from discover.loop.loop import Found
 
 MODULUS, MOBILITY, GAIN, NOISE = 100.0, 0.3, 1.1, 0.01
 FLOWS = {
@@ -102,7 +105,7 @@ def test_two_effects_with_a_term_in_common_are_one_law():
     theta = np.array([0.2, 0.1])
     positions = {"ptt_linear": [0], "tr(sigma)*sigma": [1]}
     problem = SimpleNamespace(effects=effects, model=SimpleNamespace(positions=positions.get))
-    found = SimpleNamespace(posterior=SimpleNamespace(problem=problem))
-    (term,) = terms_of(SimpleNamespace(names=tuple(effects), theta=theta), found)
+    found = Mock(Found, posterior=SimpleNamespace(problem=problem))
+    (term,) = terms_of(Mock(Fit, names=tuple(effects), theta=theta), found)
     # ε tr(σ) σ of linear PTT, Phan-Thien & Tanner 1977
     assert (term.term, term.coefficient) == ("tr(sigma)*sigma", pytest.approx(0.3))
