@@ -111,10 +111,8 @@ class Task:
             self.computed,
         )  # fmt: skip
 
-    def explained(self, declared: DeclaredModel, like: Search | None = None) -> Posterior:
+    def explained(self, declared: DeclaredModel) -> Posterior:
         """Return the posterior over what a declared model lacks.
-
-        `like`: a search with other constants by mode to start from.
 
         Raises InputError if it cannot be integrated through the fitted runs.
         """
@@ -124,7 +122,7 @@ class Task:
             raise InputError(
                 "The declared model cannot be integrated through the fitted runs: " + _DIVERGES
             )
-        return explain(problem, self.most, self.say, like)
+        return explain(problem, self.most, self.say)
 
     def explained_by_mode(self, declared: DeclaredModel) -> Posterior:
         """Return the posterior with constants that differ from mode to mode, if it is likelier.
@@ -143,7 +141,7 @@ class Task:
             if not names:
                 return first
         self.say("constants that may differ from mode to mode")
-        second = self.explained(replace(declared, by_mode=names), first.search)
+        second = self.explained(replace(declared, by_mode=names))
         gain = 2.0 * (log_evidence(second.search) - log_evidence(first.search))
         first.memory["by_mode"] = second.memory["by_mode"] = abs(gain)
         return second if gain > 0.0 else first

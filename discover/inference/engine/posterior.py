@@ -213,12 +213,7 @@ class Posterior:
 
 
 @in_one_thread
-def explain(
-    problem: Problem,
-    most: int = 3,
-    say: Callable[[str], None] | None = None,
-    like: Search | None = None,
-) -> Posterior:
+def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None = None) -> Posterior:
     """Return the posterior of a problem, hypotheses being sets of up to so many effects.
 
     Parameters
@@ -229,12 +224,8 @@ def explain(
         Effects in one set.
     say
         Called with a line of text now and then.
-    like
-        A search in the same runs with other freedom of the constants, from whose likeliest
-        hypotheses this one starts.
     """
-    search = Search(Fitter(problem, problem.fitted), most, say)
-    return posterior_of(search.run() if like is None else search.run_from(like))
+    return posterior_of(Search(Fitter(problem, problem.fitted), most, say).run())
 
 
 @in_one_thread

@@ -266,17 +266,6 @@ class Problem:
         """Return the log prior of one thing more, of its odds over those of an effect by name."""
         return float(np.log(odds / self._odds))
 
-    def constants_of(
-        self, theta: Float[np.ndarray, " theirs"], other: "Problem"
-    ) -> Float[np.ndarray, " p"]:
-        """Return a vector of another problem as one of this, which differs in what may vary."""
-        out = self.zero.copy()
-        pairs = [(self.model.free_positions, other.model.free_positions)]
-        pairs += [(self.model.positions(n), other.model.positions(n)) for n in self.effects]
-        for own, theirs in pairs:
-            out[list(own)] = theta[list(theirs)]
-        return out
-
     def without(self, theta: Float[np.ndarray, " p"], *names: str) -> Float[np.ndarray, " p"]:
         """Return a vector without some effects."""
         out = theta.copy()

@@ -14,9 +14,6 @@ _REFITTED = 8
 _EXCHANGED = 6
 _BEST = 4
 _FALLEN = 15.0
-_TAKEN_OVER = 12
-"""Hypotheses of a problem without constants by mode that are fitted with them."""
-
 """Log likelihood within which a set with an effect at zero shows that another set is as likely."""
 
 _ROUNDS = 3
@@ -107,19 +104,6 @@ class Search:
             if not level or (depth and self.rank(level[0]) < best - _HEADROOM):
                 break
         self.backwards()
-        self.exchange()
-        self.backwards()
-        self.say(f"exchanged: {len(self.found)} sets, likeliest: {self._likeliest}")
-        return self
-
-    def run_from(self, search: "Search") -> "Search":
-        """Find hypotheses from the likeliest of another problem that differs in what may vary."""
-        alive, other = search.alive()[:_TAKEN_OVER], search.problem
-        fits = {fit.names: fit for fit in [search.found[frozenset()], *alive]}
-        self.add(
-            self.fitter.start(names, self.problem.constants_of(fit.theta, other), fit.linear)
-            for names, fit in fits.items()
-        )
         self.exchange()
         self.backwards()
         self.say(f"exchanged: {len(self.found)} sets, likeliest: {self._likeliest}")
