@@ -30,7 +30,7 @@ from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 
 _MOST = 8
-"""Laws with a name, the likeliest, that are fitted without each run."""
+"""Laws of each kind with a name, the likeliest, that are fitted without each run."""
 
 _AS_WELL = float(np.log(0.05))
 """Log of odds against the best down to which runs left out do not exclude a law."""
@@ -48,11 +48,16 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     if posterior.verdict != "unexplained" or posterior.left is None or few:
         return posterior
     known = posterior.by_left_out or ((posterior.left.fit, 1.0),)
-    if has_a_name(posterior, known[0][0]):
+    of_the_field = law_of, is_thixotropic_maxwell
+    if any(has_name(posterior, known[0][0]) for has_name in of_the_field):
         return posterior
     leading = [fit for fit, _ in known]
     alive = posterior.search.alive()
-    named = list(islice((fit for fit in alive if has_a_name(posterior, fit)), _MOST))
+    classical, thixotropic = (
+        list(islice((fit for fit in alive if has_name(posterior, fit)), _MOST))
+        for has_name in of_the_field
+    )
+    named = [*classical, *thixotropic]
     some = [*leading, *(fit for fit in named if fit not in leading)]
     asked = [fit for fit in some if "missed" not in fit.memory]
     for fit, missed in zip(asked, left_out(fitter, asked), strict=True):
@@ -60,8 +65,8 @@ def with_named_law_first(posterior: Posterior) -> Posterior:
     weights = weights_of(np.array([fit.memory["missed"] for fit in some]))
     at = first_of(weights, [fit in named for fit in some])
     if some[at] not in named:
-        if of_one := [fit for fit in named if law_of(posterior, fit)]:
-            best = max(of_one, key=lambda fit: weights[some.index(fit)])
+        if classical:
+            best = max(classical, key=lambda fit: weights[some.index(fit)])
             posterior.memory["named"] = _nearest(posterior, best)
         return posterior
     chosen = some[at]
@@ -101,17 +106,16 @@ def first_of(weights: Float[np.ndarray, " laws"], named: Sequence[bool]) -> int:
     return at if own[at] > 0.0 and np.log(own[at] / weights[best]) >= _AS_WELL else best
 
 
-def has_a_name(posterior: Posterior, fit: Fit) -> bool:
-    """Return whether the field has a name for a hypothesis: a law, or a thixotropic Maxwell fluid.
+def is_thixotropic_maxwell(posterior: Posterior, fit: Fit) -> bool:
+    """Return whether a hypothesis is a Maxwell fluid with a structure and nothing else.
 
-    The latter is what a structure makes of it   [Mewis & Wagner 2009, Adv. Colloid Interface Sci.
-    147, 214].
+    The field calls that thixotropic   [Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147, 214].
     """
     states = _states(posterior, fit)
-    if states and {state.effect for state in states} <= {*STRUCTURES}:
-        found = _without_states(posterior, fit)
-        return found is not None and found[0] == "ucm"
-    return law_of(posterior, fit) is not None
+    if not states or not {state.effect for state in states} <= {*STRUCTURES}:
+        return False
+    found = _without_states(posterior, fit)
+    return found is not None and found[0] == "ucm"
 
 
 def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:

@@ -1,5 +1,7 @@
 """Of several laws the one that made the records is taken; which heads the answer where none did."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 from independent import ExtendedPomPom, Giesekus, RoliePoly, Thixotropic, UpperConvectedMaxwell
@@ -8,8 +10,12 @@ from independent.noise import white
 
 import discover as dc
 from discover.errors import InputError
+from discover.forward import DeclaredModel
+from discover.inference.engine import Posterior, Problem
+from discover.inference.engine.fits import Fit
 from discover.inference.engine.left_out import weights_of
-from discover.loop.preference import first_of
+from discover.loop.preference import first_of, is_thixotropic_maxwell, law_of
+from discover.loop.task import candidates_of
 from discover.report.loop.tables import loop_verdict
 
 NAMES = ("ucm", "giesekus", "ptt_linear", "rolie_poly", "xpp")
@@ -150,3 +156,36 @@ def test_it_does_not_where_it_misses_them_by_more_than_so_few_runs_scatter():
 def test_how_much_more_it_may_miss_falls_with_the_number_of_runs(runs, ratio):
     assert first([0.05, 0.05 * (ratio - 0.01)], [False, True], runs) == 1
     assert first([0.05, 0.05 * (ratio + 0.01)], [False, True], runs) == 0
+
+
+@pytest.mark.parametrize(
+    ("effects", "law", "thixotropic"),
+    [
+        (("thixotropy",), None, True),
+        (
+            ("edge_fracture", "thixotropy"),
+            None,
+            True,
+        ),  # an instrument's effect is none of the fluid
+        (("ptt_linear", "thixotropy"), None, False),
+        (("softening_by_work",), None, False),
+        (("ptt_linear",), "ptt_linear", False),
+        ((), "ucm", False),
+    ],
+)
+def test_a_maxwell_fluid_with_a_structure_and_nothing_else_is_thixotropic(
+    effects, law, thixotropic
+):
+    names = ["edge_fracture", "ptt_linear", "softening_by_work", "thixotropy"]
+    problem = Problem(
+        DeclaredModel.maxwell([100.0], [1.0]),
+        candidates_of(names),
+        runs(UpperConvectedMaxwell(), (1.0,)).runs,
+    )
+    theta = problem.zero.copy()
+    for name in effects:
+        theta[problem.model.positions(name)[0]] = 0.2
+    posterior, fit = Mock(Posterior, problem=problem), Mock(Fit, names=effects, theta=theta)
+    found = law_of(posterior, fit)
+    assert (found and found[0]) == law
+    assert is_thixotropic_maxwell(posterior, fit) == thixotropic
