@@ -87,7 +87,7 @@ def description(answer: Any) -> str:
     ends = f" ({_LEVEL}{low}–{high} %)" if low != high else ""
     # of fitted runs it is no error that a prediction could have
     of = "Error on unseen runs" if found.unseen else "Residual of the fitted runs"
-    besides = f", noise {noise}" if noise else ""
+    besides = f", besides {noise} noise" if noise else ""
     return f"{of} {percent_of(found.size)}{ends}{besides}."
 
 
@@ -163,6 +163,9 @@ def tolerance(answer: Any) -> str:
     missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
     over = _over_tolerance(answer)
     where_over = counted(len(over), "run") if over else ""
+    if where_over and missed[:1] == [SYMBOLS["sigma12"]] and len(missed) > 1:
+        missed[0] += f" ({where_over})"  # the others were measured in none of these
+        where_over = ""
     if not answer.adequate and not (missed or where_over):
         said = "not met"
     elif not answer.adequate or missed:
@@ -249,7 +252,7 @@ def lines(answer: Any) -> list[str]:
                 text += f", beyond the range {_at_most(one.beyond)}{at}"
             parts.append(text)
         if (worst := worst_run(answer)) is not None:
-            parts.append("worst run {}, {}".format(*worst))
+            parts.append("worst fitted run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
     found += [suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")

@@ -40,7 +40,7 @@ MELT = Answer(
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
         "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Error on unseen runs 6 % "
-        "(4–7 %), noise 0.25 %. Use in shear, 0.003–3 1/s."
+        "(4–7 %), besides 0.25 % noise. Use in shear, 0.003–3 1/s."
     )
     useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
     assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
@@ -56,7 +56,7 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
     assert tolerance(answer).startswith(f"Tolerance {said}")
-    assert any("worst run a.csv, 8 %" in line for line in answer.lines) is not adequate
+    assert any("worst fitted run a.csv, 8 %" in line for line in answer.lines) is not adequate
     *_, last = answer_screen(answer)["expected"]
     assert ((last["note"], last["inside"]) == ("a.csv", "8 %")) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
@@ -198,7 +198,7 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
         discrepancy=Discrepancy(0.06, (0.06, 0.06)),
         expected_error={"sigma12": ExpectedError(0.06, is_residual=True)},
     )
-    assert "Residual of the fitted runs 6 %, noise" in fitted.headline
+    assert "Residual of the fitted runs 6 %, besides" in fitted.headline
     assert "<th>fit residual</th>" in render("answer.html", screen=answer_screen(fitted))
     assert not any("xpected error" in line for line in fitted.lines)
     assert "<th>expected error</th>" in render("answer.html", screen=answer_screen(MELT))
@@ -214,7 +214,7 @@ def test_a_tolerance_names_the_worst_run_and_quantities_besides_stress():
     assert said == "Tolerance 5 %: not met in 2 runs."
     assert answer_screen(several)["expected"][-1]["note"] == "b"
     both = replace(several, expected_error={**MELT.expected_error, "uniaxial": ExpectedError(0.5)})
-    assert "not met for σ12 and uniaxial extension in 2 runs" in tolerance(both)
+    assert "not met for σ12 (2 runs) and uniaxial extension" in tolerance(both)
 
 
 def test_a_value_at_the_end_of_its_range_is_a_bound():
@@ -248,7 +248,7 @@ def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_
     named = replace(MELT, alternative=law)
     fit = replace(named, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None)
     assert fit.headline.startswith("Empirical fit: linear PTT with tr(σ) σ·σ. Error on unseen")
-    assert "6 % (95 %: 4–7 %), noise 0.25 %. " + law in fit.headline
+    assert "6 % (95 %: 4–7 %), besides 0.25 % noise. " + law in fit.headline
     assert fit.lines.count(law) == 0
     assert law in named.lines
 
