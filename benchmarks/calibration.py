@@ -15,7 +15,8 @@ differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves a
 runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve,
 20261214 for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one,
 20261216 for ``close-loop``; since effects start from every multiple of their inner times, 20261217
-for ``close-loop`` and 20261218 for ``compare``.
+for ``close-loop`` and 20261218 for ``compare``; since one integrator predicts, 20261219 for
+``close-loop`` and 20261220 for ``compare``.
 """
 
 from collections.abc import Callable
