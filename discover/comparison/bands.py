@@ -11,7 +11,7 @@ from discover.dataset import Run
 from discover.effects import ConstitutiveEffect
 from discover.forward import make_batch
 from discover.inference.engine.bands import quantiles
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.problem import NUISANCES
 from discover.linear_algebra_threads import in_one_thread

@@ -11,7 +11,7 @@ import numpy as np
 
 from discover.effects import AbstractEffect, ConstitutiveEffect, library_term, named_effects
 from discover.equations.parts import combined
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.posterior import posterior_of
 from discover.learners.results import RecoveredTerm
 from discover.loop.loop import Found, search

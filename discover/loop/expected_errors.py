@@ -9,7 +9,7 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.forward import make_batch
 from discover.inference.engine import Posterior
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.by_quantity import BEYOND
 from discover.protocols import FlowProtocol, in_flow, start_up

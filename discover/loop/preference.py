@@ -6,6 +6,7 @@ they do by more than so few runs can scatter.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 
@@ -19,7 +20,7 @@ from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
@@ -121,27 +122,32 @@ def is_thixotropic_maxwell(posterior: Posterior, fit: Fit) -> bool:
 
     The field calls that thixotropic   [Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147, 214].
     """
-    states = _states(posterior, fit)
-    if not states or not {state.effect for state in states} <= {*STRUCTURES}:
-        return False
-    found = _without_states(posterior, fit)
-    return found is not None and found[0] == "ucm"
+    states, law = _states_and_law(posterior, fit)
+    structures = bool(states) and {state.effect for state in states} <= {*STRUCTURES}
+    return structures and law is not None and law[0] == "ucm"
 
 
 def law_of(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
     """Return the law of the field that the fluid of a hypothesis is, with its constants."""
-    return _without_states(posterior, fit) if _states(posterior, fit) == () else None
+    states, law = _states_and_law(posterior, fit)
+    return law if states == () else None
 
 
-def _states(posterior: Posterior, fit: Fit) -> tuple[StatePart, ...] | None:
-    return states_of(posterior.problem.model, fit.theta, _present(posterior, fit))
+def _states_and_law(
+    posterior: Posterior, fit: Fit
+) -> tuple[tuple[StatePart, ...] | None, tuple[str, dict[str, float]] | None]:
+    """Return structure variables of a fluid, and the law of the field that it is without them.
 
-
-def _without_states(posterior: Posterior, fit: Fit) -> tuple[str, dict[str, float]] | None:
-    try:
-        return named_law(Equation.of_fluid(_fluid(posterior, fit)))
-    except InputError:
-        return None
+    Kept with the fit: several scans ask it of the same hypotheses.
+    """
+    if "law" not in fit.memory:
+        states = states_of(posterior.problem.model, fit.theta, _present(posterior, fit))
+        law = None
+        if states is not None:
+            with suppress(InputError):
+                law = named_law(Equation.of_fluid(_fluid(posterior, fit)))
+        fit.memory["law"] = states, law
+    return fit.memory["law"]
 
 
 def _present(posterior: Posterior, fit: Fit) -> list[str]:

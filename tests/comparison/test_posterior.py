@@ -15,7 +15,7 @@ from independent.noise import white
 import discover as dc
 from discover.comparison.hypotheses import terms_of
 from discover.effects import make_effect
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.loop.loop import Found
 
 MODULUS, MOBILITY, GAIN, NOISE = 100.0, 0.3, 1.1, 0.01

@@ -12,7 +12,7 @@ import discover as dc
 from discover.errors import InputError
 from discover.forward import DeclaredModel
 from discover.inference.engine import Posterior, Problem
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import weights_of
 from discover.loop.preference import first_of, is_thixotropic_maxwell, law_of
 from discover.loop.task import candidates_of

@@ -22,7 +22,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward import make_batch
-from discover.inference.engine.fits import Fit
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.possible_tests import PossibleTest, possible_tests
 from discover.inference.engine.posterior import Posterior
 from discover.protocols.kinematics import RecordedQuantity

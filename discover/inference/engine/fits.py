@@ -1,19 +1,18 @@
 """Likeliest constants of hypotheses, by Gauss-Newton steps of many fits side by side."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from scipy.linalg import solve_triangular
 
+from discover.inference.engine.fit import Fit
 from discover.inference.engine.linear_errors import LinearErrors
 from discover.inference.engine.noise import Noise, NoiseModel
 from discover.inference.engine.priors import Prior, Priors
 from discover.inference.engine.problem import Problem
 from discover.inference.engine.rows import Rows
-from discover.statistics import HALF_BAND
 
 _STEP = 1e-4
 """Of the width of a prior: step of a difference."""
@@ -35,88 +34,6 @@ again that must bring it nearer."""
 _ROUNDS_TO_GO = 10
 
 LOG_2PI = float(np.log(2.0 * np.pi))
-
-
-@dataclass(eq=False)
-class Fit:
-    """A hypothesis at its likeliest constants.
-
-    Attributes
-    ----------
-    names
-        Effects that are there, in alphabetical order.
-    theta
-        Constants of the model, shape (p,).
-    linear
-        What is linear in the records: gain, zeros, drifts, loadings, moduli, shape (q,).
-    priors
-        Of the constants that are free, by position.
-    predicted
-        Records as predicted, in Pa, shape (rows,).
-    log_likelihood, log_posterior
-        At these constants, over all noises.
-    noise
-        The likeliest noise.
-    slopes
-        Derivatives of `predicted` with respect to the coordinates, shape (rows, free). None where a
-        step has made them old.
-    jacobian
-        Derivatives of the records with respect to the coordinates, then of what is linear, shape
-        (rows, free + q).
-    covariance, root
-        Of these, and a factor of it: root rootᵀ, both of shape (free + q, free + q).
-    log_evidence
-        Of the records given the hypothesis, by Laplace's method; minus infinity where an effect
-        ends at zero or the law runs away.
-    at_an_end
-        Effects whose amplitude ended at zero.
-    without
-        A run whose rows the fit does not see; None for none.
-    shifts
-        What errors of the moduli do to `predicted`, in Pa, shape (rows, k).
-    """
-
-    names: tuple[str, ...]
-    theta: Float[np.ndarray, " p"]
-    linear: Float[np.ndarray, " q"]
-    priors: Priors
-    predicted: Float[np.ndarray, " rows"]
-    log_likelihood: float
-    log_posterior: float
-    noise: Noise
-    slopes: Float[np.ndarray, "rows free"] | None = None
-    jacobian: Float[np.ndarray, "rows n"] | None = None
-    covariance: Float[np.ndarray, "n n"] | None = None
-    root: Float[np.ndarray, "n n"] | None = None
-    log_evidence: float = -np.inf
-    at_an_end: tuple[str, ...] = ()
-    without: int | None = None
-    shifts: Float[np.ndarray, "rows k"] | None = None
-    damping: float = 1e-2
-    memory: dict = field(default_factory=dict)
-
-    @property
-    def free(self) -> list[int]:
-        """Positions of the free constants."""
-        return list(self.priors)
-
-    @property
-    def coordinates(self) -> Float[np.ndarray, " free"]:
-        """Coordinates of the free constants."""
-        return self.priors.coordinates(self.theta)
-
-    def at(self, coordinates: Float[np.ndarray, "*trials free"]) -> Float[np.ndarray, "*trials p"]:
-        """Return the constants at other coordinates of what is free, inside their ranges."""
-        ends = self.priors.ends
-        return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
-
-    def interval(self, position: int) -> tuple[float, float]:
-        """Return the 95 % interval of a free constant by this fit alone, inside its range."""
-        assert self.covariance is not None
-        at, prior = self.free.index(position), self.priors[position]
-        half = HALF_BAND * float(np.sqrt(self.covariance[at, at]))
-        low, high = np.clip(self.coordinates[at] + half * np.array([-1.0, 1.0]), *prior.ends)
-        return prior.to_value(low), prior.to_value(high)
 
 
 def _running_away() -> np.errstate:
