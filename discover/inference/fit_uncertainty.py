@@ -46,12 +46,8 @@ def what_is_left(
 ) -> LackOfFit:
     """Return whether what a fit leaves of the runs is noise.
 
-    Parameters
-    ----------
-    fit, batch, runs
-        The fit, and the runs of the batch in its order.
-    expectation
-        What a complete law may leave.
+    `fit`, `batch`, `runs`: the fit, and the runs of the batch in its order. `expectation`: what a
+    complete law may leave.
     """
     rows = zip(fit.residual, np.asarray(batch.weight), strict=True)
     residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]

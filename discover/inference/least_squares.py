@@ -21,16 +21,9 @@ _FREE = 1.0
 class Fit:
     """A fitted parameter vector.
 
-    Attributes
-    ----------
-    free
-        Positions of the fitted ones.
-    residual
-        Weighted residuals, shape (runs, n).
-    jacobian
-        Their derivatives in the fitted parameters, shape (free, runs, n).
-    damping, done
-        Of the descent that leads here.
+    `free`: positions of the fitted ones. `residual`: weighted residuals, shape (runs, n).
+    `jacobian`: their derivatives in the fitted parameters, shape (free, runs, n). `damping`,
+    `done`: of the descent that leads here.
     """
 
     theta: Float[np.ndarray, " p"]
@@ -74,16 +67,9 @@ def fit_batch(
     others go on where one is at its bound   [Kanzow, Yamashita & Fukushima 2004, J. Comput. Appl.
     Math. 172, 375].
 
-    Parameters
-    ----------
-    model, batch
-        What is fitted, to what.
-    starts, free
-        A parameter vector and the positions of its free parameters, for each problem.
-    max_steps
-        Largest number of steps.
-    tolerance
-        A problem is finished when a step lowers its cost by less than this fraction.
+    `model`, `batch`: what is fitted, to what. `starts`, `free`: a parameter vector and the
+    positions of its free parameters, for each problem. `max_steps`: largest number of steps.
+    `tolerance`: a problem is finished when a step lowers its cost by less than this fraction.
     """
     given = [
         Point(np.array(start, dtype=float), tuple(at))

@@ -71,12 +71,7 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     Every simple term of the library is fitted at either rate: a law too flexible to be believed
     tells which of them the fluid felt.
 
-    Parameters
-    ----------
-    declared
-        The model to start from.
-    runs
-        That are fitted.
+    `declared`: the model to start from. `runs`: that are fitted.
     """
     smooth = [smoothed(run) for run in runs]
     scatter = [

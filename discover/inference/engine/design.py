@@ -48,21 +48,11 @@ _BY_GAP = ("wall_slip", "tool_compliance")
 class NextTest:
     """One test, and what it is expected to decide.
 
-    Attributes
-    ----------
-    title
-        In words, with numbers.
-    quantity
-        What is recorded.
-    nats
-        Information that it is expected to give on which hypothesis is right.
-    evidence
-        Expected logarithm of the odds between each pair of hypotheses, shape (e, e).
-    samples, curves
-        Where each hypothesis predicts what, shapes (n,) and (e, n): times in s, of a flow curve
-        the rates in 1/s.
-    is_flow_curve
-        Whether it is one.
+    `title`: in words, with numbers. `quantity`: what is recorded. `nats`: information that it is
+    expected to give on which hypothesis is right. `evidence`: expected logarithm of the odds
+    between each pair of hypotheses, shape (e, e). `samples`, `curves`: where each hypothesis
+    predicts what, shapes (n,) and (e, n): times in s, of a flow curve the rates in 1/s.
+    `is_flow_curve`: whether it is one.
     """
 
     title: str
@@ -84,16 +74,9 @@ class NextTest:
 class NextTests:
     """The tests that were weighed, the most telling first.
 
-    Attributes
-    ----------
-    explanations
-        Sets of effects that are to be told apart, the likeliest first; twins each by itself.
-    probabilities
-        Of each, were it one of them.
-    noise
-        Relative, with what the likeliest leaves of the fitted runs.
-    tests
-        Among those that could be run.
+    `explanations`: sets of effects that are to be told apart, the likeliest first; twins each by
+    itself. `probabilities`: of each, were it one of them. `noise`: relative, with what the
+    likeliest leaves of the fitted runs. `tests`: among those that could be run.
     """
 
     explanations: tuple[tuple[str, ...], ...] = ()

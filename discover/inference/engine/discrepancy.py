@@ -71,18 +71,11 @@ _MOST = 12
 class Member:
     """One discrepancy of the grid.
 
-    Attributes
-    ----------
-    curve, stiffness, growth, terms
-        ρ over the noise, half swings, power of the rate, τ.
-    which, correlation
-        Its curve in the grid, zero for none, and the correlation of the noise beside it.
-    log_weight
-        Log of its probability among all of the hypothesis.
-    noise
-        Size of the noise over the records.
-    mean, root
-        Of the constants and terms, in units of their priors: the covariance is noise² root rootᵀ.
+    `curve`, `stiffness`, `growth`, `terms`: ρ over the noise, half swings, power of the rate, τ.
+    `which`, `correlation`: its curve in the grid, zero for none, and the correlation of the noise
+    beside it. `log_weight`: log of its probability among all of the hypothesis. `noise`: size of
+    the noise over the records. `mean`, `root`: of the constants and terms, in units of their
+    priors: the covariance is noise² root rootᵀ.
     """
 
     curve: float
@@ -100,14 +93,8 @@ class Member:
 class _Products(NamedTuple):
     """Products of what was left and columns, curves being integrated out; and those with curves.
 
-    Attributes
-    ----------
-    gram
-        Shape (1 + grid, 1 + m, 1 + m), without a curve first.
-    log_determinant
-        Shape (1 + grid,).
-    cross, inner
-        Of curves with the others and with themselves, of each run.
+    `gram`: shape (1 + grid, 1 + m, 1 + m), without a curve first. `log_determinant`: shape (1 +
+    grid,). `cross`, `inner`: of curves with the others and with themselves, of each run.
     """
 
     gram: Float[np.ndarray, "grid n n"]
@@ -119,22 +106,11 @@ class _Products(NamedTuple):
 class Discrepancy:
     """What the records say beside a hypothesis that none of its constants does.
 
-    Parameters
-    ----------
-    fitter, fit
-        A hypothesis with derivatives, and what fitted it.
-    smallest
-        What the least effect of the hypothesis takes away over the noise: a discrepancy is as
-        likely of any size up to that.
-
-    Attributes
-    ----------
-    names
-        Effects and terms that are not in the hypothesis.
-    log_factor
-        Log of how many times likelier the records are with a discrepancy than without.
-    members
-        The likeliest of the grid.
+    `fitter`, `fit`: a hypothesis with derivatives, and what fitted it. `smallest`: what the least
+    effect of the hypothesis takes away over the noise: a discrepancy is as likely of any size up to
+    that. `names`: effects and terms that are not in the hypothesis. `log_factor`: log of how many
+    times likelier the records are with a discrepancy than without. `members`: the likeliest of the
+    grid.
     """
 
     def __init__(self, fitter: Fitter, fit: Fit, smallest: float = np.inf):

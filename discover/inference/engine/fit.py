@@ -14,39 +14,18 @@ from discover.statistics import HALF_BAND
 class Fit:
     """A hypothesis at its likeliest constants.
 
-    Attributes
-    ----------
-    names
-        Effects that are there, in alphabetical order.
-    theta
-        Constants of the model, shape (p,).
-    linear
-        What is linear in the records: gain, zeros, drifts, loadings, moduli, shape (q,).
-    priors
-        Of the constants that are free, by position.
-    predicted
-        Records as predicted, in Pa, shape (rows,).
-    log_likelihood, log_posterior
-        At these constants, over all noises.
-    noise
-        The likeliest noise.
-    slopes
-        Derivatives of `predicted` with respect to the coordinates, shape (rows, free). None where a
-        step has made them old.
-    jacobian
-        Derivatives of the records with respect to the coordinates, then of what is linear, shape
-        (rows, free + q).
-    covariance, root
-        Of these, and a factor of it: root rootᵀ, both of shape (free + q, free + q).
-    log_evidence
-        Of the records given the hypothesis, by Laplace's method; minus infinity where an effect
-        ends at zero or the law runs away.
-    at_an_end
-        Effects whose amplitude ended at zero.
-    without
-        A run whose rows the fit does not see; None for none.
-    shifts
-        What errors of the moduli do to `predicted`, in Pa, shape (rows, k).
+    `names`: effects that are there, in alphabetical order. `theta`: constants of the model, shape
+    (p,). `linear`: what is linear in the records: gain, zeros, drifts, loadings, moduli, shape
+    (q,). `priors`: of the constants that are free, by position. `predicted`: records as predicted,
+    in Pa, shape (rows,). `log_likelihood`, `log_posterior`: at these constants, over all noises.
+    `noise`: the likeliest noise. `slopes`: derivatives of `predicted` with respect to the
+    coordinates, shape (rows, free). None where a step has made them old. `jacobian`: derivatives of
+    the records with respect to the coordinates, then of what is linear, shape (rows, free + q).
+    `covariance`, `root`: of these, and a factor of it: root rootᵀ, both of shape (free + q, free +
+    q). `log_evidence`: of the records given the hypothesis, by Laplace's method; minus infinity
+    where an effect ends at zero or the law runs away. `at_an_end`: effects whose amplitude ended at
+    zero. `without`: a run whose rows the fit does not see; None for none. `shifts`: what errors of
+    the moduli do to `predicted`, in Pa, shape (rows, k).
     """
 
     names: tuple[str, ...]

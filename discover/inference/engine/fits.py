@@ -44,10 +44,7 @@ def _running_away() -> np.errstate:
 class Fitter:
     """Fits of hypotheses of a problem to some of its rows.
 
-    Parameters
-    ----------
-    problem, rows
-        The problem, and what is predicted of it.
+    `problem`, `rows`: the problem, and what is predicted of it.
     """
 
     def __init__(self, problem: Problem, rows: Rows):

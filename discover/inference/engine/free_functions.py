@@ -68,20 +68,11 @@ _RESOLVED = 0.05
 class FreeFunction:
     """A function of one variable that explains what effects with a name leave.
 
-    Attributes
-    ----------
-    variable
-        What it depends on.
-    beside
-        Effects in the hypothesis with it.
-    log_odds
-        Against all that has a name, and any discrepancy of another kind, by the fitted runs.
-    log_odds_in_all
-        The same by all runs, as explanations are weighed.
-    grid, value, low95, high95
-        The curve with its 95 % band, shape (n,), in Pa or as a relative change.
-    nearest
-        A closed form that is it within its uncertainty; None if none of those tried is.
+    `variable`: what it depends on. `beside`: effects in the hypothesis with it. `log_odds`: against
+    all that has a name, and any discrepancy of another kind, by the fitted runs. `log_odds_in_all`:
+    the same by all runs, as explanations are weighed. `grid`, `value`, `low95`, `high95`: the curve
+    with its 95 % band, shape (n,), in Pa or as a relative change. `nearest`: a closed form that is
+    it within its uncertainty; None if none of those tried is.
     """
 
     variable: Variable
@@ -135,12 +126,8 @@ class _WithColumns(LinearErrors):
 class WithFunction(Fitter):
     """Fits of hypotheses with a function of one variable beside them.
 
-    Parameters
-    ----------
-    fitter
-        What fits them without.
-    variable, width
-        Of the function: what it depends on, and how much its slope changes at a knot.
+    `fitter`: what fits them without. `variable`, `width`: of the function: what it depends on, and
+    how much its slope changes at a knot.
     """
 
     def __init__(self, fitter: Fitter, variable: Variable, width: float):
@@ -178,12 +165,8 @@ class WithFunction(Fitter):
 class WithSlip(Fitter):
     """Fits of hypotheses with slip beside them that is a function of the stress.
 
-    Parameters
-    ----------
-    fitter
-        What fits them without.
-    width
-        How much the slope of the curve changes at a bend, over the typical rate and stress.
+    `fitter`: what fits them without. `width`: how much the slope of the curve changes at a bend,
+    over the typical rate and stress.
     """
 
     def __init__(self, fitter: Fitter, width: float):

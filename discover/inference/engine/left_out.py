@@ -32,10 +32,7 @@ order, which on measured sets is off by a tenth."""
 def left_out(fitter: Fitter, fits: Sequence[Fit]) -> Float[np.ndarray, "fits runs"]:
     """Return the error of each run in fits without it, over its size; all are fitted side by side.
 
-    Parameters
-    ----------
-    fitter, fits
-        Hypotheses fitted to all runs, and what fitted them.
+    `fitter`, `fits`: hypotheses fitted to all runs, and what fitted them.
     """
     rows, first = fitter.rows, fitter.problem.model.instants.start
     starts = []

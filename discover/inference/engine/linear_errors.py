@@ -21,17 +21,9 @@ _NEXT_TO_NONE = 1e-9
 class LinearErrors:
     """Gain of all runs; zero, drift and, where each is its own, loading of each; errors of moduli.
 
-    Parameters
-    ----------
-    problem, rows
-        What is known of them, and the rows that have them.
-    moduli
-        How many independent errors the moduli have.
-
-    Attributes
-    ----------
-    deviations
-        What is known of each kind, all about zero, with its place among the sizes.
+    `problem`, `rows`: what is known of them, and the rows that have them. `moduli`: how many
+    independent errors the moduli have. `deviations`: what is known of each kind, all about zero,
+    with its place among the sizes.
     """
 
     def __init__(self, problem: Problem, rows: Rows, moduli: int):
@@ -88,12 +80,8 @@ class LinearErrors:
     ) -> Float[np.ndarray, "rows q"]:
         """Return what one of each does to the records, in Pa.
 
-        Parameters
-        ----------
-        predicted
-            Records as the model alone predicts them.
-        shifts
-            What errors of the moduli do to these.
+        `predicted`: records as the model alone predicts them. `shifts`: what errors of the moduli
+        do to these.
         """
         loadings = self._own * predicted[:, None] if self._loaded else self._own[:, :0]
         return np.column_stack([predicted, self._zeros, loadings, shifts])

@@ -61,14 +61,8 @@ class Noise:
 class NoiseModel:
     """The likelihood of residuals of rows, with noise integrated out.
 
-    Parameters
-    ----------
-    rows
-        The records.
-    without
-        A run that is left out; None for none.
-    known
-        Size over the records, where it is known.
+    `rows`: the records. `without`: a run that is left out; None for none. `known`: size over the
+    records, where it is known.
     """
 
     def __init__(self, rows: Rows, without: int | None = None, known: float | None = None):

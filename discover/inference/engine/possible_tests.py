@@ -39,12 +39,7 @@ _STEPS = (0.5, 3.0)
 class PossibleTest:
     """A test that could be run.
 
-    Attributes
-    ----------
-    title
-        In words, with numbers.
-    run
-        It, with zeros for what would be recorded.
+    `title`: in words, with numbers. `run`: it, with zeros for what would be recorded.
     """
 
     title: str
@@ -54,10 +49,7 @@ class PossibleTest:
 def possible_tests(runs: Sequence[Run], relaxation_time: float) -> list[PossibleTest]:
     """Return tests of every kind, the simplest to run first; none without a run at a given rate.
 
-    Parameters
-    ----------
-    relaxation_time
-        The longest, in s.
+    `relaxation_time`: the longest, in s.
     """
     at_rate = [run for run in runs if run.protocol.control in FOLLOWED]
     rates = [float(np.max(np.abs(run.rate))) for run in at_rate]

@@ -56,14 +56,8 @@ class Explanation:
 class Size:
     """How large a discrepancy is, over the root mean square of the records.
 
-    Attributes
-    ----------
-    size, ci95
-        Of all fitted runs.
-    by_run
-        By name of the run.
-    grows_with_rate
-        Power of the shear rate with which it grows, if the records tell.
+    `size`, `ci95`: of all fitted runs. `by_run`: by name of the run. `grows_with_rate`: power of
+    the shear rate with which it grows, if the records tell.
     """
 
     size: float
@@ -76,23 +70,12 @@ class Size:
 class Posterior:
     """What records say of a problem.
 
-    Attributes
-    ----------
-    problem
-        The records, the model and the candidates.
-    search
-        Hypotheses fitted to the runs that are fitted.
-    explanations
-        With their probabilities, the likeliest first.
-    unexplained
-        Probability that none of them is all that is there.
-    fits
-        Hypotheses that are possible, fitted to the fitted runs, with their probabilities.
-    left
-        What the likeliest hypothesis leaves of the fitted runs; None where none can be followed.
-    by_left_out
-        Hypotheses to rely on where none is all there is, as they predict fitted runs that are left
-        out, with their weights.
+    `problem`: the records, the model and the candidates. `search`: hypotheses fitted to the runs
+    that are fitted. `explanations`: with their probabilities, the likeliest first. `unexplained`:
+    probability that none of them is all that is there. `fits`: hypotheses that are possible, fitted
+    to the fitted runs, with their probabilities. `left`: what the likeliest hypothesis leaves of
+    the fitted runs; None where none can be followed. `by_left_out`: hypotheses to rely on where
+    none is all there is, as they predict fitted runs that are left out, with their weights.
     """
 
     problem: Problem
@@ -124,10 +107,7 @@ class Posterior:
     def with_something_else(self, log_odds: float) -> "Posterior":
         """Return the posterior beside a further explanation that has no name.
 
-        Parameters
-        ----------
-        log_odds
-            Of that, over all that is possible so far.
+        `log_odds`: of that, over all that is possible so far.
         """
         share = 1.0 / (1.0 + float(np.exp(min(log_odds, 700.0))))
         explanations = tuple(
@@ -216,14 +196,8 @@ class Posterior:
 def explain(problem: Problem, most: int = 3, say: Callable[[str], None] | None = None) -> Posterior:
     """Return the posterior of a problem, hypotheses being sets of up to so many effects.
 
-    Parameters
-    ----------
-    problem
-        Records, model and candidates.
-    most
-        Effects in one set.
-    say
-        Called with a line of text now and then.
+    `problem`: records, model and candidates. `most`: effects in one set. `say`: called with a line
+    of text now and then.
     """
     return posterior_of(Search(Fitter(problem, problem.fitted), most, say).run())
 

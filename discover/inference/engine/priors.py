@@ -15,14 +15,10 @@ Kind = Literal["normal", "amplitude", "logarithm"]
 class Prior:
     """What is known of one constant.
 
-    Attributes
-    ----------
-    kind
-        ``normal``: about `middle` with the standard deviation `width`. ``amplitude``: Cauchy about
-        zero, for what is mostly small and may be large   [Gelman 2006, Bayesian Anal. 1, 515].
-        ``logarithm``: the logarithm is normal about that of `middle`, with the deviation `width`.
-    low, high
-        Ends of the physical range, in the unit of the constant.
+    `kind`: ``normal``: about `middle` with the standard deviation `width`. ``amplitude``: Cauchy
+    about zero, for what is mostly small and may be large   [Gelman 2006, Bayesian Anal. 1, 515].
+    ``logarithm``: the logarithm is normal about that of `middle`, with the deviation `width`.
+    `low`, `high`: ends of the physical range, in the unit of the constant.
     """
 
     kind: Kind
@@ -130,13 +126,9 @@ class Priors(dict[int, Prior]):
 class Deviations:
     """What is known of deviations about zero that have one common size.
 
-    Attributes
-    ----------
-    size
-        Their standard deviation, or its usual value where it is not known.
-    known
-        Degrees of freedom by which it is: the square of the standard deviation is size²·known/χ²,
-        and integrated out   [Gelman et al. 2013, Bayesian Data Analysis, ch. 5].
+    `size`: their standard deviation, or its usual value where it is not known. `known`: degrees of
+    freedom by which it is: the square of the standard deviation is size²·known/χ², and integrated
+    out   [Gelman et al. 2013, Bayesian Data Analysis, ch. 5].
     """
 
     size: float

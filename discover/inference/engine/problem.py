@@ -40,14 +40,8 @@ TERM_ODDS = 0.15
 class Nuisance:
     """What every sound instrument has a little of, as an effect with a narrow prior.
 
-    Attributes
-    ----------
-    effect
-        Name of the effect whose amplitude it is.
-    sound
-        Standard deviation in a sound instrument, in the scale of the effect's first trial.
-    source
-        Where that comes from.
+    `effect`: name of the effect whose amplitude it is. `sound`: standard deviation in a sound
+    instrument, in the scale of the effect's first trial. `source`: where that comes from.
     """
 
     effect: str
@@ -87,20 +81,11 @@ SCATTER_KNOWN = 1.0
 class Problem:
     """Records of runs under one model with all its candidates.
 
-    Parameters
-    ----------
-    declared
-        The model to start from.
-    candidates
-        Effects that may be there.
-    fitted, predicted
-        Runs that are fitted, and those that are predicted.
-    loading
-        Relative deviation by which loadings of the sample differ, if each run is its own.
-    noise
-        Of the records, relative to their size, where it is known.
-    computed
-        Whether the records were computed, without what every sound instrument has a little of.
+    `declared`: the model to start from. `candidates`: effects that may be there. `fitted`,
+    `predicted`: runs that are fitted, and those that are predicted. `loading`: relative deviation
+    by which loadings of the sample differ, if each run is its own. `noise`: of the records,
+    relative to their size, where it is known. `computed`: whether the records were computed,
+    without what every sound instrument has a little of.
     """
 
     def __init__(

@@ -21,24 +21,12 @@ _RUNAWAY = 1e12
 class Rows:
     """What was recorded in runs, the samples of one after those of the other.
 
-    Attributes
-    ----------
-    runs, batch
-        The runs, and their layout for prediction.
-    seen
-        Where the rows stand among the padded records, shape (runs, n).
-    recorded
-        In Pa, or of creep a strain, shape (rows,).
-    size
-        Of each value: the root mean square of its record, or the value itself in a curve.
-    time
-        Over the duration of the run.
-    run
-        Which run each row belongs to.
-    gap
-        Samples since the one before in the same run; zero where there is none.
-    fastest
-        Largest shear rate of each run, in 1/s, shape (runs,).
+    `runs`, `batch`: the runs, and their layout for prediction. `seen`: where the rows stand among
+    the padded records, shape (runs, n). `recorded`: in Pa, or of creep a strain, shape (rows,).
+    `size`: of each value: the root mean square of its record, or the value itself in a curve.
+    `time`: over the duration of the run. `run`: which run each row belongs to. `gap`: samples since
+    the one before in the same run; zero where there is none. `fastest`: largest shear rate of each
+    run, in 1/s, shape (runs,).
     """
 
     runs: tuple[Run, ...]

@@ -30,14 +30,8 @@ Key = frozenset[str]
 class Search:
     """Hypotheses that were fitted, by the set of their effects.
 
-    Parameters
-    ----------
-    fitter
-        What fits them.
-    most
-        Effects in one set.
-    say
-        Called with a line of text now and then.
+    `fitter`: what fits them. `most`: effects in one set. `say`: called with a line of text now and
+    then.
     """
 
     def __init__(self, fitter: Fitter, most: int = 3, say: Callable[[str], None] | None = None):

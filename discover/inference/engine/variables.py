@@ -27,17 +27,10 @@ _DECAY = 0.25
 class Variable:
     """What a function depends on, and what it does to a record.
 
-    Attributes
-    ----------
-    slot, name, unit
-        Of the function, as the contract names it: ``recorded_stress``, ``rate``, ``drift`` or
-        ``network``.
-    values
-        At each row; None for the stress, which is that of the fluid as predicted.
-    largest
-        In the fitted runs.
-    is_factor
-        Whether the stress is multiplied.
+    `slot`, `name`, `unit`: of the function, as the contract names it: ``recorded_stress``,
+    ``rate``, ``drift`` or ``network``. `values`: at each row; None for the stress, which is that of
+    the fluid as predicted. `largest`: in the fitted runs. `is_factor`: whether the stress is
+    multiplied.
     """
 
     slot: str
@@ -93,14 +86,9 @@ class Response(Variable):
     Weights of lags decay with the lag and change smoothly on the way, as those of a stable linear
     system do   [Chen, Ohlsson & Ljung 2012, Automatica 48, 1525: the TC kernel].
 
-    Attributes
-    ----------
-    before, after
-        At each row and lag: the rows before and after that time in the same run; -1 is at rest.
-    share
-        How far that time lies on the way to the next row.
-    root
-        What one of each coefficient adds to the weight of each lag.
+    `before`, `after`: at each row and lag: the rows before and after that time in the same run; -1
+    is at rest. `share`: how far that time lies on the way to the next row. `root`: what one of each
+    coefficient adds to the weight of each lag.
     """
 
     before: Int[np.ndarray, "rows lags"] = None  # type: ignore[assignment]  # `of` sets them
