@@ -45,7 +45,7 @@ from discover.loop.parts import (
 from discover.loop.reading import Reading, read_residual
 from discover.loop.run_record import RunRecord
 from discover.plain_numbers import json_text, plain
-from discover.summary_view import Estimate, PageView, SummaryView, table_of
+from discover.summary_view import Estimate, PageView, SummaryView
 from discover.words import percent_of
 
 if TYPE_CHECKING:
@@ -240,7 +240,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
         ]
         return float(np.mean(np.concatenate(inside))) if inside else None
 
-    def table(self) -> pd.DataFrame:
+    def to_dataframe(self) -> pd.DataFrame:
         """Return the effects that were added, one line for each of their parameters."""
         lines = []
         for number, stage in enumerate(self.stages, 1):
@@ -255,10 +255,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
 
     def _estimates(self) -> list[Estimate]:
         return self.answer.estimates
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return `table`: the effects that were added, one line for each of their parameters."""
-        return self.table()
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return explanations, constants and predictions with named dimensions, for xarray.
@@ -279,18 +275,6 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
 
         return labelled_loop(self)
 
-    def ranking_table(self, stage: int = 0) -> pd.DataFrame:
-        """Return the candidates at one stage, counted from 0, the best first.
-
-        `stage`: from 0; the last one holds those that earned nothing.
-        """
-        lines = [asdict(candidate) for candidate in self.rankings[stage]]
-        return pd.DataFrame(lines, columns=["effect", "kind", "score", "evidence", "error"])
-
-    def runs_table(self) -> pd.DataFrame:
-        """Return the relative error of every run, by the declared model and after each stage."""
-        return table_of(self.records).set_index("run")
-
     def errors_table(self) -> pd.DataFrame:
         """Return the mean relative errors before and after, on fitted and on held-out runs."""
         pairs = {"before": asdict(self.error_before), "after": asdict(self.error_after)}
@@ -299,7 +283,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def _shown(self) -> Iterable[Any]:
         yield from self.answer.lines
         yield self.errors_table()
-        yield self.table()
+        yield self.to_dataframe()
         try:
             yield self.equation()
         except InputError as error:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -48,12 +47,6 @@ class RunRecord:
     band: Float[np.ndarray, "2 n"] | None = None
     control: Control = "rate"
     by_explanation: Float[np.ndarray, "explanations n"] | None = None
-
-    def line(self) -> dict[str, Any]:
-        """Return the run as one line of a table: its errors, the declared model's first."""
-        stages = ["declared", *(f"stage_{i}" for i in range(1, len(self.errors)))]
-        errors = dict(zip(stages, map(float, self.errors), strict=True))
-        return {"run": self.name, "held_out": self.held_out, **errors}
 
     @property
     def fastest(self) -> float:

@@ -11,15 +11,9 @@ Examples
 
 from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
 from discover.callable_package import answer_calls
-from discover.simulate.solve import SimulationError, observe, simulate, simulate_homogeneous_flow
+from discover.simulate.solve import SimulationError, observe, simulate
 from discover.simulate.synthetic import synthetic_dataset
 
-__all__ = [
-    "SimulationError",
-    "observe",
-    "simulate",
-    "simulate_homogeneous_flow",
-    "synthetic_dataset",
-]
+__all__ = ["SimulationError", "observe", "simulate", "synthetic_dataset"]
 
 answer_calls(__name__, simulate)

@@ -12,7 +12,6 @@ from discover.forward.by_diffrax import exponential_steps, stress_of, vector_fie
 from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_in_batch, solve_batch
 from discover.forward.grid import had_gone_on
-from discover.laws.base import AbstractConstitutiveLaw
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
 from discover.programs import compiled, on_device
@@ -189,53 +188,3 @@ def _padded(times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " m"]:
     """Return the times with a few more just after the end."""
     step = 1e-6 * max(float(times[-1]), 1e-12)
     return np.concatenate([times, times[-1] + step * np.arange(1, -times.size % _BUCKET + 1)])
-
-
-def _change_in_any_flow(t, stress, args):
-    law, velocity_gradient = args
-    return law.stress_rate(stress, velocity_gradient(t))
-
-
-@compiled
-def _solve_in_any_flow(law, velocity_gradient, times, rtol, atol):
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(_change_in_any_flow),
-        diffrax.Tsit5(),
-        0.0,
-        times[-1],
-        None,
-        jnp.zeros((3, 3)),
-        args=(law, velocity_gradient),
-        saveat=diffrax.SaveAt(ts=times),
-        stepsize_controller=diffrax.ClipStepSizeController(
-            diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times
-        ),
-        max_steps=MAX_STEPS,
-        throw=False,
-    )
-    return solution.ys, solution.result == diffrax.RESULTS.successful
-
-
-def simulate_homogeneous_flow(
-    law: AbstractConstitutiveLaw,
-    velocity_gradient,
-    times: Float[np.ndarray, " n"],
-    rtol: float = 1e-8,
-    atol: float = 1e-10,
-) -> Float[np.ndarray, "n 3 3"]:
-    """Return the full dimensionless stress of a law in any homogeneous flow from rest.
-
-    `velocity_gradient`: function of time that returns L, shape (3, 3); `jax.tree_util.Partial` of
-    other arrays share a program. `times`: dimensionless, increasing, from 0 on. Raises
-    SimulationError if the stress diverges, as in UCM beyond a critical extension rate.
-    """
-    found, successful = _solve_in_any_flow(
-        law, velocity_gradient, jnp.asarray(times, dtype=float), rtol, atol
-    )
-    stress = np.asarray(found)
-    if not successful or not np.all(np.isfinite(stress)):
-        raise SimulationError(
-            f"The law could not be integrated to t = {float(times[-1]):g}: its stress diverges. "
-            "Check its parameters and the rate of deformation."
-        )
-    return stress

@@ -131,15 +131,10 @@ def test_the_page_says_which_modes_the_data_leave_open(tmp_path, no_pictures):
 
 def test_a_loop_shows_itself_as_tables():
     result = loop_result()
-    line = result.table().iloc[0]
+    line = result.to_dataframe().iloc[0]
     assert (line["effect"], line["value"], line["low"], line["high"]) == (
         "stress_gain", 0.7, 0.69, 0.71,
     )  # fmt: skip
-    assert result.ranking_table(1)["score"].tolist() == [0.9]
-    runs = result.runs_table()
-    assert runs.index.tolist() == [record.name for record in result.records]
-    for record in result.records:
-        assert runs.loc[record.name, "declared"] == record.errors[0]
     assert result.errors_table().loc["after", "fit"] == result.error_after.fit
     assert "stress_gain" in result._repr_html_()
     assert result._repr_html_().startswith(f"<p>{result.answer.headline}</p>")

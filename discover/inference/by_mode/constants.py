@@ -14,8 +14,6 @@ _DECADE = 10.0
 
 _ROUNDING = 1e-9
 
-_POLYNOMIAL = 2  # highest degree in log λ
-
 
 @dataclass(frozen=True)
 class StageParameter:
@@ -68,15 +66,12 @@ class ModeConstant:
         Whether these data leave it open: the interval leaves hardly a value out, the runs are as
         well described whatever this mode's constant, or it stands at the upper end of its range.
         What stands here then comes from the other modes and the smooth function alone.
-    other_laws
-        Effects which this mode alone may follow instead, as far as these data tell.
     """
 
     relaxation_time_s: float
     value: float
     ci95: tuple[float, float] | None
     left_open: bool
-    other_laws: tuple[str, ...] = ()
 
     @property
     def width(self) -> float:
@@ -99,23 +94,12 @@ class ConstantByMode(StageParameter):
         For each degree over one constant.
     modes
         In the order of the declared modes.
-    own
-        How many modes deviate from the polynomial.
-    is_raised
-        Whether a lower degree fits these runs as well, and runs held out refute it.
     """
 
     mean_time_s: float
     degree: int
     evidence: tuple[float, ...]
     modes: tuple[ModeConstant, ...]
-    own: int = field(default=0, kw_only=True)
-    is_raised: bool = field(default=False, kw_only=True)
-
-    @property
-    def n_constants(self) -> int:
-        """Number of constants fitted."""
-        return 1 + min(self.degree, _POLYNOMIAL) + self.own
 
     @property
     def told(self) -> list[ModeConstant]:
@@ -129,8 +113,3 @@ class ConstantByMode(StageParameter):
     def open_times_s(self) -> list[float]:
         """Relaxation times of the modes that are left open, the fastest first."""
         return sorted(mode.relaxation_time_s for mode in self.modes if mode.ci95 is None)
-
-    @property
-    def other_laws(self) -> dict[float, tuple[str, ...]]:
-        """Effects which one mode alone may follow instead, by its relaxation time in s."""
-        return {mode.relaxation_time_s: mode.other_laws for mode in self.modes if mode.other_laws}

@@ -82,8 +82,6 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     )
     tried = f" (evidence over one constant{which}: {listed(gains)})"
     text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
-    if constant.is_raised:
-        text += ", since runs held out refute less, which the fitted ones would be content with"
     if not constant.degree:
         return f"{text}: {significant(constant.value, 2)}. {_allowed(constant)}"
     known = [mode for mode in constant.modes if not mode.left_open]

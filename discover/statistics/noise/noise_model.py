@@ -199,21 +199,9 @@ def read_times(record: Float[np.ndarray, " n"]) -> int:
     return often if np.mean(lengths == often) > _ALIKE else 1
 
 
-_ROUNDING = 1e-9  # of the largest singular value, columns made of length one
-
-
 def rms(values: ArrayLike) -> float:
     """Return the root of the mean of the squares."""
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def without(columns: Float[np.ndarray, "m q"], values: np.ndarray) -> np.ndarray:
-    """Return the part of values, shape (m,) or (m, k), that the columns cannot describe."""
-    norms = np.linalg.norm(columns, axis=0)
-    kept = columns[:, norms > 0.0] / norms[norms > 0.0]
-    if not kept.shape[1]:
-        return values
-    return values - kept @ np.linalg.lstsq(kept, values, rcond=_ROUNDING)[0]
 
 
 def squared_distance(
