@@ -28,7 +28,7 @@ from discover.loop.final_model import (
     states_of,
 )
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import CandidateScore, FreeForm, LawFit, Stage
+from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
@@ -135,17 +135,6 @@ class Ended(Path):
             return None
         missed = self.posterior.missed(self.posterior.left.fit)
         return float(np.sqrt(np.mean(missed**2))) if len(missed) > 1 else None
-
-    @cached_property
-    def free_form(self) -> tuple[FreeForm, ...]:
-        """Functions of one variable that are likelier than all that has a name."""
-        return tuple(
-            FreeForm(
-                one.variable.slot, one.variable.name, one.variable.unit, one.beside,
-                one.grid, one.value, one.low95, one.high95, one.nearest,
-            )
-            for one in self.curves
-        )  # fmt: skip
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
@@ -338,7 +327,7 @@ def result_of(
         explanations=ended.explanations,
         next_tests=tests,
         laws=laws,
-        free_form=ended.free_form,
+        free_form=tuple(ended.curves),
         discrepancy=ended.discrepancy,
         spread_of_laws={} if ended.without_fluid else spread_of_laws(ended.posterior, ended.fit),
         left_out_error=ended.left_out_error,

@@ -16,7 +16,7 @@ from discover.forward import DeclaredModel
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fits import Fitter
-from discover.inference.engine.free_functions import FreeFunction, free_functions
+from discover.inference.engine.free_functions import FreeForm, free_functions
 from discover.inference.engine.inelastic import inelastic
 from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread
@@ -196,7 +196,7 @@ class Found:
     task: Task
     posterior: Posterior
     tried: Mapping[str, Search]
-    curves: Sequence[FreeFunction] = ()
+    curves: Sequence[FreeForm] = ()
 
     def with_curves(self) -> "Found":
         """Return what was found with free functions of one variable among the hypotheses."""
@@ -205,7 +205,7 @@ class Found:
         if not curves:
             return self
         odds = float(np.logaddexp.reduce([curve.weight for curve in curves]))
-        shown = [curve for curve in curves if curve.is_shown]
+        shown = [curve.form for curve in curves if curve.is_shown]
         return replace(self, posterior=self.posterior.with_something_else(odds), curves=shown)
 
     @cached_property

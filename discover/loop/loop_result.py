@@ -26,6 +26,7 @@ from discover.equations.parts import LawParts
 from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests
+from discover.inference.engine.free_functions import FreeForm
 from discover.laws import LAWS, Fluid
 from discover.laws.registry import name_of
 from discover.loop.answering import loop_answer
@@ -36,7 +37,6 @@ from discover.loop.parts import (
     ErrorPair,
     Explanations,
     Fold,
-    FreeForm,
     LawFit,
     NearestLaw,
     Stage,

@@ -4,9 +4,6 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
-import numpy as np
-from jaxtyping import Float
-
 from discover.equations import Equation, equation_to_json
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS
@@ -195,27 +192,6 @@ class NearestLaw:
             "size": self.size,
             "equation": equation_to_json(self.equation),
         }
-
-
-@dataclass(frozen=True)
-class FreeForm:
-    """A smooth function of one variable that explains what named effects leave.
-
-    `slot`: where it acts, such as ``relaxation`` or ``slip``. `variable`, `unit`: of what it is a
-    function, and its unit. `beside`: effects in the model with it. `grid`, `value`, `low95`,
-    `high95`: the curve with its 95 % band, shape (n,). `nearest`: name of a closed form that is it
-    within its uncertainty; None if none is.
-    """
-
-    slot: str
-    variable: str
-    unit: str
-    beside: tuple[str, ...]
-    grid: Float[np.ndarray, " n"]
-    value: Float[np.ndarray, " n"]
-    low95: Float[np.ndarray, " n"]
-    high95: Float[np.ndarray, " n"]
-    nearest: str | None
 
 
 @dataclass(frozen=True)

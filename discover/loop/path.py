@@ -14,7 +14,7 @@ from discover.inference.engine import Explanation as Told
 from discover.inference.engine import Posterior
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.free_functions import FreeFunction
+from discover.inference.engine.free_functions import FreeForm
 from discover.inference.engine.rows import Rows
 from discover.inference.engine.search import Search
 from discover.loop.parts import ErrorPair, Explanation, Explanations, Verdict
@@ -56,7 +56,7 @@ class Path:
     without_fluid: bool
     order: Sequence[str]
     most: int
-    curves: Sequence[FreeFunction] = ()
+    curves: Sequence[FreeForm] = ()
 
     @cached_property
     def verdict(self) -> Verdict:

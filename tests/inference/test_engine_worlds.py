@@ -54,7 +54,7 @@ def test_among_all_candidates_the_verdicts_are_those_among_a_few(tmp_path):
     assert verdicts == ["effects_added", "no_effect_needed", "unexplained"]
     assert found[0].explanations[0].members[0] == ("giesekus_mobility",)
     (curve,) = free_functions(ask(tmp_path, *CLIPPED)[0])
-    assert (curve.variable.slot, curve.beside) == ("recorded_stress", ("ptt_exponential",))
+    assert (curve.form.slot, curve.form.beside) == ("recorded_stress", ("ptt_exponential",))
 
 
 def inside(posterior, problem):
@@ -122,15 +122,15 @@ def test_one_explanation_alone_asks_for_no_test_to_tell_it_from_another(asked):
 def test_a_transducer_that_saturates_is_told_as_a_function_of_the_stress(tmp_path):
     posterior, _, world = ask(tmp_path, *CLIPPED, FEW)
     found = [one for one in free_functions(posterior) if one.is_shown]
-    assert [one.variable.slot for one in found] == ["recorded_stress"]
+    assert [one.form.slot for one in found] == ["recorded_stress"]
     (curve,) = found
     assert posterior.with_something_else(curve.log_odds).verdict == "unexplained"
-    assert "ptt_exponential" in curve.beside
-    assert curve.nearest == "clipped"
+    assert "ptt_exponential" in curve.form.beside
+    assert curve.form.nearest == "clipped"
     # beyond its limit a clipped record lacks what the stress exceeds it by, and below it nothing
     limit = max(np.max(np.abs(run.stress)) for run in world.make(None).values())
-    lacking = -np.maximum(curve.grid - limit, 0.0)
-    assert np.max(np.abs(curve.value - lacking)) < 0.1 * limit
+    lacking = -np.maximum(curve.form.grid - limit, 0.0)
+    assert np.max(np.abs(curve.form.value - lacking)) < 0.1 * limit
 
 
 @pytest.mark.slow
@@ -144,7 +144,7 @@ def test_a_transducer_that_bends_by_three_per_cent_is_weighed_by_the_runs_held_o
     }
     posterior = explain(problem_of(tmp_path / "bent", bent, None))
     best = max(free_functions(posterior), key=lambda one: one.log_odds_in_all)
-    assert (best.variable.slot, best.beside) == ("recorded_stress", ("giesekus_mobility",))
+    assert (best.form.slot, best.form.beside) == ("recorded_stress", ("giesekus_mobility",))
     assert best.log_odds_in_all > best.log_odds  # held-out runs reach further
     assert posterior.with_something_else(best.log_odds_in_all).verdict == "unexplained"
 
@@ -160,11 +160,13 @@ def test_slip_that_goes_with_the_square_of_the_stress_is_told_as_a_curve(tmp_pat
     slip = 0.3 / (MODULUS * TIME) / MODULUS
     posterior = of_instrument(tmp_path, Instrument(slip=slip, slip_power=2.0), effects)
     curve = free_functions(posterior)[0]
-    assert (curve.variable.slot, curve.beside) == ("slip", ("giesekus_mobility",))
+    assert (curve.form.slot, curve.form.beside) == ("slip", ("giesekus_mobility",))
     assert curve.is_shown
-    assert curve.nearest == "quadratic"
+    assert curve.form.nearest == "quadratic"
     # straight lines between three stresses are off by a tenth of the curve at most
-    assert np.allclose(curve.value, slip * curve.grid**2, atol=0.1 * slip * curve.grid[-1] ** 2)
+    assert np.allclose(
+        curve.form.value, slip * curve.form.grid**2, atol=0.1 * slip * curve.form.grid[-1] ** 2
+    )
 
 
 def test_a_transducer_that_rings_is_told_by_its_response(tmp_path):
@@ -172,13 +174,13 @@ def test_a_transducer_that_rings_is_told_by_its_response(tmp_path):
     instrument = Instrument(resonance=frequency, damping=damping)
     posterior = of_instrument(tmp_path, instrument, FEW)
     curve = free_functions(posterior)[0]
-    assert (curve.variable.slot, curve.beside) == ("response", ("giesekus_mobility",))
+    assert (curve.form.slot, curve.form.beside) == ("response", ("giesekus_mobility",))
     assert curve.is_shown
     # of a resonator: ω² e^(-ζωs) sin(ω's)/ω', which a prior of decaying weights follows to a fifth
     damped = frequency * np.sqrt(1.0 - damping**2)
-    exact = frequency**2 / damped * np.exp(-damping * frequency * curve.grid)
-    exact *= np.sin(damped * curve.grid)
-    assert np.sqrt(np.mean((curve.value - exact) ** 2)) < 0.2 * np.max(exact)
+    exact = frequency**2 / damped * np.exp(-damping * frequency * curve.form.grid)
+    exact *= np.sin(damped * curve.form.grid)
+    assert np.sqrt(np.mean((curve.form.value - exact) ** 2)) < 0.2 * np.max(exact)
 
 
 def test_a_transducer_that_lags_is_named_and_no_curve(tmp_path):
@@ -200,8 +202,8 @@ def test_slip_in_proportion_to_the_stress_is_no_curve(tmp_path):
 def test_a_zero_that_settles_is_told_as_a_function_of_time(tmp_path):
     posterior, *_ = ask(tmp_path, *SETTLING)
     (curve,) = [one for one in free_functions(posterior) if one.is_shown]
-    assert curve.variable.slot == "drift"
-    assert "ptt_linear" in curve.beside
+    assert curve.form.slot == "drift"
+    assert "ptt_linear" in curve.form.beside
 
 
 @pytest.mark.parametrize("world", [GIESEKUS, MAXWELL, POM_POM])

@@ -65,25 +65,37 @@ _RESOLVED = 0.05
 
 
 @dataclass(frozen=True)
-class FreeFunction:
-    """A function of one variable that explains what effects with a name leave.
+class FreeForm:
+    """A smooth function of one variable that explains what named effects leave.
 
-    `variable`: what it depends on. `beside`: effects in the hypothesis with it. `log_odds`: against
-    all that has a name, and any discrepancy of another kind, by the fitted runs. `log_odds_in_all`:
-    the same by all runs, as explanations are weighed. `grid`, `value`, `low95`, `high95`: the curve
-    with its 95 % band, shape (n,), in Pa or as a relative change. `nearest`: a closed form that is
-    it within its uncertainty; None if none of those tried is.
+    `slot`: where it acts, such as ``relaxation`` or ``slip``. `variable`, `unit`: of what it is a
+    function, and its unit. `beside`: effects in the model with it. `grid`, `value`, `low95`,
+    `high95`: the curve with its 95 % band, shape (n,), in Pa or as a relative change. `nearest`: a
+    closed form that is it within its uncertainty; None if none of those tried is.
     """
 
-    variable: Variable
+    slot: str
+    variable: str
+    unit: str
     beside: tuple[str, ...]
-    log_odds: float
-    log_odds_in_all: float
     grid: Float[np.ndarray, " n"]
     value: Float[np.ndarray, " n"]
     low95: Float[np.ndarray, " n"]
     high95: Float[np.ndarray, " n"]
     nearest: str | None
+
+
+@dataclass(frozen=True)
+class FreeFunction:
+    """A curve as a hypothesis.
+
+    `log_odds`: against all that has a name, and any discrepancy of another kind, by the fitted
+    runs. `log_odds_in_all`: the same by all runs, as explanations are weighed.
+    """
+
+    form: FreeForm
+    log_odds: float
+    log_odds_in_all: float
 
     @property
     def is_shown(self) -> bool:
@@ -263,8 +275,11 @@ def free_functions(posterior: Posterior) -> list[FreeFunction]:
             odds = refit.log_evidence - fit.log_evidence + rank - in_all
         if max(rank - other, odds) > _POSSIBLE:
             variable, (grid, value, half), nearest = fitter.curve(fit)
-            own = variable, fit.names, float(rank - other), float(odds)
-            found.append(FreeFunction(*own, grid, value, value - half, value + half, nearest))
+            form = FreeForm(
+                variable.slot, variable.name, variable.unit, fit.names,
+                grid, value, value - half, value + half, nearest,
+            )  # fmt: skip
+            found.append(FreeFunction(form, float(rank - other), float(odds)))
     return sorted(found, key=lambda one: -one.log_odds)
 
 
