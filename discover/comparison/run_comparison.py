@@ -23,8 +23,7 @@ from discover.comparison.flows import (
 from discover.comparison.hypotheses import MOST_EFFECTS, search_hypotheses, terms_of, with_proposals
 from discover.comparison.known_part import Frame, known_part
 from discover.comparison.learning import Learning, distilled, require_teacher, study_library
-from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.predictive_check import expectation_of, lacks_of_fit
+from discover.comparison.outcome import LearnerOutcome, expectation_of, lacks_of_fit
 from discover.comparison.rivals import Rival, exact_twins, explanations_apart, structure_of
 from discover.comparison.statements import Statement, known_equation, make_statements
 from discover.comparison.time_left import ComparisonTime

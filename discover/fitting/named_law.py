@@ -13,8 +13,7 @@ from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import uncertainty, what_is_left
-from discover.inference.least_squares import Fit, best_of, fit_batch
+from discover.inference.least_squares import Fit, best_of, fit_batch, uncertainty, what_is_left
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread

@@ -7,8 +7,7 @@ from independent import Giesekus, WhiteMetzner, oscillation, start_up
 import discover as dc
 from discover.effects import library_term, make_effect
 from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.fit_uncertainty import what_is_left
-from discover.inference.least_squares import fit_batch
+from discover.inference.least_squares import fit_batch, what_is_left
 from discover.statistics import lack_of_fit
 from discover.statistics.residual import Expectation
 from tensor_library.terms import parse_term

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from discover.loop import RunRecord
-from discover.loop.reading import read_residual
-from discover.loop.waves import oscillation, read_wave
+from discover.loop.reading import oscillation, read_residual, read_wave
 
 RATES = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 

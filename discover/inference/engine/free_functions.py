@@ -22,8 +22,7 @@ from discover.inference.engine.posterior import Posterior
 from discover.inference.engine.priors import Deviations, Prior
 from discover.inference.engine.problem import TERM_ODDS
 from discover.inference.engine.search import Search
-from discover.inference.engine.slip import SLIP_CURVE
-from discover.inference.engine.variables import KNOTS, Variable, closed_forms, variables
+from discover.inference.engine.variables import KNOTS, SLIP_CURVE, Variable, closed_forms, variables
 from discover.linear_algebra_threads import in_one_thread
 from discover.statistics import HALF_BAND
 

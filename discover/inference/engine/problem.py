@@ -14,7 +14,7 @@ from discover.forward.declared import LARGEST
 from discover.forward.records import data_scales
 from discover.inference.engine.priors import Prior
 from discover.inference.engine.rows import Rows
-from discover.inference.engine.slip import SLIP_CURVE
+from discover.inference.engine.variables import SLIP_CURVE
 from discover.statistics import root_of
 
 _TYPICAL = 0.2

@@ -7,7 +7,7 @@ from matplotlib.ticker import EngFormatter
 
 from discover.loop import RunRecord
 from discover.loop.loop_result import LoopResult
-from discover.loop.waves import oscillation
+from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
 from discover.report.overlay import Overlay
 from discover.report.plots.style import (
