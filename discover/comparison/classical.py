@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -43,16 +42,6 @@ class ClassicalFit:
     def title(self) -> str:
         """Name as a rheologist writes it, with the constants."""
         return LAWS[self.law].described(self.parameters)
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the fit as ``comparison.json`` holds it."""
-        return {
-            "parameters": self.parameters,
-            "ci95": self.ci95,
-            "misfit": self.misfit,
-            "criterion": self.criterion,
-            "errors": self.errors,
-        }
 
 
 def fit_classical_laws(

@@ -53,48 +53,19 @@ class SweepPoint:
 class Comparison(PageView, HasAnswer, SummaryView):
     """Both learners and the posterior of the same runs, in the same flows.
 
-    Attributes
-    ----------
-    name
-        Of the study.
-    data_summary, known_part
-        The data and the known part, in words.
-    flows
-        Every flow looked at.
-    before
-        Predictions of the known part alone, by flow.
-    outcomes
-        By learner.
-    posterior
-        Of the search among laws, effects and terms with the learners' proposals.
-    bands
-        Predictions of the posterior with their 95 % bands, by the key of the flow.
-    shares
-        Probability of each learner's law among all fitted, were one of them all there is.
-    lack_of_fit
-        Of each learner's law to the training runs.
-    truth
-        Terms that a perfect learner would find, or None.
-    noise
-        Relative noise of synthetic data, or None.
-    rivals, statements
-        What the data do not determine.
-    structure
-        What the training flows can determine of the library; None where not asked.
-    classical
-        Classical laws fitted to the same runs.
-    sweep
-        The same again over a parameter.
-    distillations
-        What simpler laws learn from the true one, JSON-able rows.
-    seed
-        Of the learners.
-    known
-        Known part as an equation; None where it cannot be written out.
-    known_effects
-        Effects of the instrument that the data were corrected for.
-    conditions
-        Material and temperature, where runs.csv names them.
+    `name`: of the study. `data_summary`, `known_part`: the data and the known part, in words.
+    `flows`: every flow looked at. `before`: predictions of the known part alone, by flow.
+    `outcomes`: by learner. `posterior`: of the search among laws, effects and terms with the
+    learners' proposals. `bands`: predictions of the posterior with their 95 % bands, by the key of
+    the flow. `shares`: probability of each learner's law among all fitted, were one of them all
+    there is. `lack_of_fit`: of each learner's law to the training runs. `truth`: terms that a
+    perfect learner would find, or None. `noise`: relative noise of synthetic data, or None.
+    `rivals`, `statements`: what the data do not determine. `structure`: what the training flows can
+    determine of the library; None where not asked. `classical`: classical laws fitted to the same
+    runs. `sweep`: the same again over a parameter. `distillations`: what simpler laws learn from
+    the true one, JSON-able rows. `seed`: of the learners. `known`: known part as an equation; None
+    where it cannot be written out. `known_effects`: effects of the instrument that the data were
+    corrected for. `conditions`: material and temperature, where runs.csv names them.
     """
 
     name: str
@@ -288,20 +259,17 @@ class Comparison(PageView, HasAnswer, SummaryView):
                 "details": outcome.details,
             }
         law = self.answer.equation or self.answer.classical
-        posterior, content = (
-            self.posterior,
-            {
-                "study": self.name,
-                "verdict": self.verdict,
-                "lack_of_fit": {name: _lack_of_fit(one) for name, one in self.lack_of_fit.items()},
-                "data": self.data_summary,
-                "conditions": self.conditions,
-                "known_part": self.known_part,
-                "seed": self.seed,
-                "learners": learners,
-            },
-        )
-        content |= {
+        posterior = self.posterior
+        banded = [(flow, band) for flow in self.judged if (band := self.bands.get(flow.key))]
+        content = {
+            "study": self.name,
+            "verdict": self.verdict,
+            "lack_of_fit": self.lack_of_fit,
+            "data": self.data_summary,
+            "conditions": self.conditions,
+            "known_part": self.known_part,
+            "seed": self.seed,
+            "learners": learners,
             "before": {"errors": self._errors("before", self.judged)},
             "posterior": {
                 **posterior.explanations.to_json(),
@@ -309,14 +277,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
                 "effects": posterior.stages,
                 "errors": {
                     flow.name: of_recorded(relative_errors(band.middle, flow.reference), flow)
-                    for flow in self.judged
-                    if (band := self.bands.get(flow.key)) is not None
+                    for flow, band in banded
                 },
-                "half_widths": {
-                    flow.name: band.half_widths()
-                    for flow in self.judged
-                    if (band := self.bands.get(flow.key)) is not None
-                },
+                "half_widths": {flow.name: band.half_widths() for flow, band in banded},
             },
             "discrepancy": posterior.answer.discrepancy,
             "nearest_law": posterior.nearest_law,
@@ -351,15 +314,3 @@ class Comparison(PageView, HasAnswer, SummaryView):
 
 _POSSIBLE = 0.01
 """Probability from which on a law is possible."""
-
-
-def _lack_of_fit(one: LackOfFit) -> dict[str, Any]:
-    return {
-        "misfit": one.misfit,
-        "noise": one.noise,
-        "lag_one_correlation": one.lag_one_correlation,
-        "probability": one.probability,
-        "verdict": one.verdict,
-        "outliers": one.outliers,
-        "reason": one.reason,
-    }

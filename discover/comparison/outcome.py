@@ -1,6 +1,6 @@
 """Outcome of one learner: its law, its predictions, where they lie, and what it leaves."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -66,52 +66,30 @@ class LearnerOutcome(TermTables):
         )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
-        """Return everything as JSON-able values; `from_state` undoes it exactly."""
-        return {
-            "learner": self.learner,
-            "terms": [term.to_json() for term in self.terms],
-            "train_seconds": self.train_seconds,
-            "loss_history": [np.asarray(part).tolist() for part in self.loss_history],
-            "details": plain(self.details),
-            "message": self.message,
-            "predictions": {
-                name: None if p is None else {q: v.tolist() for q, v in p.items()}
-                for name, p in self.predictions.items()
-            },
-            "physics": plain(self.physics),
-            "bands": {
-                name: None
-                if b is None
-                else {q: [v.tolist() for v in pair] for q, pair in b.items()}
-                for name, b in self.bands.items()
-            },
-        }
+        """Return everything as JSON-able values; `from_state` undoes it."""
+        return plain(self)
 
     @classmethod
     def from_state(cls, state: Mapping[str, Any]) -> "LearnerOutcome":
         """Return the outcome that was kept."""
-        terms = tuple(RecoveredTerm.from_json(term) for term in state["terms"])
-        iterations, losses = (np.asarray(part, dtype=float) for part in state["loss_history"])
-        predictions = {
-            name: None if p is None else {q: np.asarray(v, dtype=float) for q, v in p.items()}
-            for name, p in state["predictions"].items()
+
+        def arrays(by_flow: Mapping[str, Mapping | None], of: Callable[[Any], Any]) -> dict:
+            return {
+                key: None if own is None else {name: of(one) for name, one in own.items()}
+                for key, own in by_flow.items()
+            }
+
+        def numbers(values: Any) -> np.ndarray:
+            return np.asarray(values, dtype=float)
+
+        iterations, losses = map(numbers, state["loss_history"])
+        read = {
+            "terms": tuple(map(RecoveredTerm.from_json, state["terms"])),
+            "loss_history": (iterations, losses),
+            "predictions": arrays(state["predictions"], numbers),
+            "bands": arrays(state.get("bands", {}), lambda ends: tuple(numbers(ends))),
         }
-        return cls(
-            state["learner"],
-            terms,
-            float(state["train_seconds"]),
-            (iterations, losses),
-            state["details"],
-            state["message"],
-            predictions,
-            state.get("physics"),
-            {
-                name: None
-                if b is None
-                else {q: (np.asarray(low), np.asarray(high)) for q, (low, high) in b.items()}
-                for name, b in state.get("bands", {}).items()
-            },
-        )
+        return cls(**{**state, **read})
 
 
 def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:

@@ -27,6 +27,7 @@ from discover.forward.flows import transients
 from discover.laws.each_mode import with_modes
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import UpperConvectedMaxwell
+from discover.loop.task import require_possible
 from discover.protocols.protocol import FlowProtocol
 from discover.study.data import StudyData
 from discover.study.declared_model import DeclaredModel
@@ -140,14 +141,7 @@ def corrected(
     stress; or if a run is not at a given rate in time.
     """
     runs = list(data.dataset.runs)
-    for known in effects:
-        measured = next((run.name for run in runs if run.rate_is_measured), "")
-        if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
-            raise InputError(
-                f"The known effect {known.name} lies between the command and the tool, and the "
-                f"rate of {measured} was measured at the tool, so it contains it already. Leave "
-                "the effect out."
-            )
+    require_possible(effects, runs)
     if not effects or not runs:
         return data, {}
     other = next((run for run in runs if run.protocol.control != "rate"), None)

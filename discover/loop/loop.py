@@ -22,7 +22,7 @@ from discover.inference.engine.search import Search
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.from_posterior import Ended, result_of
 from discover.loop.loop_result import LoopResult
-from discover.loop.parts import ErrorPair, Fold
+from discover.loop.parts import Fold
 from discover.loop.preference import with_named_law_first
 from discover.loop.runs import MOST_SAMPLES
 from discover.loop.search_time import SearchTime
@@ -153,35 +153,28 @@ def run_loop_on_each(
         )
     say = progress or (lambda line: None)
 
-    def loop(fitted: Sequence[str], held_out: Sequence[str], prefix: str) -> LoopResult:
-        return run_loop(
-            dataset,
-            declared,
-            fit=fitted,
-            held_out=held_out,
-            progress=lambda line: say(f"{prefix}: {line}"),
-            **options,
-        )
+    def loop(name: str, fitted: Sequence[str], held_out: Sequence[str] = ()) -> LoopResult:
+        options["progress"] = lambda line: say(f"{name}: {line}")
+        return run_loop(dataset, declared, fit=fitted, held_out=held_out, **options)
 
-    whole = loop(names, (), "all runs")
-    folds = []
+    whole, folds = loop("all runs", names), []
     for name in names:
-        part = loop([other for other in names if other != name], [name], f"without {name}")
+        part = loop(f"without {name}", [other for other in names if other != name], [name])
         before, after = part.error_before.held_out, part.error_after.held_out
         assert before is not None  # one run is held out
         assert after is not None
         found = tuple(stage.effect for stage in part.stages)
         folds.append(Fold(name, part.verdict, found, before, after))
+    before, after = (
+        float(np.mean([getattr(fold, error) for fold in folds]))
+        for error in ("error_before", "error_after")
+    )
     return replace(
         whole,
-        error_before=_with_folds(whole.error_before, [fold.error_before for fold in folds]),
-        error_after=_with_folds(whole.error_after, [fold.error_after for fold in folds]),
+        error_before=replace(whole.error_before, held_out=before),
+        error_after=replace(whole.error_after, held_out=after),
         folds=tuple(folds),
     )
-
-
-def _with_folds(error: ErrorPair, left_out: Sequence[float]) -> ErrorPair:
-    return ErrorPair(error.fit, float(np.mean(left_out)))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from discover.effects import (
     AbstractEffect,
     ConstitutiveEffect,
     KinematicEffect,
+    KnownEffect,
     library_effects,
     make_effect,
     named_effects,
@@ -277,10 +278,10 @@ def admission(fitted: Sequence[Run], held: Sequence[Run]) -> Callable[[AbstractE
     return admitted
 
 
-def _require_possible(declared: DeclaredModel, runs: Sequence[Run]) -> None:
+def require_possible(effects: Sequence[KnownEffect], runs: Sequence[Run]) -> None:
     """Refuse a known effect that the rates of these runs contain already."""
     measured = [run.name for run in runs if run.rate_is_measured]
-    for known in declared.effects:
+    for known in effects:
         if measured and isinstance(known.effect, KinematicEffect) and known.effect.shapes_command:
             raise InputError(
                 f"The known effect {known.name} lies between the command and the tool, and the "
@@ -315,5 +316,5 @@ def further_candidates(
     candidates = candidates_of(effects)
     known = {effect.name for effect in declared.effects}
     _require_present(declared, {*known, *(effect.name for effect in candidates)})
-    _require_possible(declared, runs)
+    require_possible(declared.effects, runs)
     return [effect for effect in candidates if effect.name not in known]
