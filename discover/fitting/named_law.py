@@ -12,15 +12,21 @@ from discover.answer import TOLERANCE
 from discover.dataset import Dataset, Run
 from discover.errors import InputError
 from discover.fitting.named_law_fit import Constant, NamedLawFit
-from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.least_squares import Fit, best_of, fit_batch, uncertainty, what_is_left
+from discover.forward import AugmentedModel
+from discover.inference.engine.fit import Fit
+from discover.inference.engine.fits import Fitter
+from discover.inference.engine.problem import Problem
+from discover.inference.engine.search import Search
 from discover.laws import LAWS, Fluid, make_law
 from discover.laws.registry import starting_values
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.final_model import augmented_fluid, declared_law
-from discover.loop.run_record import record_runs
+from discover.loop.path import records_of
+from discover.loop.run_record import RunRecord
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.plain_numbers import as_number, as_whole_number
+from discover.protocols.between_samples import sampling_interval
+from discover.statistics import LackOfFit, lack_of_fit
 from discover.statistics.residual import Expectation
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, forward_model
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, with_known
@@ -112,31 +118,42 @@ def fit(
     declared = _declared(law, data, base, fitted, (bounds, start, fixed), effects)
     forward = forward_model(declared)
     require_samples(fitted, forward)
-    batch = make_batch(fitted)
-    model = AugmentedModel(forward, [], data_scales(fitted))
-    names = _narrow(model, declared, bounds)
-    free = model.free_positions
-    starts = _starts(model, names, free, start, declared)
-    best = best_of(fit_batch(model, batch, starts, [free] * len(starts)))
-    if best is None:
+    problem = Problem(forward, (), fitted, held, noise=noise, computed=True)
+    model = problem.model
+    names, ranges = _names_and_ranges(model, declared, bounds)
+    problem.narrow(ranges)
+    fitter = Fitter(problem, problem.fitted)
+    search = Search(fitter)
+    starts = _starts(model, names, model.free_positions, start, declared)
+    search.add(fitter.start((), theta) for theta in starts)
+    best = search.found[frozenset()]
+    if not np.isfinite(best.log_evidence):
         raise InputError(
             f"{LAWS[law].title} cannot be integrated through these runs with any of {_STARTS} "
             "starts. Narrow the ranges with bounds, or give a start."
         )
-    expectation = Expectation(noise, forward.linear_error)
-    covariance, degrees = uncertainty(model, batch, best)
-    records = record_runs(fitted, model.predictions([best.theta], batch), held_out=False)
-    if held:
-        ahead = model.predictions([best.theta], make_batch(held))
-        records += record_runs(held, ahead, held_out=True)
+    records = records_of(search, best)
     active = [known.name for known in forward.effects]
+    n, correlation = len(best.free), best.noise.correlation
+    assert best.covariance is not None
+    independent = len(problem.fitted) * (1.0 - correlation) / (1.0 + correlation)
     return NamedLawFit(
-        law, _constants(model, best, names, covariance, declared), covariance, degrees,
-        augmented_fluid(model, best.theta, active),
+        law, _constants(model, best, names, declared), best.covariance[:n, :n],
+        max(independent - n, 1.0), augmented_fluid(model, best.theta, active),
         {name: tuple(map(float, best.theta[model.positions(name)])) for name in active},
-        what_is_left(best, batch, fitted, expectation), tuple(records), model, best.theta,
-        declared_law(forward, best.theta, {}), data.name, tolerance,
+        _what_is_left(records, fitted, Expectation(noise, forward.linear_error)), tuple(records),
+        model, best.theta, declared_law(forward, best.theta, {}), data.name, tolerance,
     )  # fmt: skip
+
+
+def _what_is_left(
+    records: Sequence[RunRecord], fitted: Sequence[Run], expectation: Expectation
+) -> LackOfFit:
+    """Return whether what a fit leaves of the fitted runs is noise."""
+    left = [one.residual[0] for one in records if not one.held_out]
+    even = [1.0 / run.sizes(run.recorded) for run in fitted]
+    intervals = [sampling_interval(run.time, run.protocol, run.quantity) for run in fitted]
+    return lack_of_fit(left, [run.recorded for run in fitted], expectation, None, even, intervals)
 
 
 def _numbers(name: str, given: Any, count: int) -> dict[str, Any]:
@@ -213,9 +230,11 @@ def _estimated_mode(runs: Sequence[Run]) -> tuple[float, float]:
     return stress / (time * rate), time
 
 
-def _narrow(model: AugmentedModel, declared: DeclaredModel, bounds: Bounds) -> dict[int, str]:
-    """Narrow the model's ranges to the bounds; return the names of the free constants."""
-    names = {}
+def _names_and_ranges(
+    model: AugmentedModel, declared: DeclaredModel, bounds: Bounds
+) -> tuple[dict[int, str], dict[int, tuple[float, float]]]:
+    """Return the names of the free constants, and the ranges that bounds narrow, by position."""
+    names, ranges = {}, {}
     free = [p.name for p in model.declared.free_parameters]
     for position in model.declared.free_positions:
         name = MODE_CONSTANTS[position] if position < 2 else free[position - 2]
@@ -234,14 +253,14 @@ def _narrow(model: AugmentedModel, declared: DeclaredModel, bounds: Bounds) -> d
                 f"bounds[{name!r}] = {bounds[name]} lies outside the range of the law, "
                 f"{first:g} to {last:g}."
             )
-        model.low[position], model.high[position] = max(low, first), min(high, last)
+        ranges[position] = max(low, first), min(high, last)
     for known in model.declared.effects:
         for position, parameter in zip(
             model.positions(known.name), known.effect.parameters, strict=True
         ):
             if position in model.free_positions:
                 names[position] = f"{known.name}.{parameter.name}"
-    return names
+    return names, ranges
 
 
 def _size(declared: DeclaredModel, position: int) -> float:
@@ -289,30 +308,29 @@ def _starts(
 
 
 def _constants(
-    model: AugmentedModel,
-    fit: Fit,
-    names: Mapping[int, str],
-    covariance: Float[np.ndarray, "p p"],
-    declared: DeclaredModel,
+    model: AugmentedModel, fit: Fit, names: Mapping[int, str], declared: DeclaredModel
 ) -> tuple[Constant, ...]:
+    """Return the fitted constants in their units; of several modes the factor on them."""
     units = {
         f"{known.name}.{parameter.name}": parameter.unit or "1"
         for known in model.declared.effects
         for parameter in known.effect.parameters
     }
+    several = len(declared.modulus) > 1
+    assert fit.covariance is not None
     constants = []
-    for i, position in enumerate(fit.free):
+    for position, variance in zip(fit.free, np.diag(fit.covariance), strict=False):
         name, value = names[position], float(fit.theta[position])
-        error = float(np.sqrt(max(covariance[i, i], 0.0)))
-        low, high = float(model.low[position]), float(model.high[position])
-        if position >= 2:
-            unit = units.get(name, "1")
-            constants.append(Constant(name, unit, value, error, low, high))
-            continue
-        several = len(declared.modulus) > 1
-        size = _size(declared, position) * float(np.exp(value))
-        unit = "1" if several else ("Pa", "s")[position]
-        name = ("modulus_factor", "relaxation_time_factor")[position] if several else name
-        low, high = (_size(declared, position) * float(np.exp(end)) for end in (low, high))
-        constants.append(Constant(name, unit, size, size * error, low, high, logarithmic=True))
+        error = float(np.sqrt(max(variance, 0.0)))
+        ends = float(model.low[position]), float(model.high[position])
+        unit, logarithmic = units.get(name, "1"), fit.priors[position].is_logarithm
+        if position < 2:  # as the logarithm of a factor
+            size, logarithmic = _size(declared, position), True
+            value, *ends = (size * float(np.exp(one)) for one in (value, *ends))
+            if several:
+                name = ("modulus_factor", "relaxation_time_factor")[position]
+            else:
+                unit = ("Pa", "s")[position]
+        error *= value if logarithmic else 1.0
+        constants.append(Constant(name, unit, value, error, *ends, logarithmic=logarithmic))
     return tuple(constants)

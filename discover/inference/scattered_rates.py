@@ -13,16 +13,13 @@ from jaxtyping import Float
 from discover.dataset import Run
 from discover.dataset.run_table import wave_of
 from discover.effects import simplest_terms
-from discover.forward.augmented_model import AugmentedModel
 from discover.forward.declared import DeclaredModel
-from discover.forward.flows import make_batch
-from discover.forward.records import data_scales
-from discover.inference.least_squares import fit_batch
+from discover.inference.engine.fits import Fitter
+from discover.inference.engine.problem import Problem
 from discover.protocols import another_between_samples, sampled_rate
 from discover.protocols.between_samples import samples_of
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.noise.whiteness import separate_probability
-from discover.statistics.residual import summarise
 from discover.words import percent_of
 
 _LEAST = 5e-3
@@ -81,16 +78,14 @@ def unfelt_scatter(declared: DeclaredModel, runs: Sequence[Run]) -> str:
     ]
     if not scatter:
         return ""
-    terms, costs, effective = simplest_terms(), [], []
+    terms, found = simplest_terms(), []
     for some in (runs, smooth):
-        model, batch = AugmentedModel(declared, terms, data_scales(some)), make_batch(some)
-        free = [*model.free_positions, *(model.positions(term.name)[0] for term in terms)]
-        fit = fit_batch(model, batch, [model.zero()], [free])[0]
-        if not fit.usable:
-            return ""
-        costs.append(fit.cost)
-        effective.append(summarise(fit.residual, np.asarray(batch.weight)).effective_samples)
-    if 0.5 * min(effective) * np.log(costs[0] / costs[1]) < _LIKELIER:
+        problem = Problem(declared, terms, some)
+        fitter = Fitter(problem, problem.fitted)
+        start = fitter.start([term.name for term in terms], problem.zero)
+        (fit,) = fitter.fit([start], derivatives=False)
+        found.append(fit.log_likelihood)
+    if not np.all(np.isfinite(found)) or found[1] - found[0] < _LIKELIER:
         return ""
     return (
         f"The rates that were read scatter by {percent_of(max(scatter))} from sample to sample, "

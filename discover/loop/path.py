@@ -43,6 +43,16 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     return found
 
 
+def records_of(search: Search, fit: Fit) -> list[RunRecord]:
+    """Return the runs of a problem, fitted and held out, with what a hypothesis predicts."""
+    problem, found = search.problem, []
+    for rows, held_out in ((problem.fitted, False), (problem.predicted, True)):
+        if rows is not None:
+            own = predicted(search, fit, rows, held_out)[None]
+            found += record_runs(rows.runs, own, held_out)
+    return found
+
+
 @dataclass(frozen=True)
 class Path:
     """A posterior, the likeliest hypothesis of it, and the way there.

@@ -27,8 +27,8 @@ from discover.inference.step_instants import with_places
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.parts import LawFit
-from discover.loop.path import predicted
-from discover.loop.run_record import errors_of, record_runs
+from discover.loop.path import records_of
+from discover.loop.run_record import errors_of
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
 from discover.words import unknown_name
 
@@ -188,12 +188,7 @@ class Task:
                 room = _AT_END * (parameter.high - parameter.low)
                 if min(value - parameter.low, parameter.high - value) < room:
                     ends.append(parameter.name)
-            problem, records = search.problem, []
-            for rows, held in ((problem.fitted, False), (problem.predicted, True)):
-                if rows is not None:
-                    own = predicted(search, best, rows, held)[None]
-                    records += record_runs(rows.runs, own, held)
-            error = errors_of(records, 0)
+            error = errors_of(records_of(search, best), 0)
             probability = float(np.exp(logs[name] - total))
             lines.append(LawFit(name, values, tuple(ends), error, probability, best.names))
         return tuple(lines)

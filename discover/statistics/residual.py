@@ -9,26 +9,24 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import median_filter
 
 from discover.statistics.noise import whiteness
-from discover.statistics.noise.noise_model import independent_samples
 
 
 @dataclass(frozen=True)
 class ResidualSummary:
     """Noise and structure in the residuals of some runs.
 
-    `noise`: relative, by run, from third differences. `effective_samples`: of all runs together.
+    `noise`: relative, by run, from third differences.
     """
 
     noise: Float[np.ndarray, " runs"]
     autocorrelation: Float[np.ndarray, " runs"]  # correlation of neighbouring residuals of each run
-    effective_samples: float
 
 
 def summarise(
     residual: Float[np.ndarray, "runs n"], weight: Float[np.ndarray, "runs n"]
 ) -> ResidualSummary:
-    """Return noise (`fast_part`) and effective samples of weighted residuals."""
-    noise, correlation, effective = [], [], 0.0
+    """Return noise (`fast_part`) and correlation of weighted residuals."""
+    noise, correlation = [], []
     for row, w in zip(residual, weight, strict=True):
         values = row[w > 0] * np.sqrt(np.count_nonzero(w))
         n = len(values)
@@ -37,8 +35,7 @@ def summarise(
         rho = float(np.sum(values[1:] * values[:-1])) / power if power > 0 and n > 2 else 0.0
         rho = float(np.clip(rho, 0.0, 0.99))
         correlation.append(rho)
-        effective += independent_samples(values)
-    return ResidualSummary(np.array(noise), np.array(correlation), effective)
+    return ResidualSummary(np.array(noise), np.array(correlation))
 
 
 def fast_part(values: Float[np.ndarray, " n"]) -> float:

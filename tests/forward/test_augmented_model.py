@@ -1,11 +1,11 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.inference.least_squares import fit_batch
 from discover.laws import Fluid, Giesekus, UpperConvectedMaxwell
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, start_up
 from discover.simulate import simulate
@@ -73,28 +73,29 @@ def giesekus_runs(mobility=0.3, rates=(0.5, 1.0, 2.0)):
     return runs
 
 
+def least_squares_at(model, batch, start, at):
+    """Return the vector of least residuals by scipy, some of its parameters being free."""
+
+    def placed(values):
+        theta = start.copy()
+        theta[list(at)] = values
+        return theta
+
+    low, high = model.low[list(at)], model.high[list(at)]
+    found = least_squares(
+        lambda values: model.residuals(placed(values)[None], batch).ravel(), start[list(at)],
+        bounds=(low, high), x_scale="jac",
+    )  # fmt: skip
+    return placed(found.x)
+
+
 def test_a_fit_finds_the_parameter():
     model = AugmentedModel(DECLARED, [make_effect("giesekus_mobility")])
     batch = make_batch(giesekus_runs())
     at = model.positions("giesekus_mobility")
     start = model.zero()
     start[at] = 0.05
-    fit = fit_batch(model, batch, [start], [at], tolerance=1e-8)[0]
-    assert fit.theta[at[0]] == pytest.approx(0.3, abs=1e-3)
-
-
-def test_a_trial_that_runs_away_is_a_rejected_step_and_no_crash():
-    model = AugmentedModel(DECLARED, [make_effect("tr(sigma)*sigma")])
-    batch = make_batch(giesekus_runs())
-    at = model.positions("tr(sigma)*sigma")
-    away = model.zero()
-    away[at] = -5.0
-    assert not np.all(np.isfinite(model.residuals(np.stack([away]), batch)))
-    near, far = model.zero(), away
-    fits = fit_batch(model, batch, [near, far], [at, at])
-    assert fits[0].usable
-    assert fits[0].cost < 0.5 * np.sum(model.residuals(near[None], batch) ** 2)
-    assert not fits[1].usable
+    assert least_squares_at(model, batch, start, at)[at[0]] == pytest.approx(0.3, abs=1e-3)
 
 
 def test_free_parameters_of_the_declared_law_are_fitted():
@@ -102,12 +103,7 @@ def test_free_parameters_of_the_declared_law_are_fitted():
         "giesekus", {"alpha": 0.1}, 2.0 * MODULUS, TIME, free=("alpha", "modulus_Pa")
     )
     model = AugmentedModel(declared, [make_effect("stress_offset")])
-    fit = fit_batch(
-        model,
-        make_batch(giesekus_runs()),
-        [model.zero()],
-        [declared.free_positions],
-        tolerance=1e-8,
-    )[0]
-    assert np.exp(fit.theta[0]) == pytest.approx(0.5, rel=1e-3)
-    assert fit.theta[2] == pytest.approx(0.3, rel=5e-3)
+    batch = make_batch(giesekus_runs())
+    found = least_squares_at(model, batch, model.zero(), declared.free_positions)
+    assert np.exp(found[0]) == pytest.approx(0.5, rel=1e-3)
+    assert found[2] == pytest.approx(0.3, rel=5e-3)

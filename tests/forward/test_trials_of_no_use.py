@@ -9,7 +9,6 @@ from discover.dataset.run import Run
 from discover.effects import named_effects
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flows import PeriodicFlows
-from discover.inference.least_squares import fit_batch
 from discover.protocols import oscillations, start_up
 from discover.protocols.control import steady_rates
 
@@ -112,18 +111,3 @@ def test_a_transient_whose_record_is_altered_afterwards_is_followed_to_the_end(s
     theta[model.positions("stress_gain")[0]] = 1e-6
     found = model._predictor.of_part(model._trials([theta], np.array([0.1])), batch, 0)
     np.testing.assert_array_equal(found, model._predictor.of_part(model._trials([theta]), batch, 0))
-
-
-def test_fits_to_transients_are_those_of_trials_followed_to_the_end(start_ups, monkeypatch):
-    model, batch = start_ups
-    starts = [model.zero() for _ in NAMES]
-    free = [model.positions(name) for name in NAMES]
-    for start, at in zip(starts, free, strict=True):
-        start[at[0]] = 20.0 * model.first_trial[at[0]]  # from far off some steps are refused
-    left = fit_batch(model, batch, starts, free)
-    residuals = model.residuals
-    monkeypatch.setattr(
-        model, "residuals", lambda thetas, batch, limits=None: residuals(thetas, batch)
-    )
-    for one, other in zip(left, fit_batch(model, batch, starts, free), strict=True):
-        np.testing.assert_array_equal(one.theta, other.theta)

@@ -6,10 +6,11 @@ from independent import Giesekus, WhiteMetzner, oscillation, start_up
 
 import discover as dc
 from discover.effects import library_term, make_effect
-from discover.forward import AugmentedModel, DeclaredModel, data_scales, make_batch
-from discover.inference.least_squares import fit_batch, what_is_left
-from discover.statistics import lack_of_fit
-from discover.statistics.residual import Expectation
+from discover.forward import DeclaredModel
+from discover.inference.engine.fits import Fitter
+from discover.inference.engine.problem import Problem
+from discover.protocols.between_samples import sampling_interval
+from discover.statistics.lack_of_fit import what_is_left
 from tensor_library.terms import parse_term
 
 SCALE = {"modulus": 100.0, "relaxation_time": 1.0}
@@ -22,8 +23,8 @@ TERMS = ("tr(sigma.gammadot)*sigma", "tr(sigma.gammadot.gammadot)*sigma")
 STARTS = {"wall_slip": 0.006, TERMS[0]: 0.5, TERMS[1]: -0.17, "giesekus_mobility": 0.3}
 
 
-def fitted(fluid, names, seed):
-    """Return fit, batch and runs of some effects, fitted to a fluid by scipy, 1 % noise."""
+def left_by(fluid, names, seed):
+    """Return what some effects, fitted to a fluid by scipy with 1 % noise, leave of the runs."""
     runs = []
     for i, (flow, protocol, times) in enumerate(FLOWS):
         stress = fluid.respond(flow, times).sigma12
@@ -34,35 +35,34 @@ def fitted(fluid, names, seed):
     effects = [make_effect("wall_slip"), make_effect("giesekus_mobility")]
     effects += [library_term(parse_term(term)) for term in TERMS]
     declared = DeclaredModel.named("ucm", {}, np.array([100.0]), np.array([1.0]))
-    model = AugmentedModel(declared, effects, data_scales(runs))
-    batch = make_batch(runs)
-    start, free = model.zero(), []
+    problem = Problem(declared, effects, runs, computed=True)
+    start = problem.zero.copy()
     for name in names:
-        at = model.positions(name)
-        start[at] = STARTS[name]
-        free += at
-    return fit_batch(model, batch, [start], [free])[0], batch, runs
+        start[problem.model.positions(name)[0]] = STARTS[name]
+    fitter = Fitter(problem, problem.fitted)
+    (fit,) = fitter.fit([fitter.start(names, start)])
+    left = fitter.record(fit) - problem.fitted.recorded
+    own = [left[problem.fitted.run == i] for i in range(len(runs))]
+    return fitter.misfit(fit), own, runs
 
 
-def alone(fit, batch, runs):
-    """Return the verdict without the times of the samples."""
-    rows = zip(fit.residual, np.asarray(batch.weight), strict=True)
-    residuals = [row[weight > 0] / weight[weight > 0] for row, weight in rows]
-    return lack_of_fit(residuals, [run.recorded for run in runs]).verdict
+def verdict(left, runs, with_times=True):
+    """Return the verdict, with the times of the samples or without."""
+    intervals = [sampling_interval(run.time, run.protocol) for run in runs] if with_times else None
+    return what_is_left(left, [run.recorded for run in runs], intervals=intervals).verdict
 
 
 def test_slip_and_two_terms_do_not_explain_a_white_metzner_fluid():
     passed = 0
     for seed in range(4):
-        fit, batch, runs = fitted(WhiteMetzner(0.5, **SCALE), ("wall_slip", *TERMS), seed)
-        # hardly more than the noise, and not in all runs
-        assert np.mean(np.sqrt(np.sum(fit.residual**2, axis=1))) < 0.017
-        assert what_is_left(fit, batch, runs, Expectation()).verdict == "unexplained"
-        passed += alone(fit, batch, runs) == "explained"
+        misfit, left, runs = left_by(WhiteMetzner(0.5, **SCALE), ("wall_slip", *TERMS), seed)
+        assert misfit < 0.017  # hardly more than the noise, and not in all runs
+        assert verdict(left, runs) == "unexplained"
+        passed += verdict(left, runs, with_times=False) == "explained"
     assert passed  # so what tells it is that the noise of the other runs is white
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_the_law_that_made_the_runs_explains_them(seed):
-    fit, batch, runs = fitted(Giesekus(0.3, **SCALE), ("giesekus_mobility",), seed)
-    assert what_is_left(fit, batch, runs, Expectation()).verdict == "explained"
+    _, left, runs = left_by(Giesekus(0.3, **SCALE), ("giesekus_mobility",), seed)
+    assert verdict(left, runs) == "explained"

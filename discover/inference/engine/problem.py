@@ -1,6 +1,6 @@
 """A model, the records that it is held against, and what is known of its constants beforehand."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -120,13 +120,21 @@ class Problem:
     def _known(self) -> dict[int, Prior]:
         """Return priors of what is always free: the declared constants, and the bench."""
         model, found = self.model, {}
+        sizes = {"one": 1.0} | self.scales
+        units = {
+            at: sizes.get(parameter.scale, 1.0)
+            for known in model.declared.effects
+            for at, parameter in zip(
+                model.positions(known.name), known.effect.parameters, strict=True
+            )
+        }
         for position in model.free_positions:
             low, high = float(model.low[position]), float(model.high[position])
             if low > 0.0 and high > _FEW * low:
                 start = float(np.clip(self.zero[position], low, high))
                 found[position] = Prior("logarithm", start, 3.0, low, high)
             else:
-                width = min(high - low, 10.0)
+                width = min(high - low, 10.0 * units.get(position, 1.0))
                 middle = float(self.zero[position])
                 found[position] = Prior("normal", middle, width, low, high)
         declared = {known.name for known in model.declared.effects}
@@ -148,6 +156,12 @@ class Problem:
         for position in range(model.instants.start, model.instants.stop):
             found[position] = Prior("normal", 0.5, 0.29, 0.0, 1.0)
         return found
+
+    def narrow(self, ranges: Mapping[int, tuple[float, float]]) -> None:
+        """Narrow the ranges of constants that are always free, by position."""
+        for position, (low, high) in ranges.items():
+            self.model.low[position], self.model.high[position] = low, high
+        self._priors = self._known()
 
     def _by_mode(self, name: str) -> dict[int, Prior]:
         """Return the priors of what varies a constant from mode to mode, on its link's scale."""
