@@ -11,11 +11,12 @@ from discover.equations.parts import (
     combined,
     effect_terms,
     law_parts,
+    law_parts_by_mode,
     law_terms,
 )
 
 __all__ = [
     "FORMATS", "AugmentedLaw", "Box", "Equation", "HasEquation", "NamedPart", "StatePart", "Tested",
-    "combined", "effect_terms", "equation_from_json", "equation_to_json", "law_parts", "law_terms",
-    "read_result_laws", "read_rheotool", "write_equation",
+    "combined", "effect_terms", "equation_from_json", "equation_to_json", "law_parts",
+    "law_parts_by_mode", "law_terms", "read_result_laws", "read_rheotool", "write_equation",
 ]  # fmt: skip

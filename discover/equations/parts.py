@@ -1,6 +1,6 @@
 """Laws in parts: a law with a name, a sum of terms, states of the whole fluid."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -286,6 +286,47 @@ def law_parts(law: AbstractConstitutiveLaw) -> LawParts:
             return None, law_terms(core)
         part = NamedPart(named[0], (named[1],))
     return part, combined(added)
+
+
+def law_parts_by_mode(
+    law: AbstractConstitutiveLaw, by_mode: Mapping[str, Sequence[float]], modes: int
+) -> LawParts:
+    """Return the parts of a law some constants of which differ from mode to mode.
+
+    `by_mode`: values for each mode, by name of a constant, or of an effect that is a law by itself.
+    Raises InputError as `law_parts`, or if what differs is no constant of a law with a name, or a
+    mode was added.
+    """
+    if not by_mode:
+        return law_parts(law)
+    differing = dict(by_mode)
+    for name in by_mode:
+        moved = law.with_named(name) if isinstance(law, AugmentedLaw) else None
+        if moved is not None:
+            law, constant = moved
+            differing[constant] = differing.pop(name)
+    core, added = law.split()
+    named = name_of(core)
+    known = {} if named is None else named[1]
+    # what an effect adds is the same sum in all modes; of a mode added to the declared ones
+    # nothing was said
+    if (
+        named is None
+        or set(differing) - set(known)
+        or any(len(values) != modes for values in differing.values())
+    ):
+        raise InputError(
+            f"{', '.join(differing)} differs from one relaxation mode to the next, and the law "
+            "with it cannot be written out: only constants of a law with a name can, without "
+            "an added mode. loop.json has the constants of each mode."
+        )
+    ranges = LAWS[named[0]].parameters
+    constants = tuple(
+        # at an end of its range a constant may be beyond it by a rounding
+        known | {n: float(np.clip(own[k], *ranges[n])) for n, own in differing.items()}
+        for k in range(modes)
+    )
+    return NamedPart(named[0], constants), added
 
 
 def _of_each_mode(law: LawOfEachMode) -> NamedPart:

@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
-from discover.equations import AugmentedLaw, Equation, NamedPart, StatePart, law_parts
+from discover.equations import AugmentedLaw, Equation, StatePart, law_parts_by_mode
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
-from discover.laws import LAWS, Fluid
+from discover.laws import Fluid
 from discover.laws.each_mode import with_modes
 from discover.loop.parts import DeclaredEffect, KnownParameter
 from discover.programs import on_device
@@ -72,29 +72,15 @@ def declared_law(
     differ from mode to mode.
     """
     law = declared.law_with(theta[2 : 2 + len(declared.free_parameters)])
+    differing = {name: one.values for name, one in by_mode.items()}
     if by_mode and declared.added_modes:
         return None  # one of the modes is that of an effect
     try:
-        parts = (_named_by_mode(declared, theta, by_mode), ()) if by_mode else law_parts(law)
+        parts = law_parts_by_mode(law, differing, len(declared.modulus))
     except InputError:
         return None
     moduli, times = np.exp(theta[:2, None]) * (declared.modulus, declared.relaxation_time)
     return Equation.of_fluid(Fluid(law, moduli, times, declared.solvent_viscosity), parts)
-
-
-def _named_by_mode(
-    declared: DeclaredModel, theta: Theta, by_mode: Mapping[str, ConstantByMode]
-) -> NamedPart:
-    ranges = LAWS[declared.law_name].parameters
-    known = dict(declared.parameters)
-    for i, parameter in enumerate(declared.free_parameters):
-        known[parameter.name] = float(theta[2 + i])
-    of_modes = []
-    for number in range(len(declared.modulus)):
-        own = known | {name: one.modes[number].value for name, one in by_mode.items()}
-        # at an end of its range a constant may be beyond it by a rounding
-        of_modes.append({n: float(np.clip(value, *ranges[n])) for n, value in own.items()})
-    return NamedPart(declared.law_name, tuple(of_modes))
 
 
 def states_of(

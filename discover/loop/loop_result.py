@@ -12,14 +12,12 @@ import pandas as pd
 from discover.answer import TOLERANCE, Answer, HasAnswer
 from discover.answer.simple_material import SimpleMaterial
 from discover.equations import (
-    AugmentedLaw,
     Equation,
     HasEquation,
-    NamedPart,
     StatePart,
     Tested,
     equation_to_json,
-    law_parts,
+    law_parts_by_mode,
 )
 from discover.equations.equation import box_of, flow_numbers, mean_relaxation_time
 from discover.equations.parts import LawParts
@@ -27,8 +25,7 @@ from discover.errors import InputError
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests
 from discover.inference.engine.free_functions import FreeForm
-from discover.laws import LAWS, Fluid
-from discover.laws.registry import name_of
+from discover.laws import Fluid
 from discover.loop.answering import loop_answer
 from discover.loop.expected_errors import Spread
 from discover.loop.parts import (
@@ -193,37 +190,8 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
 
     def _parts(self, fluid: Fluid) -> LawParts:
         """Return the law of the fluid with a name, if it needs one, and its terms."""
-        differing = {name: self.by_mode[name].modes for name in self.differing_by_mode}
-        if not differing:
-            return law_parts(fluid.law)
-        law = fluid.law
-        for name in [*differing]:
-            moved = law.with_named(name) if isinstance(law, AugmentedLaw) else None
-            if moved is not None:
-                law, constant = moved
-                differing[constant] = differing.pop(name)
-        core, added = law.split()
-        named = name_of(core)
-        known = {} if named is None else named[1]
-        # what an effect adds is the same sum in all modes; of a mode added to the declared ones
-        # nothing was said
-        if (
-            named is None
-            or set(differing) - set(known)
-            or fluid.n_modes != len(next(iter(differing.values())))
-        ):
-            raise InputError(
-                f"{', '.join(differing)} differs from one relaxation mode to the next, and the law "
-                "with it cannot be written out: only constants of a law with a name can, without "
-                "an added mode. loop.json has the constants of each mode."
-            )
-        ranges = LAWS[named[0]].parameters
-        constants = tuple(
-            # at an end of its range a constant may be beyond it by a rounding
-            known | {n: float(np.clip(m[k].value, *ranges[n])) for n, m in differing.items()}
-            for k in range(fluid.n_modes)
-        )
-        return NamedPart(named[0], constants), added
+        differing = {n: self.by_mode[n].values for n in self.differing_by_mode}
+        return law_parts_by_mode(fluid.law, differing, fluid.n_modes)
 
     @cached_property
     def readings(self) -> tuple[Reading, Reading]:

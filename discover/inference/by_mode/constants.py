@@ -102,6 +102,11 @@ class ConstantByMode(StageParameter):
     modes: tuple[ModeConstant, ...]
 
     @property
+    def values(self) -> tuple[float, ...]:
+        """Value of each mode."""
+        return tuple(mode.value for mode in self.modes)
+
+    @property
     def told(self) -> list[ModeConstant]:
         """Modes with an interval, the fastest first; of many those known best and least."""
         known = [mode for mode in self.modes if mode.ci95 is not None]
