@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass, field
 
-_FEW = 3
-"""Modes, each of which is told."""
-
 _OPEN = 100.0
 """Factor above the value from which on an interval tells nothing: two decades, beyond which records
 tell no time   [Davies & Anderssen 1997, J. Non-Newtonian Fluid Mech. 73, 163]."""
@@ -73,11 +70,6 @@ class ModeConstant:
     ci95: tuple[float, float] | None
     left_open: bool
 
-    @property
-    def width(self) -> float:
-        """Width of the interval; infinite where there is none."""
-        return float("inf") if self.ci95 is None else self.ci95[1] - self.ci95[0]
-
 
 @dataclass(frozen=True)
 class ConstantByMode(StageParameter):
@@ -88,10 +80,9 @@ class ConstantByMode(StageParameter):
     mean_time_s
         Mean relaxation time by viscosity.
     degree
-        Of the polynomial in log λ; 0 for one constant of all modes, 3 where modes that the runs
-        tell by themselves are free.
+        3: free in each mode that the runs tell; of earlier results that of a polynomial in log λ.
     evidence
-        For each degree over one constant.
+        The last is that over one constant.
     modes
         In the order of the declared modes.
     """
@@ -105,16 +96,3 @@ class ConstantByMode(StageParameter):
     def values(self) -> tuple[float, ...]:
         """Value of each mode."""
         return tuple(mode.value for mode in self.modes)
-
-    @property
-    def told(self) -> list[ModeConstant]:
-        """Modes with an interval, the fastest first; of many those known best and least."""
-        known = [mode for mode in self.modes if mode.ci95 is not None]
-        if len(known) > _FEW:
-            known = sorted(known, key=lambda mode: mode.width)[:: len(known) - 1]
-        return sorted(known, key=lambda mode: mode.relaxation_time_s)
-
-    @property
-    def open_times_s(self) -> list[float]:
-        """Relaxation times of the modes that are left open, the fastest first."""
-        return sorted(mode.relaxation_time_s for mode in self.modes if mode.ci95 is None)

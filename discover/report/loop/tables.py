@@ -98,8 +98,6 @@ def named(name: str, parameter: StageParameter) -> str:
     text = readable(name.replace("_", " ").replace("build up", "build-up"))
     if not isinstance(parameter, ConstantByMode):
         return text
-    if not parameter.degree:
-        return f"{text} (one for all modes; the interval lets them differ)"
     time = significant(parameter.mean_time_s, 3)
     return f"{text} (varies from mode to mode) at λ = {time} s"
 

@@ -16,15 +16,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     picture,
 )
-from discover.words import effect_title, interval, listed, readable, significant
-
-_DEGREES = (
-    "one constant for all modes",
-    "linear in log λ",
-    "quadratic in log λ",
-    "free in each mode that the runs tell",
-)
-_TRIED = ("linear", "quadratic", "free")
+from discover.words import effect_title, readable, significant
 
 
 def by_mode_picture(
@@ -65,25 +57,15 @@ def by_mode_picture(
         return picture(
             drawing,
             "by_mode",
-            f"{said}{doubt} Intervals take it that the law is the fluid's. They hold one degree "
-            "more than was chosen, where one was tried, and modes that are free where more of them "
-            "are told than a parabola has constants.",
+            f"{said}{doubt} Intervals take it that the law is the fluid's.",
         )
 
 
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     """Return what the data say of a constant by mode."""
     symbol = readable(effect_title(name))
-    gains = [significant(gain, 2) for gain in constant.evidence[1:]]
-    which = (
-        f", {listed(_TRIED[: len(gains)])}"
-        if len(gains) > 1 or constant.degree < len(_TRIED)
-        else ""
-    )
-    tried = f" (evidence over one constant{which}: {listed(gains)})"
-    text = f"{symbol} is {_DEGREES[constant.degree]}{tried}"
-    if not constant.degree:
-        return f"{text}: {significant(constant.value, 2)}. {_allowed(constant)}"
+    gain = significant(constant.evidence[-1], 2)
+    text = f"{symbol} is free in each mode that the runs tell (evidence over one constant: {gain})"
     known = [mode for mode in constant.modes if not mode.left_open]
     if not known:
         return f"{text}, and not determined by these data in any mode."
@@ -93,18 +75,3 @@ def by_mode_sentence(name: str, constant: ConstantByMode) -> str:
     if open_ones:
         text += f" Not determined by these data in the modes of {', '.join(open_ones)} s."
     return text
-
-
-def _allowed(constant: ConstantByMode) -> str:
-    """Return by how much modes may still differ where one constant serves for all."""
-    said = "These data show no difference"
-    ranges = [
-        f"{interval(mode.ci95)} in the mode of {significant(mode.relaxation_time_s, 2)} s"
-        for mode in constant.told
-        if mode.ci95 is not None
-    ]
-    if not ranges:
-        return f"{said}, and determine it in no single mode."
-    text = f"{said}, and allow {' and '.join(ranges)}"
-    left = [significant(time, 2) for time in constant.open_times_s]
-    return f"{text}; they leave it open at {', '.join(left)} s." if left else f"{text}."
