@@ -43,7 +43,7 @@ from discover.study.data import StudyData, load_study_data
 from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
-from discover.words import unknown_name
+from discover.words import counted, unknown_name
 from tensor_library import LawTerm, TermLibrary
 
 Asked = tuple[str, float, Study]
@@ -105,20 +105,18 @@ def data_in_words(data: StudyData, study: Study) -> str:
     samples = sum(len(run) for run in data.fit)
     recorded = in_words(run.quantity for run in data.fit)
     # what is recorded in addition to σ12 is data of its own, and no other run
-    fitted, held_out = (len({run.source for run in part}) for part in (data.fit, data.held_out))
-    runs = f"{recorded} of {_runs(fitted)} ({samples} samples)"
+    fitted, held_out = (
+        counted(len({run.source for run in part}), "run") for part in (data.fit, data.held_out)
+    )
+    runs = f"{recorded} of {fitted} ({samples} samples)"
     made = study.data.synthetic
     if made is None:
         kept = f"{data.dataset.left_out} {data.dataset.thinned}".strip().removesuffix(".")
-        text = f"{runs} of {data.dataset.name}; {_runs(held_out)} held out"
+        text = f"{runs} of {data.dataset.name}; {held_out} held out"
         return f"{text}. {kept}" if kept else text
     law = LAWS[made.law].described(made.parameters)
     noise = f"{100 * made.noise:g} % noise" if made.noise else "no noise"
     return f"{runs} computed from the {law} law, {noise}"
-
-
-def _runs(number: int) -> str:
-    return f"{number} run{'' if number == 1 else 's'}"
 
 
 def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
