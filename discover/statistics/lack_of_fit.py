@@ -16,7 +16,14 @@ from discover.statistics.noise.whiteness import (
     noise_probability,
     repeated,
 )
-from discover.statistics.residual import STRUCTURE, Expectation, judging, summarise, tells_noise
+from discover.statistics.residual import (
+    STRUCTURE,
+    Expectation,
+    judging,
+    noise_floor,
+    summarise,
+    tells_noise,
+)
 from discover.words import percent_of
 
 FitVerdict = Literal["explained", "unexplained", "no_signal"]
@@ -122,14 +129,16 @@ def what_is_left(
     """
     expectation = expectation or Expectation()
     residual, weight, record, outliers = _without_outliers(residuals, measured)
-    rows = judging(weight)
-    misfit = float(np.mean(np.sqrt(np.sum(residual[rows] ** 2, axis=1))))
     further = _further(residual, weight, intervals)
-    floor = expectation.floor(residual, weight, record, further)
-    expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
     known = expectation.noise is not None or tells_noise(weight)
-    explained = known and expectation.explains(residual, weight, record, further)
+    rows = judging(weight)
+    residual, weight, record = residual[rows], weight[rows], record[rows]
+    misfit = float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
     probability = noise_probability(residual, weight, record, further)
+    floor = expectation.noise
+    floor = noise_floor(residual, weight, probability) if floor is None else floor
+    expected = float(np.hypot(max(floor, expectation.repeat_error), expectation.linear_error))
+    explained = known and expectation.explains(residual, weight, probability, floor)
     long = np.any(np.count_nonzero(weight > 0, axis=1) >= FEWEST_TESTED)
     pattern = _PATTERN if long else _PATTERN_OF_SHORT
     verdict: FitVerdict = "explained" if explained else "unexplained"

@@ -74,21 +74,16 @@ def _median_difference(rows: Sequence[Float[np.ndarray, " _"]], order: int) -> f
 def noise_floor(
     residual: Float[np.ndarray, "runs n"],
     weight: Float[np.ndarray, "runs n"],
-    measured: Float[np.ndarray, "runs n"] | None = None,
-    further: Sequence[float] = (),
+    probability: float | None,
 ) -> float:
     """Return the relative noise, mean over runs.
 
     The size of a residual that is noise (single samples count up to six times the noise), else the
     part that changes from sample to sample; correlated noise is then underestimated. Runs too short
-    to be tested are as noisy as the others, or as what changes in them if that is more. Runs that
-    are not `judging` do not count. `further`: tests, as of `noise_probability`.
+    to be tested are as noisy as the others, or as what changes in them if that is more.
+    `probability`: by `noise_probability`.
     """
-    rows = judging(weight)
-    residual, weight = np.asarray(residual)[rows], np.asarray(weight)[rows]
-    measured = None if measured is None else np.asarray(measured)[rows]
     fast = summarise(residual, weight).noise
-    probability = whiteness.noise_probability(residual, weight, measured, further)
     samples = np.count_nonzero(weight > 0, axis=1)
     tested = samples >= whiteness.FEWEST_TESTED
     known = probability is not None and probability > whiteness.SIGNIFICANCE
@@ -135,17 +130,6 @@ def tells_noise(weight: Float[np.ndarray, "runs n"]) -> bool:
     return bool(np.any(np.count_nonzero(np.asarray(weight) > 0, axis=1) >= whiteness.FEWEST_FAST))
 
 
-def is_noise(
-    residual: Float[np.ndarray, "runs n"],
-    weight: Float[np.ndarray, "runs n"],
-    measured: Float[np.ndarray, "runs n"] | None = None,
-    further: Sequence[float] = (),
-) -> bool:
-    """Return whether residuals may be noise, white or of first order; runs too short may be."""
-    probability = whiteness.noise_probability(residual, weight, measured, further)
-    return probability is None or probability > whiteness.SIGNIFICANCE
-
-
 _BLOCK, _FEWEST_BLOCKS = 8, 3
 _LARGEST = 6.0  # robust standard deviations up to which one sample counts as noise
 
@@ -164,49 +148,28 @@ class Expectation:
     linear_error: float = 0.0  # relative error of the linear data that the declared modes come from
     repeat_error: float = 0.0
 
-    @property
-    def patterned(self) -> float:
-        """Relative size that a pattern may have which is due to the sweep or to loadings."""
-        return float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
-
-    def excuses(self, pattern: float) -> bool:
-        """Return whether a pattern of this relative size may be due to the sweep or to loadings."""
-        return self.patterned > 0.0 and pattern <= self.patterned
-
-    def floor(
-        self,
-        residual: Float[np.ndarray, "runs n"],
-        weight: Float[np.ndarray, "runs n"],
-        measured: Float[np.ndarray, "runs n"] | None = None,
-        further: Sequence[float] = (),
-    ) -> float:
-        """Return the relative noise, known or estimated."""
-        if self.noise is not None:
-            return self.noise
-        return noise_floor(residual, weight, measured, further)
-
     def explains(
         self,
         residual: Float[np.ndarray, "runs n"],
         weight: Float[np.ndarray, "runs n"],
-        measured: Float[np.ndarray, "runs n"] | None = None,
-        further: Sequence[float] = (),
+        probability: float | None,
+        floor: float,
     ) -> bool:
         """Return whether noise and the error of the linear data explain a residual.
 
         It may be no larger than both together. A pattern that noise has not may be no larger than
         the error of the linear data or of repeats; or the whole no larger than a given noise.
+        `probability`: by `noise_probability`. `floor`: relative noise.
         """
-        rows = judging(weight)
-        sizes = np.sqrt(np.sum(np.asarray(residual)[rows] ** 2, axis=1))
-        error = float(np.mean(sizes))
-        floor = max(self.floor(residual, weight, measured, further), self.repeat_error)
-        if error > STRUCTURE * float(np.hypot(floor, self.linear_error)):
+        error = float(np.mean(np.sqrt(np.sum(residual**2, axis=1))))
+        if error > STRUCTURE * float(np.hypot(max(floor, self.repeat_error), self.linear_error)):
             return False
-        if is_noise(residual, weight, measured, further):
+        if probability is None or probability > whiteness.SIGNIFICANCE:
             return True
         if self.noise is not None:
             return error <= float(np.hypot(self.noise, self.linear_error))
-        judged = zip(np.asarray(residual)[rows], np.asarray(weight)[rows], strict=True)
-        slow = [slow_part(r[w > 0] * np.sqrt(np.count_nonzero(w))) for r, w in judged]
-        return self.excuses(float(np.mean(slow)))
+        # a pattern may be due to the sweep or to loadings
+        excused = float(np.hypot(STRUCTURE * self.linear_error, self.repeat_error))
+        rows = zip(residual, weight, strict=True)
+        slow = [slow_part(r[w > 0] * np.sqrt(np.count_nonzero(w))) for r, w in rows]
+        return excused > 0.0 and float(np.mean(slow)) <= excused

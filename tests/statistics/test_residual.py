@@ -8,12 +8,34 @@ from independent.noise import correlated, proportional, rms, white
 from discover.statistics import lack_of_fit
 from discover.statistics.lack_of_fit import what_is_left
 from discover.statistics.noise.smooth_misfit import smooth_misfit_probability
-from discover.statistics.noise.whiteness import noise_probability
-from discover.statistics.residual import Expectation, is_noise, judging, noise_floor, tells_noise
+from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
+from discover.statistics.residual import Expectation, judging, noise_floor, tells_noise
 
 RUNS, SAMPLES = 6, 60
 WEIGHT = np.full((RUNS, SAMPLES), 1 / np.sqrt(SAMPLES))
 PHASE = np.linspace(0.0, 6.0, SAMPLES)
+
+
+def is_noise(residual, weight):
+    return noise_probability(residual, weight) > SIGNIFICANCE
+
+
+def floor_and_explained(residual, weight, **budget):
+    """Return the noise of a residual, and whether a complete model may leave it."""
+    rows, budget = judging(weight), Expectation(**budget)
+    residual, weight = residual[rows], weight[rows]
+    probability = noise_probability(residual, weight)
+    floor = noise_floor(residual, weight, probability)
+    noise = floor if budget.noise is None else budget.noise
+    return floor, budget.explains(residual, weight, probability, noise)
+
+
+def explained(residual, weight=None, **budget):
+    return floor_and_explained(residual, WEIGHT if weight is None else weight, **budget)[1]
+
+
+def floor_of(residual, weight):
+    return floor_and_explained(residual, weight)[0]
 
 
 def noise(correlation=0.0, seed=0, size=0.01):
@@ -48,29 +70,29 @@ def test_runs_of_a_few_samples_say_nothing():
 @pytest.mark.parametrize("correlation", [0.0, 0.6])
 def test_the_floor_is_the_size_of_the_noise_correlated_or_not(correlation):
     # 360 samples, of which the correlation leaves 90: 7 % standard error
-    assert noise_floor(noise(correlation), WEIGHT) == pytest.approx(0.01, rel=0.2)
+    assert floor_of(noise(correlation), WEIGHT) == pytest.approx(0.01, rel=0.2)
 
 
 def test_what_a_model_may_leave_is_noise_and_the_error_of_the_linear_data():
     smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
     left = noise() + smooth
-    assert not Expectation().explains(left, WEIGHT)
-    assert Expectation(linear_error=0.02).explains(left, WEIGHT)
+    assert not explained(left)
+    assert explained(left, linear_error=0.02)
     # an error of the linear data that is far smaller does not excuse it
-    assert not Expectation(linear_error=0.002).explains(left, WEIGHT)
+    assert not explained(left, linear_error=0.002)
     # nor does a noise that is given, unless it is as large as the whole
-    assert Expectation(noise=0.02).explains(left, WEIGHT)
-    assert not Expectation(noise=0.015).explains(left, WEIGHT)
-    assert not Expectation(noise=0.005).explains(left, WEIGHT)
+    assert explained(left, noise=0.02)
+    assert not explained(left, noise=0.015)
+    assert not explained(left, noise=0.005)
 
 
 def test_what_repeated_runs_differ_by_may_have_a_pattern_of_its_size_and_no_more():
     smooth = np.tile(0.02 * np.sin(PHASE), (RUNS, 1)) / np.sqrt(SAMPLES)
     left = noise() + smooth  # the pattern is 1.4 %, the noise 1 %
-    assert Expectation(repeat_error=0.02).explains(left, WEIGHT)
-    assert not Expectation(repeat_error=0.01).explains(left, WEIGHT)
+    assert explained(left, repeat_error=0.02)
+    assert not explained(left, repeat_error=0.01)
     # what is left may be as large as before, and no pattern beyond it
-    assert not Expectation(repeat_error=0.02).explains(noise() + 3.0 * smooth, WEIGHT)
+    assert not explained(noise() + 3.0 * smooth, repeat_error=0.02)
 
 
 def with_a_short_run(samples, miss):
@@ -85,16 +107,16 @@ def with_a_short_run(samples, miss):
 def test_a_run_of_a_few_samples_decides_nothing_beside_longer_ones(samples):
     residual, weight = with_a_short_run(samples, 0.3)
     assert judging(weight).tolist() == [True, True, False]
-    assert noise_floor(residual, weight) == pytest.approx(0.01, rel=0.2)
-    assert Expectation().explains(residual, weight)
+    assert floor_of(residual, weight) == pytest.approx(0.01, rel=0.2)
+    assert explained(residual, weight)
 
 
 def test_the_size_of_a_run_too_short_to_be_tested_is_no_sign_of_noise():
     residual, weight = with_a_short_run(15, 0.3)
-    assert noise_floor(residual, weight) == pytest.approx(0.01, rel=0.2)
-    assert not Expectation().explains(residual, weight)
+    assert floor_of(residual, weight) == pytest.approx(0.01, rel=0.2)
+    assert not explained(residual, weight)
     residual, weight = with_a_short_run(15, 0.01)
-    assert Expectation().explains(residual, weight)
+    assert explained(residual, weight)
 
 
 def test_runs_that_are_all_of_a_few_samples_do_not_say_how_noisy_they_are():
@@ -187,7 +209,7 @@ def test_longer_runs_tell_short_ones_how_correlated_their_noise_is():
 def test_the_noise_of_short_runs_is_their_size_where_nothing_speaks_against_it():
     residual = noise_short(np.random.default_rng(1)) / np.sqrt(15)
     # 90 samples: 7 % standard error
-    assert noise_floor(residual, np.full((6, 15), 1 / np.sqrt(15))) == pytest.approx(0.01, rel=0.2)
+    assert floor_of(residual, np.full((6, 15), 1 / np.sqrt(15))) == pytest.approx(0.01, rel=0.2)
 
 
 GROWTH, WAVE = np.geomspace(0.05, 10.0, 60), np.linspace(0.0, 12.0, 121)

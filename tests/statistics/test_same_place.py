@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from discover.statistics.lack_of_fit import what_is_left
-from discover.statistics.noise.whiteness import same_place_probability
+from discover.statistics.noise.whiteness import noise_probability, same_place_probability
 from discover.statistics.residual import Expectation, noise_floor
 
 NOISE, SAMPLES = 0.01, 61
@@ -75,7 +75,9 @@ def test_few_samples_do_not_hide_a_misfit_in_the_noise():
     for seed in range(20):
         noise = NOISE * np.random.default_rng(seed).standard_normal((4, 8))
         weight = np.full((4, 8), 1.0 / np.sqrt(8.0))
-        floors.append(noise_floor((missed + noise) * weight, weight))
-        assert not Expectation().explains((missed + noise) * weight, weight)
+        residual = (missed + noise) * weight
+        probability = noise_probability(residual, weight)
+        floors.append(noise_floor(residual, weight, probability))
+        assert not Expectation().explains(residual, weight, probability, floors[-1])
     # 16 differences tell it to 40 %, the mean of 20 draws to 9 %; the bends of the misfit add some
     assert np.mean(floors) < 1.5 * NOISE

@@ -5,7 +5,6 @@ by its order and not by its size.
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -116,26 +115,6 @@ def noise_probability(
     `measured`: the records, by which cycles are found. `further`: probabilities by other tests of
     the longer runs.
     """
-    arrays = [residual, weight] if measured is None else [residual, weight, measured]
-    exact = [np.ascontiguousarray(values, dtype=float) for values in arrays]
-    return _remembered(tuple((one.shape, one.tobytes()) for one in exact), tuple(further))
-
-
-@lru_cache(maxsize=32)
-def _remembered(
-    arrays: tuple[tuple[tuple[int, ...], bytes], ...], further: tuple[float, ...]
-) -> float | None:
-    """Return the same; how large a residual may be and what it holds are asked one by one."""
-    residual, weight, *measured = (np.frombuffer(data).reshape(shape) for shape, data in arrays)
-    return _probability(residual, weight, measured[0] if measured else None, further)
-
-
-def _probability(
-    residual: Float[np.ndarray, "runs n"],
-    weight: Float[np.ndarray, "runs n"],
-    measured: Float[np.ndarray, "runs n"] | None,
-    further: Sequence[float],
-) -> float | None:
     rows, records, short = [], [], []
     for i, (values, seen) in enumerate(zip(residual, weight, strict=True)):
         row = np.asarray(values)[np.asarray(seen) > 0]
