@@ -161,16 +161,15 @@ def _drawn(found: Found, fit: Fit, as_recorded: bool):
     """Return constants, moduli and gains of a hypothesis: the likeliest, then pairs of draws."""
     problem = found.posterior.problem
     assert fit.covariance is not None
-    root = np.linalg.cholesky(fit.covariance)
-    lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(root)))
-    moved = np.concatenate([np.zeros((1, len(root))), lot, -lot]) @ root.T
-    p, runs = len(fit.priors), len(problem.fitted.runs)
-    thetas = np.array([fit.at(fit.coordinates + one[:p]) for one in moved])
-    linear = fit.linear + moved[:, p:]
-    gains = 1.0 + linear[:, 0] if as_recorded else np.ones(len(moved))
-    moduli = np.tile(problem.moduli, (len(moved), 1))
+    lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
+    normal = np.concatenate([np.zeros((1, lot.shape[1])), lot, -lot])
+    thetas = fit.drawn(normal)
+    linear = fit.linear + normal @ np.linalg.cholesky(fit.covariance)[len(fit.priors) :].T
+    gains = 1.0 + linear[:, 0] if as_recorded else np.ones(len(normal))
+    moduli = np.tile(problem.moduli, (len(normal), 1))
     if problem.modulus_root is not None:
-        shifts = linear[:, 1 + (2 + bool(problem.loading)) * runs :] @ problem.modulus_root.T
+        of_runs = found.posterior.search.fitter.errors.of_runs
+        shifts = linear[:, of_runs.stop :] @ problem.modulus_root.T
         moduli[:, : shifts.shape[1]] += shifts
     if not as_recorded:
         thetas[:, _of_bench(found)] = problem.zero[_of_bench(found)]

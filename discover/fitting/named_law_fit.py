@@ -10,7 +10,7 @@ import pandas as pd
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from discover.answer import QUANTITIES, TOLERANCE, Answer, Discrepancy, HasAnswer, Mode
+from discover.answer import QUANTITIES, TOLERANCE, Answer, HasAnswer, Mode
 from discover.answer import Constant as Fitted
 from discover.dataset import Dataset
 from discover.equations import Equation, HasEquation
@@ -18,7 +18,7 @@ from discover.errors import InputError
 from discover.forward import AugmentedModel, make_batch
 from discover.laws import LAWS, Fluid
 from discover.loop.answering import range_of
-from discover.loop.by_quantity import beyond_noise, measured
+from discover.loop.by_quantity import measured, of_fitted
 from discover.loop.run_record import RunRecord
 from discover.statistics import LackOfFit
 from discover.summary_view import Estimate, PageView, SummaryView
@@ -173,10 +173,8 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
         equation = self.written and self.equation()
         law = LAWS[self.law]
         noise = self.misfit.noise
-        size = beyond_noise(self.misfit.misfit, noise)
-        fitted = [one for one in self.records if not one.held_out]
-        by_run = {one.name: beyond_noise(float(one.errors[0]), noise) for one in fitted}
-        exact = self.fits_to_the_noise or not np.isfinite(size)
+        left = of_fitted(self.records, self.misfit.misfit, noise)
+        exact = self.fits_to_the_noise or not np.isfinite(left.size)
         expected = {name: measured(self.records, name, noise) for name in QUANTITIES}
         modes = np.asarray(self.fluid.modulus), np.asarray(self.fluid.relaxation_time)
         answer = Answer(
@@ -191,7 +189,7 @@ class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
             self.error,
             noise,
             self.fits_to_the_noise,
-            None if exact else Discrepancy(size, (size, size), by_run),
+            None if exact else left,
             range_of(self.records, equation),
             {name: one for name, one in expected.items() if one is not None},
             failed=self._caveats(),

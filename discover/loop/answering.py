@@ -10,7 +10,6 @@ import numpy as np
 from discover.answer import (
     Answer,
     Constant,
-    Discrepancy,
     ExpectedError,
     Mode,
     Range,
@@ -30,9 +29,9 @@ from discover.errors import InputError
 from discover.inference.by_mode.constants import StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.by_quantity import (
-    beyond_noise,
     errors_by_quantity,
     normal_stress_settled,
+    of_fitted,
     of_stress,
     with_unseen,
 )
@@ -156,9 +155,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
     found = range_of(result.records)
     inelastic = ExpectedError(missing="not modelled")
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
-    size = beyond_noise(result.error_after.fit, result.noise_floor)
-    fitted = [record for record in result.records if not record.held_out]
-    by_run = {r.name: beyond_noise(float(r.errors[-1]), result.noise_floor) for r in fitted}
+    left = of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
         material.title,
         material.law,
@@ -166,7 +163,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         error=result.error_after.fit,
         noise=result.noise_floor,
         fits_to_the_noise=to_noise,
-        discrepancy=None if to_noise else Discrepancy(size, (size, size), by_run),
+        discrepancy=None if to_noise else left,
         range=found,
         expected_error={"sigma12": of_stress(result), "N1": inelastic, "N2": inelastic},
         next_test=following,

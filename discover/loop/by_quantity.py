@@ -34,6 +34,14 @@ def beyond_noise(error: float, noise: float | None) -> float:
     return float(np.sqrt(max(error**2 - (noise or 0.0) ** 2, 0.0)))
 
 
+def of_fitted(records: Sequence[RunRecord], error: float, noise: float) -> Discrepancy:
+    """Return what a law leaves of the fitted runs besides noise, without an interval."""
+    size = beyond_noise(error, noise)
+    fitted = [record for record in records if not record.held_out]
+    by_run = {one.name: beyond_noise(float(one.errors[-1]), noise) for one in fitted}
+    return Discrepancy(size, (size, size), by_run)
+
+
 def with_unseen(result: Any) -> Discrepancy | None:
     """Return the discrepancy of a closed loop, of all unseen runs in the range if there are any."""
     if result.discrepancy is None:

@@ -63,9 +63,7 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     thetas, weights = [best.theta], []
     for fit, weight in weighed:
         assert fit.covariance is not None
-        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
-        normal = lot.standard_normal((_DRAWS, root.shape[1]))
-        thetas += [fit.at(fit.coordinates + root @ one) for one in normal]
+        thetas += [*fit.drawn(lot.standard_normal((_DRAWS, len(fit.covariance))))]
         weights += [weight / _DRAWS] * _DRAWS
     inside = [_run(*one) for one in _flows_inside(runs, rates)]
     fast = start_up(BEYOND * max(rates))

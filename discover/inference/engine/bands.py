@@ -125,10 +125,8 @@ class Predictions:
         predicted = self._ahead(fit)
         assert predicted is not None
         assert fit.covariance is not None
-        root = np.linalg.cholesky(fit.covariance)[: len(fit.priors)]
-        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, root.shape[1]))
-        drawn = fit.coordinates + np.concatenate([lot, -lot]) @ root.T
-        found = self.fitter.predict([fit.at(one) for one in drawn])
+        lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
+        found = self.fitter.predict(fit.drawn(np.concatenate([lot, -lot])))
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
         spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)

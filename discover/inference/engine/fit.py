@@ -62,6 +62,12 @@ class Fit:
         ends = self.priors.ends
         return self.priors.placed(self.theta, np.clip(coordinates, ends[:, 0], ends[:, 1]))
 
+    def drawn(self, normal: Float[np.ndarray, "draws n"]) -> Float[np.ndarray, "draws p"]:
+        """Return constants drawn from this fit, of independent normal numbers for all it holds."""
+        assert self.covariance is not None
+        root = np.linalg.cholesky(self.covariance)[: len(self.priors)]
+        return self.at(self.coordinates + normal @ root.T)
+
     def interval(self, position: int) -> tuple[float, float]:
         """Return the 95 % interval of a free constant by this fit alone, inside its range."""
         assert self.covariance is not None
