@@ -11,7 +11,7 @@ from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
 from discover.forward import DeclaredModel, make_batch
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.problem import Problem
-from discover.laws import LAWS, UpperConvectedMaxwell
+from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found
 from discover.loop.task import with_law
@@ -69,14 +69,10 @@ def fit_classical_laws(
 
 def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tuple[Fitter, Fit]]:
     """Return the classical laws as effects added to upper convected Maxwell."""
-    problem = found.posterior.problem
-    declared = problem.declared
-    is_maxwell = isinstance(declared.law, UpperConvectedMaxwell) and declared.law.linear_relaxation
-    if declared.by_mode or not is_maxwell or not _holds_classical(problem):
-        bare = with_law(replace(declared, by_mode=()), "ucm")
-        known = {effect.name for effect in (*declared.effects, *bench)}
-        names = {name for some in _AS_EFFECTS.values() for name in some} - known
-        problem = _problem(found, bare, [*map(make_effect, sorted(names)), *bench])
+    declared = with_law(replace(found.posterior.problem.declared, by_mode=()), "ucm")
+    known = {effect.name for effect in (*declared.effects, *bench)}
+    names = {name for some in _AS_EFFECTS.values() for name in some} - known
+    problem = _problem(found, declared, [*map(make_effect, sorted(names)), *bench])
     fitter = Fitter(problem, problem.fitted)
     names = [effect.name for effect in bench]
     owners, starts = [], []
@@ -93,11 +89,6 @@ def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tu
         if law not in best or fit.log_evidence > best[law][1].log_evidence:
             best[law] = fitter, fit
     return best
-
-
-def _holds_classical(problem: Problem) -> bool:
-    candidates = {effect.name for effect in problem.candidates}
-    return all(set(own) <= candidates for own in _AS_EFFECTS.values())
 
 
 def _problem(found: Found, declared: DeclaredModel, effects: Sequence[AbstractEffect]) -> Problem:
