@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import get_args
 
 import numpy as np
 from jaxtyping import Float
@@ -71,11 +70,7 @@ class Path:
     @cached_property
     def verdict(self) -> Verdict:
         """What is to be believed."""
-        if self.without_fluid:
-            return "no_signal"
-        found = self.posterior.verdict
-        known = {one: one for one in get_args(Verdict)}
-        return known[found]
+        return "no_signal" if self.without_fluid else self.posterior.verdict
 
     @cached_property
     def fit(self) -> Fit:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -88,8 +89,8 @@ class Posterior:
     memory: dict = field(default_factory=dict)
 
     @property
-    def verdict(self) -> str:
-        """``unexplained``, ``effects_added`` or ``no_effect_needed``."""
+    def verdict(self) -> Literal["unexplained", "effects_added", "no_effect_needed"]:
+        """What is to be believed."""
         if self.unexplained >= 0.5 or not self.explanations:
             return "unexplained"
         return "effects_added" if self.explanations[0].members[0] else "no_effect_needed"
