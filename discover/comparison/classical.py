@@ -8,9 +8,8 @@ import numpy as np
 from discover.comparison.flows import Flow, columns_of, of_recorded, relative_errors
 from discover.comparison.known_part import Frame
 from discover.effects import AbstractEffect, ConstitutiveEffect, make_effect
-from discover.forward import DeclaredModel, make_batch
+from discover.forward import make_batch
 from discover.inference.engine.fits import Fit, Fitter
-from discover.inference.engine.problem import Problem
 from discover.laws import LAWS
 from discover.loop.answering import LAW_OF_EFFECT
 from discover.loop.loop import Found
@@ -72,7 +71,7 @@ def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tu
     declared = with_law(replace(found.posterior.problem.declared, by_mode=()), "ucm")
     known = {effect.name for effect in (*declared.effects, *bench)}
     names = {name for some in _AS_EFFECTS.values() for name in some} - known
-    problem = _problem(found, declared, [*map(make_effect, sorted(names)), *bench])
+    problem = found.task.problem(declared, [*map(make_effect, sorted(names)), *bench])
     fitter = Fitter(problem, problem.fitted)
     names = [effect.name for effect in bench]
     owners, starts = [], []
@@ -91,15 +90,10 @@ def _added_to_ucm(found: Found, bench: Sequence[AbstractEffect]) -> dict[str, tu
     return best
 
 
-def _problem(found: Found, declared: DeclaredModel, effects: Sequence[AbstractEffect]) -> Problem:
-    task = found.task
-    return Problem(declared, effects, task.fitted, (), task.loading, task.noise, task.computed)
-
-
 def _of_law(found: Found, name: str, bench: Sequence[AbstractEffect]) -> tuple[Fitter, Fit]:
     """Return any named law in place of the declared one."""
     declared = with_law(replace(found.posterior.problem.declared, by_mode=()), name)
-    problem = _problem(found, declared, bench)
+    problem = found.task.problem(declared, bench)
     fitter = Fitter(problem, problem.fitted)
     names = [effect.name for effect in bench]
     starts = [problem.zero]

@@ -1,4 +1,4 @@
-"""Least-squares fit of one named law, within bounds, from several starts."""
+"""Fit of one named law, within bounds, from several starts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

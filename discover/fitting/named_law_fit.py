@@ -60,7 +60,7 @@ class Constant:
 
 @dataclass(frozen=True, eq=False)
 class NamedLawFit(SummaryView, PageView, HasEquation, HasAnswer):
-    """One named law fitted to runs by least squares.
+    """One named law fitted to runs.
 
     Attributes
     ----------

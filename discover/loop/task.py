@@ -102,15 +102,21 @@ class Task:
             progress or (lambda line: None), computed, dataset.names, spikes, of_rates,
         )  # fmt: skip
 
-    def problem(self, declared: DeclaredModel) -> Problem:
-        """Return the problem that a declared model makes of the runs."""
-        admitted = admission(self.fitted, self.held_out)
-        known = {effect.name for effect in declared.effects}
-        candidates = [e for e in self.candidates if admitted(e) and e.name not in known]
+    def problem(
+        self, declared: DeclaredModel, effects: Sequence[AbstractEffect] | None = None
+    ) -> Problem:
+        """Return the problem that a declared model makes of the runs.
+
+        `effects`: those that may be there, for a fit to the fitted runs alone; else all candidates.
+        """
+        runs = self.held_out if effects is None else ()
+        if effects is None:
+            admitted = admission(self.fitted, self.held_out)
+            known = {effect.name for effect in declared.effects}
+            effects = [e for e in self.candidates if admitted(e) and e.name not in known]
         return Problem(
-            declared, candidates, self.fitted, self.held_out, self.loading, self.noise,
-            self.computed,
-        )  # fmt: skip
+            declared, effects, self.fitted, runs, self.loading, self.noise, self.computed
+        )
 
     def explained(self, declared: DeclaredModel) -> Posterior:
         """Return the posterior over what a declared model lacks.
