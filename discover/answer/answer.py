@@ -93,7 +93,9 @@ class Constant:
 
     @property
     def interval(self) -> str:
-        """95 % interval, or a dash."""
+        """95 % interval, or a dash; also of what is not determined."""
+        if not self.determined:
+            return "–"
         if (other := self.reciprocal) is not self:
             return other.interval
         if self.bound:
