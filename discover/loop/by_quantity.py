@@ -119,15 +119,16 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
 
 
 def _second_difference(result: Any, settled: bool, differ: str, name: str) -> ExpectedError:
-    """Return what is said of N2 where nothing measured it: that of the law, if laws agree."""
+    """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
     apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
     if apart and apart > _WORTH_SAYING:
         return ExpectedError(missing="not determined", note=f"{differ} of N1")
     ratio = None if spread is None else spread.over_n1
-    if not settled or ratio is None:
+    if ratio is None:
         return ExpectedError(missing="not determined", note="not measured")
     share = "0" if abs(ratio) < _NOTHING else f"{percent_of(ratio)} of N1".replace("-", "−")
-    return ExpectedError(missing="untested", note=f"{share} {_given(name)}")
+    missing = "untested" if settled else "not determined"
+    return ExpectedError(missing=missing, note=f"{share} {_given(name)}")
 
 
 def _given(name: str) -> str:
