@@ -19,8 +19,6 @@ _REPLACEMENTS = (
     (r"\boldsymbol", r"\mathbf"),
     (r"\bm", r"\mathbf"),
     (r"\text{", r"\mathrm{"),
-    (r"\left", ""),
-    (r"\right", ""),
     (r"\;", r"\ "),
 )
 

@@ -30,6 +30,7 @@ from discover.answer.sentences import (
     separable,
     worst_run,
 )
+from discover.effects import StateEffect
 from discover.equations import Equation
 from discover.equations.files import FORMATS
 from discover.equations.spelling.markup import law_element
@@ -352,7 +353,7 @@ def _law(equation: Equation, rest: bool = False) -> str:
         # what a state of the whole fluid does stands below the law of a mode
         index = "_k" if modes > 1 else ""
         parts = [
-            one.equation.replace("_k", index) + _at_rest(one.states, part.own.rest)
+            one.equation.replace("_k", index) + _at_rest(one.states, part.own)
             for one, part in zip(equation.spelled_states, equation.states, strict=True)
         ]
         return law + _formulas(parts)
@@ -360,9 +361,11 @@ def _law(equation: Equation, rest: bool = False) -> str:
         return ""
 
 
-def _at_rest(states: Sequence[str], value: float) -> str:
+def _at_rest(states: Sequence[str], effect: StateEffect) -> str:
     """Return what the states of a fluid are at rest, as it goes on behind their equation."""
-    return "".join(rf",\quad {state} = {value:g}\ \mathrm{{at\ rest}}" for state in states)
+    index = "" if effect.levels == 1 else "_i"
+    rest = rf"{index} = {effect.rest:g}\ \mathrm{{at\ rest}}"
+    return "".join(rf",\quad {state}{rest}" for state in states)
 
 
 def _copies(answer: Answer) -> list[Mapping[str, str]]:
