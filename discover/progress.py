@@ -86,28 +86,56 @@ def by_time(
     return say
 
 
+class Crowding:
+    """How much longer this process takes than alone: time on the clock over that of its processors.
+
+    One at least; other processes that want the same cores raise it. Counted from the beginning.
+    """
+
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.perf_counter,
+        processor: Callable[[], float] = time.process_time,
+    ):
+        self._clock, self._processor = clock, processor
+        self._begun = clock(), processor()
+
+    def __call__(self) -> float:
+        """Return the factor so far."""
+        passed, worked = self._clock() - self._begun[0], self._processor() - self._begun[1]
+        return max(1.0, passed / worked) if worked > _TELLING else 1.0
+
+
+_TELLING = 0.2
+"""Seconds of the processor that tell how crowded a machine is."""
+
 STATES = 0.125
 """Fraction that is done when states alone begin to be searched: most are found to be those of an
 inelastic material at once. It is of the drawing too."""
 
 
 class FollowedBy:
-    """Progress of a part from the beginning, after which others take so many seconds."""
+    """Progress of a part from the beginning, after which others take so many seconds.
+
+    `seconds`: on a machine of its own. `crowding`: how much longer it takes.
+    """
 
     def __init__(
         self,
         progress: Progress | None,
         seconds: float,
         clock: Callable[[], float] = time.perf_counter,
+        crowding: Callable[[], float] | None = None,
     ):
         self._progress, self._seconds, self._clock = progress, seconds, clock
+        self._crowding = crowding or Crowding()
         self.begun, self._largest = clock(), 0.0
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""
         if fraction > STATES:
             passed = self._clock() - self.begun
-            fraction = passed / (passed / fraction + self._seconds)
+            fraction = passed / (passed / fraction + self._seconds * self._crowding())
         self._largest = max(self._largest, fraction)
         (self._progress or silent)(text, self._largest)
 

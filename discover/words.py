@@ -13,6 +13,10 @@ _LIKENESS = 0.65
 """Least share of letters in common of a guess: 'alfa' is alpha (0.67), 'sweep' no creep (0.60)."""
 
 
+LEVEL = "95 % CI"
+"""What stands before or above an interval of 95 %."""
+
+
 def listed(parts: Sequence[str]) -> str:
     """Return what is listed in a sentence: 'one', 'one and another', 'one, another and a third'."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)

@@ -2,8 +2,17 @@
 
 import pytest
 
+from discover.batch.run import _DRAWING
+from discover.comparison.time_left import ComparisonTime
 from discover.loop.search_time import SearchTime
-from discover.progress import FollowedBy, by_shares, by_time, on_stop, run_stop_callbacks
+from discover.progress import (
+    Crowding,
+    FollowedBy,
+    by_shares,
+    by_time,
+    on_stop,
+    run_stop_callbacks,
+)
 
 
 def test_each_part_of_a_task_moves_on_by_its_share():
@@ -105,22 +114,26 @@ RECORDED = {
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("crowding", [1.0, 8.0])
 @pytest.mark.parametrize("name", RECORDED)
-def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_tenth_on(name):
+def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_tenth_on(
+    name, crowding
+):
     now, told = 0.0, []
 
     def clock():
         return now
 
-    whole = FollowedBy(lambda text, fraction: told.append(fraction), 2.5, clock)
+    whole = FollowedBy(lambda text, fraction: told.append(fraction), 2.5, clock, lambda: crowding)
     say = by_time(whole, clock)
     without = "none held out" in name
     search = SearchTime(
         int(name[-9]), "one mode" not in name, 1, not without, "gel" not in name and not without,
-        clock=clock,
+        clock=clock, crowding=lambda: crowding,
     )  # fmt: skip
-    end, checked = RECORDED[name][-1][0], 0
-    for now, line in RECORDED[name][:-1]:  # the clock reads it
+    record = [(crowding * at, line) for at, line in RECORDED[name]]
+    end, checked = record[-1][0], 0
+    for now, line in record[:-1]:  # the clock reads it
         whole(line, 1.0) if line == "drawing" else say(line, search.heard(line))
         if told[-1] and now > 0.1 * end:
             left = now * (1.0 - told[-1]) / told[-1]
@@ -130,9 +143,60 @@ def test_the_time_left_of_recorded_loops_is_right_within_a_factor_of_1_5_from_a_
     assert checked >= len(RECORDED[name]) // 2
 
 
+# the same of the demonstration's comparison; learners ended at a fifth of their steps
+DEMO = [
+    (0.74, "searching", "search among 31 effects"),
+    (1.15, "searching", "sets of 1: 24 fitted, likeliest: giesekus_mobility"),
+    (1.69, "searching", "sets of 2: 24 fitted, likeliest: giesekus_mobility"),
+    (1.82, "searching", "exchanged: 50 sets, likeliest: giesekus_mobility"),
+    (2.68, "learning"),
+    (4.00, "learned", "starting", 0.0),
+    (8.59, "learned", "step 1 of at most 228", 0.0),
+    (14.39, "learned", "11 laws fitted", 0.13),
+    (19.97, "weighing", "weighing what was found"),
+    (20.72, "searching", "curves of one variable"),
+    (29.93, "drawing"),
+    (38.38, "end"),
+]
+
+
+@pytest.mark.parametrize("crowding", [1.0, 8.0])
+def test_the_time_left_of_a_comparison_is_right_on_a_crowded_machine_too(crowding):
+    now, told = 0.0, []
+
+    def clock():
+        return now
+
+    whole = FollowedBy(
+        lambda text, fraction: told.append(fraction), _DRAWING["compare"], clock, lambda: crowding
+    )
+    times = ComparisonTime(whole, 3, False, False, 1.0, clock, lambda: crowding)
+    end = crowding * DEMO[-1][0]
+    for at, what, *said in DEMO[:-1]:
+        now = crowding * at  # the clock reads it
+        if what == "drawing":
+            whole("", 1.0)
+        else:
+            getattr(times, what)(*said)
+        if now > 0.1 * end and what != "learning":
+            left = now * (1.0 - told[-1]) / told[-1]
+            assert 1.0 / 1.5 < left / (end - now) < 1.5, (what, said)
+
+
+def test_a_machine_is_as_crowded_as_its_processor_is_late():
+    now, worked = 10.0, 3.0
+    crowding = Crowding(lambda: now, lambda: worked)
+    now, worked = 11.0, 3.1
+    assert crowding() == 1.0  # too early to tell
+    now, worked = 30.0, 7.0
+    assert crowding() == pytest.approx(5.0)
+    worked = 43.0  # several cores
+    assert crowding() == 1.0
+
+
 def test_rounds_that_leave_a_run_out_each_take_as_long_as_the_first():
     now = 0.0
-    search = SearchTime(1, False, rounds=3, clock=lambda: now)
+    search = SearchTime(1, False, rounds=3, clock=lambda: now, crowding=lambda: 1.0)
     # 8 fits a second, of one effect 10, none exchanged; then 135 fits, 36 and 3.5 s, 15 and 8 s
     round_ = [(0.0, "search among 400 effects"), (40.0, "sets of 1: 400 fitted"),
               (40.0, "exchanged: 400 sets"), (56.9, "curves of one variable"),

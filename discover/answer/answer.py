@@ -10,7 +10,7 @@ from discover.equations.equation import Equation
 from discover.equations.spelling.plain_signs import plain as plain_signs
 from discover.plain_numbers import plain
 from discover.summary_view import Estimate
-from discover.words import effect_title, estimate, interval, readable, significant
+from discover.words import LEVEL, effect_title, estimate, interval, readable, significant
 
 TOLERANCE = 0.05
 """Relative discrepancy that is accepted where nobody says otherwise."""
@@ -40,6 +40,7 @@ class Constant:
     determined: bool = True  # whether the data determine it
     letter: str = ""  # LaTeX, as the equation of its effect has it
     meaning: str = ""  # in a few words, where its letter is not one of the field
+    end: Literal["", "low", "high"] = ""  # of its physical range, where the value is there
 
     @property
     def is_term(self) -> bool:
@@ -59,6 +60,7 @@ class Constant:
             ci95=None if self.ci95 is None else (1.0 / high, 1.0 / low),
             unit=_RECIPROCAL[self.unit],
             letter=self.letter.removeprefix("1/"),
+            end=_OTHER_END[self.end],
         )
 
     @property
@@ -91,9 +93,13 @@ class Constant:
 
     @property
     def interval(self) -> str:
-        """95 % interval, or a dash."""
+        """95 % interval, or a dash; also of what is not determined."""
+        if not self.determined:
+            return "–"
         if (other := self.reciprocal) is not self:
             return other.interval
+        if self.bound:
+            return self.bound
         low, high = self.ci95 or (math.nan, math.nan)
         first, last = self._rounded(low), self._rounded(high)
         if first and last:
@@ -133,28 +139,54 @@ class Constant:
     @property
     def text(self) -> str:
         """Symbol, value and interval."""
-        return self.with_interval("95 %: ")
+        return self.with_interval(f"{LEVEL} ")
 
     def with_interval(self, level: str) -> str:
         """Return symbol, value and interval, with what stands before the interval."""
         if not self.determined:
             return f"{self.symbol} not determined"
-        if self.at_end:
-            return f"{self.symbol} {self.at_end}"
-        ends = f" ({level}{self.interval})" if self.has_interval else ""
-        return f"{self.symbol} = {self.number}{ends}"
+        return f"{self.symbol}{'' if self.bound else ' ='} {self.measured(level)}"
+
+    def measured(self, level: str) -> str:
+        """Return value and interval, with what stands before the interval.
+
+        Of a value near an end of its interval the interval comes first: alone it would look like a
+        slip, and no other value goes with the other constants.
+        """
+        if not self.has_interval:
+            return self.number
+        if not self.bound and not self.is_skewed:
+            return f"{self.number} ({level}{self.interval})"
+        level = f"{level.strip()}, " if level.strip() else ""
+        _, space, unit = self.number.partition(" ")
+        return f"{self.interval}{space}{unit} ({level}best fit {self.number})"
 
     @property
-    def at_end(self) -> str:
-        """Bound that remains of a value at an end of its range; empty of one inside."""
-        if self.ci95 is None or not self.has_interval or self.ci95[0] < self.value < self.ci95[1]:
-            return ""
+    def is_skewed(self) -> bool:
+        """Whether the value, the best of all constants together, is near an end of its interval.
+
+        The interval is over all laws that fit as well, in which it may be far from that value.
+        """
+        if not self.has_interval or self.ci95 is None:
+            return False
         low, high = self.ci95
-        bound = replace(self, value=low if self.value >= high else high).number
-        return f"{'≥' if self.value >= high else '≤'} {bound}, at the end of its range"
+        return not _NEAR_END < (self.value - low) / (high - low) < 1.0 - _NEAR_END
+
+    @property
+    def bound(self) -> str:
+        """Bound that remains of a value at an end of its physical range; empty of one inside."""
+        one = self.reciprocal
+        if not one.end or one.ci95 is None or not one.has_interval:
+            return ""
+        low, high = one.ci95
+        sign, value = ("≥", low) if one.end == "high" else ("≤", high)
+        return f"{sign} {replace(one, value=value, end='').number.partition(' ')[0]}"
 
 
 _MINUS = "−"
+_OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
+_NEAR_END = 0.1
+"""Share of an interval at its ends in which a value is not near its middle."""
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
@@ -206,12 +238,11 @@ class Suspect:
         if not amplitude.determined:
             return f"{title} not determined"
         if not self.is_established:
-            return f"{title} {amplitude.number} (95 %: {amplitude.interval}), not established"
-        if amplitude.at_end:
-            return f"{title} {amplitude.at_end}"
+            return f"{title} {amplitude.number} ({LEVEL} {amplitude.interval}), not established"
+        if amplitude.bound or amplitude.is_skewed or not amplitude.has_interval:
+            return f"{title} {amplitude.measured(f'{LEVEL} ')}"
         share = f" {amplitude.meaning}" if amplitude.unit == "%" and amplitude.meaning else ""
-        ends = f" (95 %: {amplitude.interval})" if amplitude.has_interval else ""
-        return f"{title} {amplitude.number}{share}{ends}"
+        return f"{title} {amplitude.number}{share} ({LEVEL} {amplitude.interval})"
 
     @property
     def is_established(self) -> bool:
@@ -224,7 +255,7 @@ class Suspect:
     @property
     def is_separate(self) -> bool:
         """Whether the runs give it a size of its own."""
-        return self.is_established and not any(one.at_end for one in self.constants[:1])
+        return self.is_established and not any(one.bound for one in self.constants[:1])
 
 
 @dataclass(frozen=True)
@@ -253,7 +284,7 @@ class ExpectedError:
     `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
     `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note`: why it is unknown, or on what it rests: ``if Giesekus; not measured``.
+    `note`: why it is unknown, or on what it rests: ``if Giesekus; untested``.
     """
 
     inside: float | None = None
@@ -294,6 +325,7 @@ class Answer:
     `constants`: of the law, dimensionless or with units; moduli and times that were fitted among
         them.
     `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
+    `temperature_C`: of its moduli and times; None where unknown.
     `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
     `discrepancy`: size of what it leaves besides noise; None where unknown.
     `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
@@ -313,7 +345,7 @@ class Answer:
     ...     range=Range((1.0, 2.0), (0.25, 1.0)),
     ... )
     >>> answer.headline.partition(". ")[0]
-    'Giesekus, α = 0.200 (95 %: 0.199–0.201)'
+    'Giesekus, α = 0.200 (95 % CI 0.199–0.201)'
     >>> answer.adequate
     True
     """
@@ -339,6 +371,7 @@ class Answer:
     alternative: str = ""
     instead: str = ""  # first line where there is no law to use, such as for pure noise
     tolerance: float = TOLERANCE  # relative discrepancy that is good enough
+    temperature_C: float | None = None
 
     @property
     def is_empirical(self) -> bool:
@@ -394,6 +427,7 @@ class Answer:
                 },
                 "modes": self.modes,
                 "solvent_viscosity_Pa_s": self.solvent_viscosity_Pa_s,
+                "temperature_C": self.temperature_C,
                 "range": {
                     "weissenberg": flows.weissenberg,
                     "deborah": flows.deborah,

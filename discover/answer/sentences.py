@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
-from discover.words import counted, effect_title, listed, percent_of, significant
+from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
 _MOST_CONSTANTS = 3
 """Constants that a first line names; the table has all."""
@@ -28,17 +28,18 @@ def headline(answer: Any) -> str:
 def quality(answer: Any) -> str:
     """Return what follows the law: how well it describes, what else there is, where to use it."""
     behind = answer.alternative if answer.is_empirical else ""
-    return _level_once(answer, " ".join(filter(None, [description(answer), behind, where(answer)])))
+    parts = [description(answer), answer.failed, behind, where(answer)]
+    return _level_once(answer, " ".join(filter(None, parts)))
 
 
-_LEVEL = "95 %: "
+_LEVEL = f"{LEVEL} "
 """Level of intervals, which a first screen says once."""
 
 
 def _level_once(answer: Any, text: str) -> str:
     """Return text that follows the law, without a level of intervals that has been said."""
-    said, first, rest = ("", "", text) if _LEVEL in law(answer) else text.partition(f"({_LEVEL}")
-    return said + first + rest.replace(f"({_LEVEL}", "(")
+    said, first, rest = ("", "", text) if LEVEL in law(answer) else text.partition(f"({LEVEL}")
+    return said + first + rest.replace(f"({LEVEL}, ", "(").replace(f"({_LEVEL}", "(")
 
 
 def law(answer: Any) -> str:
@@ -60,7 +61,14 @@ def law(answer: Any) -> str:
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
+    if answer.temperature_C is not None:
+        named.append(f"at {degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
+
+
+def degrees(temperature: float) -> str:
+    """Return a temperature in °C."""
+    return f"{temperature:.0f} °C".replace("-", "−")
 
 
 def constants(several: Sequence[Any]) -> list[str]:
@@ -87,7 +95,9 @@ def description(answer: Any) -> str:
     ends = f" ({_LEVEL}{low}–{high} %)" if low != high else ""
     # of fitted runs it is no error that a prediction could have
     of = "Error on unseen runs" if found.unseen else "Residual of the fitted runs"
-    besides = f", besides {noise} noise" if noise else ""
+    if noise and found.size < answer.noise:
+        return f"{of} {percent_of(found.size)}{ends}, less than the noise ({noise})."
+    besides = f", plus {noise} noise" if noise else ""
     return f"{of} {percent_of(found.size)}{ends}{besides}."
 
 
@@ -119,6 +129,8 @@ def where(answer: Any) -> str:
     place = ", ".join([flows(answer), *found])
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
+    if answer.adequate is False:
+        return f"Use in {place}, if {percent_of(answer.size)} error is acceptable."
     return f"Use in {place}."
 
 
@@ -199,7 +211,8 @@ def worst_run(answer: Any) -> tuple[str, str] | None:
 
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
-    return "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
+    of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
+    return f"{of} besides noise"
 
 
 def expected(one: Any, place: str) -> str:
@@ -221,10 +234,19 @@ MUCH = 2.0
 
 def suspects(answer: Any) -> str:
     """Return what is suspected of the instrument; empty where nothing is."""
-    if len(answer.suspects) < 2:
-        return "".join(f"Suspect: {one.text}." for one in answer.suspects)
+    if not answer.suspects:
+        return ""
+    if len(answer.suspects) == 1:
+        return f"{SUSPECTED}: {answer.suspects[0].text}."
     names = listed([effect_title(one.effect) for one in answer.suspects])
-    return f"Suspects{'' if separable(answer) else ', not separable'}: {names}."
+    return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
+
+
+SUSPECTED = "Suspected in the measurement, not part of the law"
+"""Heading of effects of the instrument and of the flow in the gap."""
+
+NOT_SEPARABLE = "sizes not separable"
+"""What is said of several of them that these runs do not give a size each."""
 
 
 def separable(answer: Any) -> bool:
@@ -233,10 +255,9 @@ def separable(answer: Any) -> bool:
 
 
 def further(answer: Any) -> list[str]:
-    """Return what stands below the table: another law, tolerance and failed test."""
+    """Return what stands below the table: another law, and the tolerance."""
     behind = "" if answer.is_empirical else _level_once(answer, answer.alternative)
-    return [one for one in (behind, " ".join(filter(None, [tolerance(answer), answer.failed])))
-            if one]  # fmt: skip
+    return [one for one in (behind, tolerance(answer)) if one]
 
 
 def lines(answer: Any) -> list[str]:

@@ -341,7 +341,8 @@ _NAMES: dict[str, tuple[Kind, str, tuple[tuple[str, str], ...]]] = {
 _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: rf"\sigma_{{12}} = \eta\,\dot\gamma, \qquad \eta = {v[0]}",
     "herschel_bulkley": lambda v: (
-        rf"\sigma_{{12}} = \tau_y + K\dot\gamma^n, \qquad "
+        r"|\sigma_{12}| = \tau_y + K|\dot\gamma|^n\ \mathrm{where}\ |\sigma_{12}| > \tau_y,\quad "
+        r"\dot\gamma = 0\ \mathrm{elsewhere}, \qquad "
         rf"\tau_y = {v[0]},\; K = {v[1]},\; n = {v[2]}"
     ),
     "power_law": lambda v: (
@@ -361,7 +362,8 @@ _LATEX: dict[str, Callable[[Sequence[str]], str]] = {
 _PYTHON: dict[str, Callable[[Sequence[str]], str]] = {
     "newtonian": lambda v: f"def stress(rate):\n    return {v[0]} * rate\n",
     "herschel_bulkley": lambda v: (
-        f"def stress(rate):\n    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
+        f"def stress(rate):\n    # of a rate above zero; no flow up to a stress of {v[0]} Pa\n"
+        f"    return {v[0]} + {v[1]} * rate ** {v[2]}\n"
     ),
     "power_law": lambda v: (
         f"def stress(rate):\n    return {v[0]} * abs(rate) ** ({v[1]} - 1) * rate\n"
@@ -422,5 +424,5 @@ def material_of(
     )
     latex = _LATEX[law]([f"{value:.6g}" for value in values])
     return SimpleMaterial(
-        kind, title, law, constants, error, latex.partition(", ")[0], latex, onset
+        kind, title, law, constants, error, latex.partition(r", \qquad ")[0], latex, onset
     )

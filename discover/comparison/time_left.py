@@ -1,13 +1,17 @@
 """Time that a comparison still takes: search, learners, and what is weighed after."""
 
 import time
+from collections.abc import Callable
 
 from discover.loop.search_time import SearchTime
-from discover.progress import Progress, by_time
+from discover.progress import Crowding, Progress, by_time
 
-_LEARN, _WEIGH = (5.0, 0.2), (6.0, 0.25)
-"""Seconds in which learners learn, and in which laws are weighed: a constant, and a share of the
-search's. Measured on the demonstration and on LDPE."""
+_LEARN, _WEIGH = (15.0, 0.2), (9.0, 0.25)
+"""Seconds in which learners learn, and in which laws are weighed: a constant, which a crowded
+machine prolongs, and a share of the search's. Measured on the demonstration and on LDPE."""
+
+_SLOWER = 2.0
+"""Factor by which learning may change what is expected of weighing."""
 
 _LEAST = 0.15
 """Share of a part's expected time that is still told of it once that time is over."""
@@ -17,7 +21,7 @@ class ComparisonTime:
     """Progress of a comparison.
 
     `most`, `several_modes`, `held_out`: as for `SearchTime`. `trainings`: how often all learners
-    learn.
+    learn. `clock`, `crowding`: as for `SearchTime`.
     """
 
     def __init__(
@@ -27,10 +31,17 @@ class ComparisonTime:
         several_modes: bool,
         held_out: bool,
         trainings: float,
+        clock: Callable[[], float] = time.perf_counter,
+        crowding: Callable[[], float] | None = None,
     ):
-        self._tell, self._trainings = by_time(progress), trainings
-        self._searches = SearchTime(most, several_modes, held_out=held_out, reported=False)
-        self._begun = self._since = time.perf_counter()
+        self._clock, self._crowding = clock, crowding or Crowding()
+        self._tell, self._trainings = by_time(progress, clock), trainings
+        self._searches = SearchTime(
+            most, several_modes, held_out=held_out, reported=False, clock=clock,
+            crowding=self._crowding,
+        )  # fmt: skip
+        self._begun = self._since = clock()
+        self._search = 0.0
         self._learn = self._weigh = 0.0
         self._weighs = False
 
@@ -41,30 +52,38 @@ class ComparisonTime:
             return
         left = self._searches.heard(line)
         if left is not None:
-            self._expect(time.perf_counter() - self._begun + left)
+            self._search = self._clock() - self._begun + left
+            self._expect()
             left += self._learn + self._weigh
         self._tell(line, left)
 
     def learning(self) -> None:
         """Begin to learn."""
-        now = time.perf_counter()
-        self._expect(now - self._begun)
-        self._since = now
+        self._since = self._clock()
+        self._search = self._since - self._begun
+        self._expect()
 
     def learned(self, text: str, fraction: float) -> None:
         """Pass on what learners say; trainings end by themselves, so their fraction is no time."""
+        self._expect()
         least = (1.0 - fraction) * _LEAST * self._learn
         self._tell(text, max(self._learn - self._passed, least) + self._weigh)
 
     def weighing(self, text: str) -> None:
         """Begin to weigh."""
-        self._weighs, self._since = True, time.perf_counter()
+        slower = self._passed / self._learn if self._learn else 1.0
+        self._weighs, self._since = True, self._clock()
+        if slower > 0.5 / _SLOWER:  # learners that were kept tell nothing
+            self._weigh *= min(max(slower, 1.0 / _SLOWER), _SLOWER)
         self._tell(text, self._weigh)
 
     @property
     def _passed(self) -> float:
-        return time.perf_counter() - self._since
+        return self._clock() - self._since
 
-    def _expect(self, search: float) -> None:
-        learn, self._weigh = (constant + share * search for constant, share in (_LEARN, _WEIGH))
+    def _expect(self) -> None:
+        crowding = self._crowding()
+        learn, self._weigh = (
+            constant * crowding + share * self._search for constant, share in (_LEARN, _WEIGH)
+        )
         self._learn = learn * self._trainings

@@ -106,6 +106,21 @@ _MATERIAL = ("material", "sample", "sample_label")
 _TEMPERATURE = ("temperature_C", "temperature_C_measured")
 
 
+def temperature_of(runs: Iterable[Run]) -> float | None:
+    """Return the temperature of runs in °C, rounded; None where they have several, or are shifted.
+
+    Shifted runs are at a reference temperature, which only the study knows.
+    """
+    found = set()
+    for run in runs:
+        values = [run.metadata.get(key) for key in _TEMPERATURE]
+        own = [float(round(v, 0)) for v in values if isinstance(v, int | float)][:1]
+        if not own or run.clock_factor != 1.0:
+            return None
+        found.update(own)
+    return found.pop() if len(found) == 1 else None
+
+
 def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
     """Material (a study's, or of runs.csv) and temperature of runs in words, if told."""
     names, temperatures = [], []

@@ -36,7 +36,7 @@ class RateGain(KinematicEffect):
     acts_on_steady_states = True
 
     def felt_rate(self, values, instrument_times, shear_rate):
-        """Return (1 + g) γ̇."""
+        """Return (1 + g_r) γ̇."""
         del instrument_times
         return (1.0 + values[0]) * shear_rate
 
@@ -45,15 +45,15 @@ RATE_GAIN = RateGain(
     name="rate_gain",
     parameters=(
         EffectParameter(
-            "gain_error", "g", low=-0.5, high=1.0, first_trial=0.01,
+            "gain_error", r"g_\mathrm{r}", low=-0.5, high=1.0, first_trial=0.01,
             range_source="a gap or an angle wrong by a factor of two; the zero of a gap is off by "
             "10 to 100 µm (Davies & Stokes 2008, J. Non-Newtonian Fluid Mech. 148, 73)",
         ),
     ),
-    equation=r"\dot\gamma_\mathrm{felt} = (1 + g)\,\dot\gamma",
+    equation=r"\dot\gamma_\mathrm{felt} = (1 + g_\mathrm{r})\,\dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: errors of cone angle and gap",
     check="Measure a Newtonian oil; measure the gap and the cone angle.",
-    visible="g of about 0.05.",
+    visible="g_r of about 0.05.",
 )  # fmt: skip
 
 
@@ -61,7 +61,7 @@ class RateRiseTime(KinematicEffect):
     """The rate felt follows the commanded one with a first-order lag on the instrument's clock."""
 
     def felt_rate(self, values, instrument_times, shear_rate):
-        """Return the lagged rate: τ γ̇_felt' + γ̇_felt = γ̇, from rest."""
+        """Return the lagged rate: t_m γ̇_felt' + γ̇_felt = γ̇, from rest."""
         return first_order_lag(instrument_times, shear_rate, values[0])
 
 
@@ -69,15 +69,16 @@ RATE_RISE_TIME = RateRiseTime(
     name="rate_rise_time", shapes_command=True,
     parameters=(
         EffectParameter(
-            "tau", r"\tau", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
+            "tau", r"t_\mathrm{m}", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
             range_source="motors answer in 0.01 to 0.1 s; a badly tuned loop that controls the "
             "rate of a stress-controlled instrument needs seconds",
         ),
     ),
-    equation=r"\tau\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt} = \dot\gamma",
+    equation=r"t_\mathrm{m}\,\frac{d\dot\gamma_\mathrm{felt}}{dt} + \dot\gamma_\mathrm{felt}"
+    r" = \dot\gamma",
     source="Macosko 1994, Rheology, ch. 8: response time of the drive",
     check="Record the angle of the motor in start-up.",
-    visible="tau of about 5 % of the time in which the stress grows.",
+    visible="t_m of about 5 % of the time in which the stress grows.",
 )  # fmt: skip
 
 
@@ -106,12 +107,12 @@ TOOL_COMPLIANCE = ToolCompliance(
 
 
 class WallSlip(SeriesElement):
-    """Slip in proportion to the stress, γ̇_felt = γ̇ − s σ   [Navier 1823; Yoshimura 1988]."""
+    """Slip in proportion to the stress, γ̇_felt = γ̇ − s_w σ   [Navier 1823; Yoshimura 1988]."""
 
     acts_on_steady_states = True
 
     def slip_and_compliance(self, values):
-        """Return s and 0."""
+        """Return s_w and 0."""
         return values[0], jnp.zeros_like(values[0])
 
 
@@ -119,14 +120,15 @@ WALL_SLIP = WallSlip(
     name="wall_slip",
     parameters=(
         EffectParameter(
-            "slip", "s", "1/(Pa s)", low=0.0, high=10.0, scale="fluidity", first_trial=0.01,
-            range_scale="fluidity",
-            range_source="slip cannot exceed the deformation commanded, s σ = γ̇; ten times "
+            "slip", r"s_\mathrm{w}", "1/(Pa s)", low=0.0, high=10.0, scale="fluidity",
+            first_trial=0.01, range_scale="fluidity",
+            range_source="slip cannot exceed the deformation commanded, s_w σ = γ̇; ten times "
             "leaves room for runs that differ",
         ),
     ),
-    equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - s\,\sigma,\quad s = 2 b / H",
+    equation=r"\dot\gamma_\mathrm{felt} = \dot\gamma - s_\mathrm{w}\,\sigma,"
+    r"\quad s_\mathrm{w} = 2 b / H",
     source="Yoshimura & Prud'homme 1988, J. Rheol. 32, 53 (slip velocity b sigma, gap H)",
     check="Repeat with another gap H: slip goes as 1/H; roughen the plates.",
-    visible="s of about 5 % of the inverse zero-shear viscosity.",
+    visible="s_w of about 5 % of the inverse zero-shear viscosity.",
 )  # fmt: skip

@@ -36,9 +36,9 @@ THIXOTROPY = Thixotropy(
     name="thixotropy", complexity=2,
     parameters=(
         EffectParameter(
-            "breakdown", "k", meaning="breakdown per unit strain", low=0.0, high=1e3,
+            "breakdown", r"k_\mathrm{b}", meaning="breakdown per unit strain", low=0.0, high=1e3,
             first_trial=0.02,
-            range_source="a strain of 1/k breaks the structure: suspensions of attractive "
+            range_source="a strain of 1/k_b breaks the structure: suspensions of attractive "
             "particles, the most brittle, yield from 0.001 on (Bonn et al. 2017, Rev. Mod. Phys. "
             "89, 035005)",
         ),
@@ -51,23 +51,23 @@ THIXOTROPY = Thixotropy(
         ),
     ),
     equation=r"G_k \to s\,G_k,\quad \frac{ds}{dt} = \frac{1 - s}{t_\mathrm{b}} - "
-    r"k\,|\dot\gamma|\,s",
+    r"k_\mathrm{b}\,|\dot\gamma|\,s",
     source="Moore 1959, Trans. Br. Ceram. Soc. 58, 470; Mewis & Wagner 2009, Adv. Colloid "
     "Interface Sci. 147-148, 214",
     check="Start the flow again after rests: the overshoot grows with the length of the rest.",
-    visible="k times the strain of about 0.05, where that strain is reached within t_b.",
+    visible="k_b times the strain of about 0.05, where that strain is reached within t_b.",
 )  # fmt: skip
 
 
 class ViscousHeating(StateEffect):
     """Relaxation times shortened by the heat of the flow by exp(−Θ) [Winter 1977].
 
-    dΘ/dt = b σγ̇ − Θ/t_h: b is −d ln a_T/dT over the heat capacity per volume, t_h the time in
+    dΘ/dt = b_h σγ̇ − Θ/t_h: b_h is −d ln a_T/dT over the heat capacity per volume, t_h the time in
     which heat leaves the gap.
     """
 
     def source_and_decay(self, values, shear_rate, stress):
-        """Return b σγ̇ and 1/t_h."""
+        """Return b_h σγ̇ and 1/t_h."""
         return values[0] * stress * shear_rate, 1.0 / values[1]
 
     def written(self):
@@ -89,8 +89,8 @@ VISCOUS_HEATING = ViscousHeating(
     name="viscous_heating", complexity=2,
     parameters=(
         EffectParameter(
-            "heating", "b", "1/Pa", meaning="fall of ln λ per unit work", low=0.0, high=1e-6,
-            scale="inverse_stress", first_trial=0.01,
+            "heating", r"b_\mathrm{h}", "1/Pa", meaning="fall of ln λ per unit work", low=0.0,
+            high=1e-6, scale="inverse_stress", first_trial=0.01,
             range_source="−d ln a_T/dT is 0.01 to 0.1 1/K, and 0.8 at a glass transition (Ferry "
             "1980, ch. 11: 2.303 · 17.44/51.6 K); the heat capacity per volume of liquids is 1 to "
             "4 MJ/(m³ K)",
@@ -103,11 +103,12 @@ VISCOUS_HEATING = ViscousHeating(
             "lengthen it without limit (Winter 1977)",
         ),
     ),
-    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} = b\,\sigma\dot\gamma "
+    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad "
+    r"\frac{d\Theta}{dt} = b_\mathrm{h}\,\sigma\dot\gamma "
     r"- \frac{\Theta}{t_\mathrm{h}}",
     source="Winter 1977, Adv. Heat Transfer 13, 205",
     check="Repeat with half the gap, which cools faster; measure the temperature of the sample.",
-    visible="b times the work done per volume within t_h of about 0.05.",
+    visible="b_h times the work done per volume within t_h of about 0.05.",
 )  # fmt: skip
 
 
@@ -122,9 +123,9 @@ SOFTENING_BY_WORK = SofteningByWork(
     name="softening_by_work", complexity=3,
     parameters=(
         EffectParameter(
-            "softening", "b", "1/Pa", meaning="fall of ln λ per unit work", low=0.0, high=10.0,
-            scale="inverse_stress", first_trial=0.01, range_scale="inverse_stress",
-            range_source="the work 1/b, σ times a strain, takes a deformation of more than 10 %: "
+            "softening", r"b_\mathrm{r}", "1/Pa", meaning="fall of ln λ per unit work", low=0.0,
+            high=10.0, scale="inverse_stress", first_trial=0.01, range_scale="inverse_stress",
+            range_source="the work 1/b_r, σ times a strain, takes a deformation of more than 10 %: "
             "networks of chains, which are known to soften by work, are linear up to there "
             "(Treloar 1975, The Physics of Rubber Elasticity, ch. 5)",
         ),
@@ -135,11 +136,12 @@ SOFTENING_BY_WORK = SofteningByWork(
             "rubber stays as soft as its first stretch made it (Mullins 1969)",
         ),
     ),
-    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad \frac{d\Theta}{dt} = b\,\sigma\dot\gamma "
+    equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad "
+    r"\frac{d\Theta}{dt} = b_\mathrm{r}\,\sigma\dot\gamma "
     r"- \frac{\Theta}{t_\mathrm{r}}",
     source="Mullins 1969, Rubber Chem. Technol. 42, 339, and Ogden & Roxburgh 1999, Proc. R. Soc. "
     "A 455, 2861 for softening by work; that it shortens times, as heat would, is an assumption",
     check="Repeat a weak flow after a strong one, at once and after rests; the temperature does "
     "not change.",
-    visible="b times the work done per volume within t_r of about 0.05.",
+    visible="b_r times the work done per volume within t_r of about 0.05.",
 )  # fmt: skip

@@ -1,11 +1,13 @@
 """Effects by name: the built-in ones, and a user's own (docs/adding-an-effect.md)."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 from discover.effects import base, kinematic, memory, network, signal, structure
+from discover.effects.letters import Spelled, spelled_apart
 from discover.effects.library_term import library_effects, library_term
 from discover.errors import InputError, Problems
 from discover.validation import require_new_name
@@ -110,6 +112,18 @@ def parameters_of(name: str) -> dict[str, base.EffectParameter]:
         return {one.name: one for one in make_effect(name).parameters}
     except InputError:
         return {}
+
+
+def spelled_on_a_page(names: Iterable[str]) -> dict[str, Spelled]:
+    """Return equations and letters of effects by name, each letter for one constant.
+
+    Without those that were given as objects.
+    """
+    found = []
+    for name in dict.fromkeys(names):
+        with suppress(InputError):
+            found.append(make_effect(name))
+    return spelled_apart(found)
 
 
 Written = Any

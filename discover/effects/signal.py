@@ -43,7 +43,7 @@ class EdgeFracture(SignalEffect):
     """
 
     def recorded_stress(self, values, record):
-        """Return σ exp(−k max(0, γ_total − γ_c))."""
+        """Return σ exp(−k_e max(0, γ_total − γ_c))."""
         beyond = jnp.maximum(record.total_strain - values[1], 0.0)
         return record.stress * jnp.exp(-values[0] * beyond)
 
@@ -52,9 +52,9 @@ EDGE_FRACTURE = EdgeFracture(
     name="edge_fracture", complexity=2,
     parameters=(
         EffectParameter(
-            "loss", "k", meaning="of the stress per unit strain", low=0.0, high=10.0,
+            "loss", r"k_\mathrm{e}", meaning="of the stress per unit strain", low=0.0, high=10.0,
             first_trial=0.005,
-            range_source="a strain of 1/k empties the gap: a crack grows inwards with the flow, "
+            range_source="a strain of 1/k_e empties the gap: a crack grows inwards with the flow, "
             "and melts lose their torque over strains of ten and more (Mattes et al. 2008)",
         ),
         EffectParameter(
@@ -64,13 +64,13 @@ EDGE_FRACTURE = EdgeFracture(
             "also be broken from the start",
         ),
     ),
-    equation=r"\sigma_\mathrm{rec} = \sigma\,e^{-k\,\max(0,\ \gamma_\mathrm{total} - "
+    equation=r"\sigma_\mathrm{rec} = \sigma\,e^{-k_\mathrm{e}\,\max(0,\ \gamma_\mathrm{total} - "
     r"\gamma_\mathrm{c})}",
     source="Mattes, Vogt & Friedrich 2008, Rheol. Acta 47, 929: the torque of melts falls from "
     "cycle to cycle. Tanner & Keentok 1983, J. Rheol. 27, 47, say when an edge breaks (by N2), "
     "not how the torque falls: the exponential in strain is an empirical form",
     check="Watch the edge; repeat with a smaller cone angle.",
-    visible="k times the strain beyond the critical one of about 0.1.",
+    visible="k_e times the strain beyond the critical one of about 0.1.",
 )  # fmt: skip
 
 
@@ -94,7 +94,7 @@ class InstrumentInertia(SignalEffect):
         return record.stress + values[0] * record.clock_factor * at_points
 
     def inertia(self, values):
-        """Return I."""
+        """Return I_t."""
         return values[0]
 
 
@@ -102,17 +102,18 @@ INSTRUMENT_INERTIA = InstrumentInertia(
     name="instrument_inertia",
     parameters=(
         EffectParameter(
-            "inertia", "I", "Pa s^2", low=-1e3, high=1e3, scale="inertia", first_trial=0.01,
+            "inertia", r"I_\mathrm{t}", "Pa s^2", low=-1e3, high=1e3, scale="inertia",
+            first_trial=0.01,
             range_source="2 J H/(πR⁴) of motor and tool with J = 1e-4 N m s², plates of R = 4 mm "
             "and H = 1 mm give 120; a correction for it can be wrong by its whole size, either "
             "way: J is determined empirically, and its precision is rarely stated (Klemuk & Titze "
             "2009)",
         ),
     ),
-    equation=r"\sigma_\mathrm{rec} = \sigma + I\,\frac{d\dot\gamma_\mathrm{tool}}{dt}",
+    equation=r"\sigma_\mathrm{rec} = \sigma + I_\mathrm{t}\,\frac{d\dot\gamma_\mathrm{tool}}{dt}",
     source="Krieger 1990, J. Rheol. 34, 471; Klemuk & Titze 2009, J. Rheol. 53, 765 for its error",
     check="Oscillate a Newtonian oil over the same frequencies; compare the raw phase.",
-    visible="I omega of about 5 % of the dynamic viscosity at the highest frequency omega.",
+    visible="I_t omega of about 5 % of the dynamic viscosity at the highest frequency omega.",
 )  # fmt: skip
 
 
@@ -120,7 +121,7 @@ class StressDrift(SignalEffect):
     """A stress that grows linearly with instrument time is added to the one recorded."""
 
     def recorded_stress(self, values, record):
-        """Return σ + d t."""
+        """Return σ + a t."""
         return record.stress + values[0] * record.instrument_times
 
 
@@ -128,26 +129,26 @@ STRESS_DRIFT = StressDrift(
     name="stress_drift",
     parameters=(
         EffectParameter(
-            "drift", "d", "Pa/s", low=-2.0, high=2.0, scale="stress_rate", first_trial=0.01,
+            "drift", "a", "Pa/s", low=-2.0, high=2.0, scale="stress_rate", first_trial=0.01,
             range_scale="stress_rate",
             range_source="at twice the stress over the length of a run, half of the record is the "
             "drift of an instrument that measures nothing",
         ),
     ),
-    equation=r"\sigma_\mathrm{rec} = \sigma + d\,t",
+    equation=r"\sigma_\mathrm{rec} = \sigma + a\,t",
     source="Macosko 1994, Rheology, ch. 8: transducer drift",
     check="Record the stress of a sample at rest for as long as the longest run.",
-    visible="d times the length of a run of about 10 % of its root-mean-square stress.",
+    visible="a times the length of a run of about 10 % of its root-mean-square stress.",
 )  # fmt: skip
 
 
 class StressGain(SignalEffect):
-    """The stress recorded is (1 + g) times the true one."""
+    """The stress recorded is (1 + g_s) times the true one."""
 
     acts_on_steady_states = True
 
     def recorded_stress(self, values, record):
-        """Return (1 + g) σ."""
+        """Return (1 + g_s) σ."""
         return (1.0 + values[0]) * record.stress
 
 
@@ -155,15 +156,15 @@ STRESS_GAIN = StressGain(
     name="stress_gain",
     parameters=(
         EffectParameter(
-            "gain_error", "g", low=-0.8, high=4.0, first_trial=0.01,
+            "gain_error", r"g_\mathrm{s}", low=-0.8, high=4.0, first_trial=0.01,
             range_source="a factor of five either way: the stress goes as 1/R³, and 25 mm entered "
             "for plates of 40 mm gives a factor of four (Macosko 1994, ch. 5)",
         ),
     ),
-    equation=r"\sigma_\mathrm{rec} = (1 + g)\,\sigma",
+    equation=r"\sigma_\mathrm{rec} = (1 + g_\mathrm{s})\,\sigma",
     source="Macosko 1994, Rheology, ch. 8: calibration and sample radius",
     check="Calibrate the transducer with a dead weight; look at the filling of the gap.",
-    visible="g of about 0.05.",
+    visible="g_s of about 0.05.",
 )  # fmt: skip
 
 
@@ -228,11 +229,11 @@ class TransducerLag(SignalEffect):
     """The stress recorded follows the true one with a first-order lag on the instrument's clock."""
 
     def recorded_stress(self, values, record):
-        """Return the lagged stress: τ σ_rec' + σ_rec = σ, from rest."""
+        """Return the lagged stress: t_f σ_rec' + σ_rec = σ, from rest."""
         return first_order_lag(record.instrument_times, record.stress, values[0])
 
     def response(self, values, frequency):
-        """Return 1/(1 + iωτ)."""
+        """Return 1/(1 + iω t_f)."""
         return 1.0 / (1.0 + 1j * frequency * values[0])
 
 
@@ -240,14 +241,14 @@ TRANSDUCER_LAG = TransducerLag(
     name="transducer_lag",
     parameters=(
         EffectParameter(
-            "tau", r"\tau", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
+            "tau", r"t_\mathrm{f}", "s", low=0.0, high=10.0, scale="sampling_time", first_trial=0.5,
             range_source="transducers answer in 0.001 to 0.1 s, and filters behind them average "
             "over seconds at most",
         ),
     ),
-    equation=r"\tau\,\frac{d\sigma_\mathrm{rec}}{dt} + \sigma_\mathrm{rec} = \sigma",
+    equation=r"t_\mathrm{f}\,\frac{d\sigma_\mathrm{rec}}{dt} + \sigma_\mathrm{rec} = \sigma",
     source="Doebelin 2004, Measurement Systems, ch. 3: instruments of first order; transducers of "
     "rheometers: Macosko 1994, Rheology, ch. 8",
     check="Look up the filter of the transducer; strike it and record the response.",
-    visible="tau of about 5 % of the time in which the stress changes, 0.05/omega in oscillation.",
+    visible="t_f of about 5 % of the time in which the stress changes, 0.05/omega in oscillation.",
 )  # fmt: skip

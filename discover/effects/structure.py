@@ -19,11 +19,11 @@ _DULLAERT = "Dullaert & Mewis 2006, J. Non-Newtonian Fluid Mech. 139, 21"
 
 @dataclass(frozen=True)
 class Structure(StateEffect):
-    """A structure s, one at rest: ds/dt = (1 − s)/t_b − (X/X_c)ⁿ s/t_b.
+    """A structure s, one at rest: ds/dt = (1 − s)/t_b − (X/X_c)^m s/t_b.
 
-    In steady flow s = 1/(1 + (X/X_c)ⁿ), Cross's equation   [Cross 1965, J. Colloid Sci. 20, 417;
+    In steady flow s = 1/(1 + (X/X_c)^m), Cross's equation   [Cross 1965, J. Colloid Sci. 20, 417;
     Mewis & Wagner 2009, Adv. Colloid Interface Sci. 147–148, 214]. Parameters: 1/X_c (the
-    amplitude), t_b, n. `broken_by`: X, the shear rate or the stress. `scales`: what s multiplies,
+    amplitude), t_b, m. `broken_by`: X, the shear rate or the stress. `scales`: what s multiplies,
     the stress or the relaxation times of all modes.
     """
 
@@ -41,7 +41,7 @@ class Structure(StateEffect):
         return self.scales == "time"
 
     def source_and_decay(self, values, shear_rate, stress):
-        """Return 1/t_b and (1 + (X/X_c)ⁿ)/t_b, of both structures where there are two."""
+        """Return 1/t_b and (1 + (X/X_c)^m)/t_b, of both structures where there are two."""
         times = values[1] if self.levels == 1 else values[1] * jnp.array([1.0, values[2]])
         size = values[0] * jnp.abs(shear_rate if self.broken_by == "rate" else stress)
         # a power below one has no derivative at zero
@@ -84,7 +84,7 @@ class Structure(StateEffect):
 class TwoStructures(Structure):
     """Two structures with one steady state: s = (1 − w) s₁ + w s₂, of times t_b and R t_b.
 
-    [Wei, Solomon & Larson 2018, J. Rheol. 62, 321]. R and w stand in the place of n, which is
+    [Wei, Solomon & Larson 2018, J. Rheol. 62, 321]. R and w stand in the place of m, which is
     Cross's: no record of which we know determines all five constants.
     """
 
@@ -113,7 +113,7 @@ BUILD_UP_TIME = EffectParameter(
 )  # fmt: skip
 
 EXPONENT = EffectParameter(
-    "exponent", "n", low=0.1, high=4.0, first_trial=1.0,
+    "exponent", "m", low=0.1, high=4.0, first_trial=1.0,
     range_source="1 in most models of thixotropy, other values in some (Mewis & Wagner 2009), 2/3 "
     "in Cross's equation for dispersions; beyond 4 the whole structure breaks at one rate or "
     "stress",
@@ -145,10 +145,10 @@ def _one_structure(
             INVERSE_RATE if broken_by == "rate" else INVERSE_STRESS, BUILD_UP_TIME, EXPONENT,
         ),
         equation=rf"{scaled} \to s\,{scaled},\quad t_\mathrm{{b}}\frac{{ds}}{{dt}} = 1 - s"
-        rf" - \left(\frac{{|{letter}|}}{{{letter}_\mathrm{{c}}}}\right)^n s",
+        rf" - \left(\frac{{|{letter}|}}{{{letter}_\mathrm{{c}}}}\right)^m s",
         source=source,
         check=check,
-        visible=f"largest {broken_by} over the critical one, to the power n, of about 0.05, over "
+        visible=f"largest {broken_by} over the critical one, to the power m, of about 0.05, over "
         "t_b.",
         complexity=3,
         broken_by=broken_by,
@@ -156,7 +156,7 @@ def _one_structure(
     )  # fmt: skip
 
 
-THIXOTROPIC_MODULUS = _one_structure(  # `thixotropy` is the case n = 1
+THIXOTROPIC_MODULUS = _one_structure(  # `thixotropy` is the case m = 1
     "thixotropic_modulus", "modulus", "rate",
     source=f"{_MEWIS}; {_DULLAERT}",
     check="Oscillate gently after flow at several rates: the moduli should grow at rest.",

@@ -9,6 +9,7 @@ import pandas as pd
 from jaxtyping import Real
 from numpy.typing import ArrayLike
 
+from discover.effects.letters import Spelled, spelled_apart
 from discover.equations.parts import LawParts, NamedPart, StatePart, law_parts
 from discover.equations.spelling.markup import (
     SEPARATOR,
@@ -194,7 +195,13 @@ class Equation(NotebookView):
     def latex(self) -> str:
         """Return the dimensionless law as one LaTeX equation, and that of states behind it."""
         law = law_latex(self.terms, self.linear_relaxation, named=self.named)
-        return SEPARATOR.join([law, *(part.own.equation for part in self.states)])
+        return SEPARATOR.join([law, *(one.equation for one in self.spelled_states)])
+
+    @property
+    def spelled_states(self) -> list[Spelled]:
+        """Equations and letters of the states, no letter twice, in LaTeX."""
+        spelled = spelled_apart(part.own for part in self.states)
+        return [spelled[part.effect] for part in self.states]
 
     def modes_table(self) -> pd.DataFrame:
         """Return G_k in Pa and λ_k in s, one line for each mode, and what differs by mode."""

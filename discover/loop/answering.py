@@ -35,7 +35,7 @@ from discover.loop.by_quantity import (
     of_stress,
     with_unseen,
 )
-from discover.loop.parts import STRUCTURES
+from discover.loop.parts import STRUCTURES, Stage
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import effect_title, effects_title, listed, percent_of, readable
@@ -67,8 +67,9 @@ LAW_OF_EFFECT = {
 """Laws that an effect makes of an upper convected Maxwell fluid."""
 
 _NOT_TESTED = {
-    "flows": "Fitted, not tested: no run was held out.",
-    "states": "Fitted, not tested: only steady or periodic states were measured.",
+    "flows": "Not tested on unseen runs.",
+    "states": "Not tested on unseen runs or in transients.",
+    "transients": "Not tested in transients.",
 }
 
 
@@ -99,15 +100,13 @@ def loop_answer(result: Any) -> Answer:
         result.verdict in EXPLAINED,
         with_unseen(result),
         range_of(result.records, equation),
-        errors_by_quantity(result, title.partition(" with ")[0] if law else "this law"),
+        errors_by_quantity(result, title.partition(" with ")[0] if law else ""),
         following,
-        tuple(
-            Suspect(stage.effect, _constants(stage.parameters, stage.left_open, stage.effect))
-            for stage in suspected(result)
-        ),
+        tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
         alternative=_alternative(result),
         tolerance=result.tolerance,
+        temperature_C=result.temperature_C,
     )
     if equation is None:
         near = result.nearest_law
@@ -169,6 +168,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         next_test=following,
         failed=_failed(result),
         tolerance=result.tolerance,
+        temperature_C=result.temperature_C,
     )
     slowest = 0.0 if found.rate_1_s is None else found.rate_1_s[0]
     written = material.written(answer.lines, slowest, DENSITY)
@@ -178,7 +178,8 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
 def _failed(result: Any) -> str:
     """Return what the law was not tested by, or failed."""
     if untested := untested_by(result):
-        return _NOT_TESTED[untested]
+        held_out = any(record.held_out for record in result.records)
+        return _NOT_TESTED["transients" if untested == "states" and held_out else untested]
     chance = result.remaining.get("probability")
     if result.verdict == "unexplained" and chance is not None and chance < 0.05:
         return "Residual systematic."
@@ -209,7 +210,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
     in_fluid = [stage for stage in result.stages if stage.kind == "constitutive"]
     found = list(_constants(result.declared_parameters))
     for stage in in_fluid:
-        own = _constants(stage.parameters, stage.left_open, stage.effect)
+        own = _of_stage(result, stage)
         found += _renamed(stage.effect, own, found)
     for known in result.declared_effects:
         if known.kind == "constitutive":
@@ -246,7 +247,11 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
 
 
 def _added_title(effect: str) -> str:
-    return "solvent" if effect == "solvent_viscosity" else effect_title(effect)
+    return _ADDED.get(effect, effect_title(effect))
+
+
+_ADDED = {"solvent_viscosity": "solvent", "relaxation_mode": "added mode"}
+"""What is added to a law by some effects, where the name of the effect says less."""
 
 
 def shows_a_derivative(result: Any) -> bool:
@@ -276,10 +281,20 @@ def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[C
     return [*own, *left]
 
 
+def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
+    """Return the constants of an effect that was added, with letters that no other has."""
+    letters = result.letters.get(stage.effect, {})
+    return _constants(stage.parameters, stage.left_open, stage.effect, letters)
+
+
 def _constants(
-    parameters: Mapping, left_open: Sequence[str] = (), effect: str = ""
+    parameters: Mapping,
+    left_open: Sequence[str] = (),
+    effect: str = "",
+    letters: Mapping[str, str] | None = None,
 ) -> tuple[Constant, ...]:
     known = parameters_of(effect) if effect else {}
+    spelled = letters or {name: one.symbol for name, one in known.items()}
     return tuple(
         Constant(
             name,
@@ -287,8 +302,9 @@ def _constants(
             one.ci95,
             one.unit or "1",
             name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
-            known[name].symbol if name in known else "",
-            _meaning(effect, known[name]) if name in known else "",
+            spelled.get(name, ""),
+            meaning=_meaning(effect, known[name]) if name in known else "",
+            end=one.at_end if isinstance(one, StageParameter) else "",
         )
         for name, one in parameters.items()
     )

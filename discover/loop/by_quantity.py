@@ -24,7 +24,7 @@ _WORTH_SAYING = 0.05
 _FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
-_UNSEEN, _FITTED = "unseen runs, noise subtracted", "fitted runs, noise subtracted"
+_UNSEEN, _FITTED = "unseen runs", "fitted runs"
 
 _TWICE = f"predicted at {BEYOND:g}× the rate"
 
@@ -99,7 +99,7 @@ def _missed(record: RunRecord, result: Any) -> float:
 def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
     """Return expected errors: of what was measured, else by how far equally good laws differ.
 
-    `name`: law on which they rest.
+    `name`: law on which they rest; empty of one without a name.
     """
     found = {"sigma12": of_stress(result)}
     settled = normal_stress_settled(result)
@@ -113,20 +113,39 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
-            note = f"if {name}; not measured"
+            note = f"{_given(name)}; untested"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
         elif kind == "N1":
             found[kind] = ExpectedError(missing="not determined", note=differ)
         elif kind == "N2":
-            told = f"follows only if {name}; not measured" if settled else "not measured"
-            if apart and apart > _WORTH_SAYING:
-                told = f"{differ} of N1"
-            found[kind] = ExpectedError(missing="not determined", note=told)
+            found[kind] = _second_difference(result, settled, differ, name)
         elif apart is not None and apart >= _APART:
             found[kind] = ExpectedError(missing="not determined", note=differ)
         else:
             found[kind] = ExpectedError(note=differ if apart and apart > _WORTH_SAYING else "")
     return found
+
+
+def _second_difference(result: Any, settled: bool, differ: str, name: str) -> ExpectedError:
+    """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
+    apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
+    if apart and apart > _WORTH_SAYING:
+        return ExpectedError(missing="not determined", note=f"{differ} of N1")
+    ratio = None if spread is None else spread.over_n1
+    if ratio is None:
+        return ExpectedError(missing="not determined", note="not measured")
+    share = "0" if abs(ratio) < _NOTHING else f"{percent_of(ratio)} of N1".replace("-", "−")
+    missing = "untested" if settled else "not determined"
+    return ExpectedError(missing=missing, note=f"{share} {_given(name)}")
+
+
+def _given(name: str) -> str:
+    """Return the condition on which a prediction rests, that the law is the right one."""
+    return f"if {name}" if name else "by this law"
+
+
+_NOTHING = 1e-3
+"""N2 over N1 that rounding of the integration leaves."""
 
 
 def normal_stress_settled(result: Any) -> bool:

@@ -37,11 +37,13 @@ class Spread:
     """Root-mean-square difference between laws that describe the runs as well.
 
     `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
-    fitted rates; None where a law diverges.
+    fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1
+    inside, by their rms, with the sign of N2/N1; None of other quantities.
     """
 
     inside: float | None
     beyond: float | None
+    over_n1: float | None = None
 
 
 @in_one_thread
@@ -84,10 +86,13 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     ends = zip(("inside", "beyond"), np.moveaxis(in_extension, 1, 0), strict=True)
     seen += [("uniaxial", place, found) for place, found in ends]
     own: dict[str, dict[str, list[float]]] = {}
+    ratios = []
     for i, (kind, place, found) in enumerate(seen):
         of_n1 = seen[i - 1][2] if kind == "N2" else found
         with np.errstate(all="ignore"):  # laws that diverge in this flow
             size = rms(of_n1[0])
+            if kind == "N2" and place == "inside":
+                ratios.append(float(np.copysign(rms(found[0]), found[0] @ of_n1[0])) / size)
             squares = np.mean((found[1:] - found[0]) ** 2, axis=1)
         sound = np.isfinite(squares)
         share = np.array(weights) * sound
@@ -97,8 +102,13 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
             square = float(share[sound] @ squares[sound]) / float(np.sum(share))
             value = float(np.sqrt(square)) / size
         own.setdefault(kind, {}).setdefault(place, []).append(value)
-    return {kind: Spread(*(_largest(of[place]) for place in ("inside", "beyond")))
-            for kind, of in own.items()}  # fmt: skip
+    ratio = max(ratios, key=abs) if np.all(np.isfinite(ratios)) else None
+    return {
+        kind: Spread(
+            _largest(of["inside"]), _largest(of["beyond"]), ratio if kind == "N2" else None
+        )
+        for kind, of in own.items()
+    }
 
 
 def _largest(values: Sequence[float]) -> float | None:

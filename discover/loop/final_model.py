@@ -9,7 +9,7 @@ from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import AugmentedLaw, Equation, StatePart, law_parts_by_mode
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter, end_of_range
 from discover.laws import Fluid
 from discover.laws.each_mode import with_modes
 from discover.loop.parts import DeclaredEffect, KnownParameter
@@ -27,6 +27,7 @@ def declared_parameters(
 ) -> dict[str, StageParameter]:
     """Return the fitted constants of the declared model, in their units."""
     named = {2 + i: p.name for i, p in enumerate(declared.free_parameters)}
+    ends = {2 + i: (p.low, p.high) for i, p in enumerate(declared.free_parameters)}
     # of several modes only a common factor is fitted, which has no unit
     single = len(declared.modulus) == 1
     constants = {
@@ -43,7 +44,8 @@ def declared_parameters(
             # fitted as the logarithm of a factor
             values = scale * np.exp(values)
         value, low, high = map(float, values)
-        out[name] = StageParameter(value, (low, high), unit)
+        end = "" if at not in ends else end_of_range(value, *ends[at])
+        out[name] = StageParameter(value, (low, high), unit, at_end=end)
     return out
 
 

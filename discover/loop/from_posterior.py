@@ -11,8 +11,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import chi2
 
+from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
-from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
+from discover.inference.by_mode.constants import (
+    ConstantByMode,
+    ModeConstant,
+    StageParameter,
+    end_of_range,
+)
 from discover.inference.engine.design import NextTests, design
 from discover.inference.engine.left_out import FEWEST_RUNS
 from discover.inference.engine.problem import NUISANCES
@@ -139,13 +145,21 @@ class Ended(Path):
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
         search, found = self.posterior.search, []
+        spelled = spelled_apart(self.posterior.problem.effects[name] for name in self.fit.names)
         for i, (before, after) in enumerate(zip(self.path[:-1], self.path[1:], strict=True), 1):
             (name,) = set(after.names) - set(before.names)
             effect, model = self.posterior.problem.effects[name], self.posterior.problem.model
             at = dict(zip((p.name for p in effect.parameters), model.positions(name), strict=True))
             parameters = {
                 p.name: StageParameter(
-                    float(self.fit.theta[at[p.name]]), self.bounds[at[p.name]], p.unit
+                    float(self.fit.theta[at[p.name]]),
+                    self.bounds[at[p.name]],
+                    p.unit,
+                    at_end=end_of_range(
+                        float(self.fit.theta[at[p.name]]),
+                        float(model.low[at[p.name]]),
+                        float(model.high[at[p.name]]),
+                    ),
                 )
                 for p in effect.parameters
             }
@@ -160,7 +174,7 @@ class Ended(Path):
             found.append(
                 Stage(
                     name, effect.kind, parameters, self._aliases(name), errors_of(self.records, i),
-                    float(gained), effect.equation, effect.source, effect.check,
+                    float(gained), spelled[name].equation, effect.source, effect.check,
                     left_open=left_open,
                 )
             )  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 
 from discover.answer import TOLERANCE
 from discover.dataset import Dataset
+from discover.dataset.run_table import temperature_of
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
 from discover.loop.loop import run_loop_on
@@ -97,7 +98,13 @@ def close_loop(
         f"Data: {data.name}, {counted(len(divided.fit), 'run')} fitted, {judged}. Declared model: "
         f"{fluid.described}, {counted(len(fluid.modulus), 'relaxation mode')}. {data.thinned}"
     ).strip()
-    return replace(result, title=data.name, described=summary, tolerance=good_enough)
+    return replace(
+        result,
+        title=data.name,
+        described=summary,
+        tolerance=good_enough,
+        temperature_C=temperature_of(data),
+    )
 
 
 def _checked(options: Mapping[str, Any]) -> Loop:

@@ -11,6 +11,7 @@ import pandas as pd
 
 from discover.answer import TOLERANCE, Answer, HasAnswer
 from discover.answer.simple_material import SimpleMaterial
+from discover.effects.registry import spelled_on_a_page
 from discover.equations import (
     Equation,
     HasEquation,
@@ -76,7 +77,8 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     root-mean-square relative error of fitted runs that are left out of the fit in turn.
     `nearest_law`: where the law has no name of the field: the best that has one. `material`: the
     simple material that the runs show, recognised before any search; None where none is.
-    `tolerance`: relative discrepancy that is accepted. `folds`: the loops that left each run out in
+    `tolerance`: relative discrepancy that is accepted. `temperature_C`: of the moduli and times;
+    None where unknown. `folds`: the loops that left each run out in
     turn, where they were asked for; the held-out errors are then their means. `seconds`: time
     taken. `title`, `described`: name of the data, and data and declared model in words, for the
     page.
@@ -106,6 +108,7 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     nearest_law: NearestLaw | None = None
     material: SimpleMaterial | None = None
     tolerance: float = TOLERANCE
+    temperature_C: float | None = None
     folds: tuple[Fold, ...] = ()
     seconds: float = 0.0
     title: str = field(repr=False, default="")
@@ -134,6 +137,12 @@ class LoopResult(PageView, HasEquation, HasAnswer, SummaryView):
     def differing_by_mode(self) -> tuple[str, ...]:
         """Names of those of them that do."""
         return tuple(name for name, one in self.by_mode.items() if one.degree)
+
+    @cached_property
+    def letters(self) -> dict[str, dict[str, str]]:
+        """Letters of the parameters in LaTeX by effect that was added, no two alike."""
+        spelled = spelled_on_a_page(stage.effect for stage in self.stages)
+        return {name: one.symbols for name, one in spelled.items()}
 
     @cached_property
     def answer(self) -> Answer:

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from discover.effects.registry import built_in_effects, named_effects
 from discover.forward.declared import may_differ_by_mode
+from discover.progress import Crowding
 
 Amount = Float[np.ndarray, "2"]
 """Part of a search: fits of one hypothesis, and seconds besides."""
@@ -69,7 +70,8 @@ class SearchTime:
     from mode to mode may follow; it does if the likeliest effects have such. `rounds`: how often
     all of it is done, each time with another run left out. `held_out`: whether runs are held out.
     `curves`: whether curves of one variable are tried. `reported`: whether these, bands and the
-    next test belong to it. `clock`: seconds now.
+    next test belong to it. `clock`: seconds now. `crowding`: how much longer this process takes
+    than alone.
     """
 
     def __init__(
@@ -81,7 +83,9 @@ class SearchTime:
         curves: bool = True,
         reported: bool = True,
         clock: Callable[[], float] = time.perf_counter,
+        crowding: Callable[[], float] | None = None,
     ):
+        self._crowding = crowding or Crowding()
         self._most, self._several_modes, self._clock = most, several_modes, clock
         self._rounds, self._reported = rounds, reported
         self._weighed = _WEIGHED if held_out else _WEIGHED_ALONE
@@ -133,8 +137,9 @@ class SearchTime:
             left = left + (self._first if self._first.any() else self._this_search)
         left = left + (self._rounds - 1) * (self._done - self._round_before + left)
         passed = self._clock() - self._begun
-        one_fit = max(passed - self._done[1], _SLOW * passed) / self._done[0]
-        return float(one_fit * left[0] + left[1])
+        besides = self._crowding() * np.array([self._done[1], left[1]])
+        one_fit = max(passed - besides[0], _SLOW * passed) / self._done[0]
+        return float(one_fit * left[0] + besides[1])
 
     @property
     def _this_search(self) -> Amount:

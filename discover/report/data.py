@@ -275,7 +275,7 @@ def _own_words(found: Superposition, own: Superposition, kind: str) -> str:
 
 def _factor(factor: tuple[float, float, float]) -> str:
     value, low, high = factor
-    return f"{value:.3g} (95 %: {low:.3g} to {high:.3g})"
+    return f"{value:.3g} (95 % CI {low:.3g} to {high:.3g})"
 
 
 def _law_words(law: ShiftLaw, found: Superposition) -> str:
@@ -291,7 +291,7 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
         known = (
             "not determined by these shifts"
             if interval is None
-            else f"95 %: {interval[0]:.4g} to {interval[1]:.4g}"
+            else f"95 % CI {interval[0]:.4g} to {interval[1]:.4g}"
         )
         parts.append(f"{symbol} = {f'{value:.4g} {unit}'.strip()} ({known})")
     return (

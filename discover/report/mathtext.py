@@ -19,25 +19,29 @@ _REPLACEMENTS = (
     (r"\boldsymbol", r"\mathbf"),
     (r"\bm", r"\mathbf"),
     (r"\text{", r"\mathrm{"),
-    (r"\left", ""),
-    (r"\right", ""),
     (r"\;", r"\ "),
 )
 
 
-def formula(latex: str, name: str) -> str:
+_TEXT = 12.0
+"""Size of text in points."""
+
+
+def formula(latex: str, name: str, size: float = _TEXT) -> str:
     """Return a formula as inline SVG, or in plain signs where matplotlib cannot set it.
 
-    `latex`: without dollar signs. `name`: unique on the page.
+    `latex`: without dollar signs. `name`: unique on the page. `size`: of letters in points; larger
+    than text, fractions are displayed.
     """
     text = latex.strip().strip("$")
     for old, new in _REPLACEMENTS:
         text = text.replace(old, new)
+    text = text.replace(r"\frac", r"\dfrac") if size > _TEXT else text
     buffer = io.StringIO()
     try:
         with only_settings({"svg.fonttype": "path", "svg.hashsalt": "discover"}):
             drawing = Figure(figsize=(0.01, 0.01))
-            drawing.text(0, 0, f"${text}$", fontsize=12, color=INK)
+            drawing.text(0, 0, f"${text}$", fontsize=size, color=INK)
             drawing.savefig(
                 buffer,
                 format="svg",

@@ -18,6 +18,8 @@ from markupsafe import Markup, escape
 from discover._version import __version__
 from discover.answer import Answer, Suspect
 from discover.answer.sentences import (
+    NOT_SEPARABLE,
+    SUSPECTED,
     SYMBOLS,
     error_title,
     expected,
@@ -28,6 +30,7 @@ from discover.answer.sentences import (
     separable,
     worst_run,
 )
+from discover.effects import StateEffect
 from discover.equations import Equation
 from discover.equations.files import FORMATS
 from discover.equations.spelling.markup import law_element
@@ -36,7 +39,7 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import effect_title, estimate, interval, listed, readable, significant
+from discover.words import LEVEL, effect_title, estimate, interval, listed, readable, significant
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -171,10 +174,11 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     found: dict[str, Any] = {
         "headline": _unbroken(law(answer)),
         "quality": _unbroken(quality(answer)),
-        "level": "95 % CI" if answer.adequate and answer.fits_to_the_noise else "95 %, statistical",
+        "level": LEVEL,
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
-        "law": "", "constants": (), "expected": (), "modes": (), "linear": "", "solvent": 0.0,
+        "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
+        "expected": (), "modes": (), "linear": "", "solvent": 0.0,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -195,8 +199,8 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "constants": [
             (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
-        ]
-        + [_suspected(one, separable(answer)) for one in answer.suspects],
+        ],
+        "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
         "expected": [
             {
                 "symbol": symbol,
@@ -232,13 +236,12 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
 
 def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
-    title, note = effect_title(one.effect), "suspected"
+    title = effect_title(one.effect)
     if one.amplitude is None or not separable:
-        return title, note, "not separable" if not separable else "–", "–"
-    number = one.amplitude.at_end.partition(",")[0] or one.amplitude.number
-    if one.amplitude.unit == "%" and one.amplitude.meaning:
-        note = f"{one.amplitude.meaning}; {note}"
-    return title, note, _in_cell(number), _in_cell(one.amplitude.interval)
+        return title, "", "–" if separable else NOT_SEPARABLE, "–"
+    note = one.amplitude.meaning if one.amplitude.unit == "%" else ""
+    note = note if one.is_established else "; ".join(filter(None, [note, "may be zero"]))
+    return title, note, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
 
 
 def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
@@ -255,7 +258,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
 
 _TOGETHER = re.compile(
     r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/)|(?<=Pa) (?=s)"
-    r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=%:) |(?<=\() "
+    r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=% CI) |(?<=%) (?=CI\b)|(?<=\() "
 )
 
 
@@ -326,10 +329,14 @@ def _rounded(equation: Equation, answer: Answer) -> Equation:
     return replace(equation, terms=terms, named=named)
 
 
+_LARGE = 15.0
+"""Size in points of an equation that the answer rests on."""
+
+
 def _formulas(lines: Sequence[str]) -> str:
     """Return equations in LaTeX, each in a paragraph that breaks between its parts."""
     parts = [
-        [formula(part, f"answer{i}_{k}") for k, part in enumerate(line.split(r",\quad"))]
+        [formula(part, f"answer{i}_{k}", _LARGE) for k, part in enumerate(line.split(r",\quad"))]
         for i, line in enumerate(lines)
     ]
     return "".join(f'<p class="scroll">{" &emsp; ".join(one)}</p>' for one in parts)
@@ -345,10 +352,20 @@ def _law(equation: Equation, rest: bool = False) -> str:
         )
         # what a state of the whole fluid does stands below the law of a mode
         index = "_k" if modes > 1 else ""
-        parts = [part.own.equation.replace("_k", index) for part in equation.states]
+        parts = [
+            one.equation.replace("_k", index) + _at_rest(one.states, part.own)
+            for one, part in zip(equation.spelled_states, equation.states, strict=True)
+        ]
         return law + _formulas(parts)
     except InputError:  # nobody said how a law of their own is written
         return ""
+
+
+def _at_rest(states: Sequence[str], effect: StateEffect) -> str:
+    """Return what the states of a fluid are at rest, as it goes on behind their equation."""
+    index = "" if effect.levels == 1 else "_i"
+    rest = rf"{index} = {effect.rest:g}\ \mathrm{{at\ rest}}"
+    return "".join(rf",\quad {state}{rest}" for state in states)
 
 
 def _copies(answer: Answer) -> list[Mapping[str, str]]:

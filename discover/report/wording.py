@@ -10,6 +10,7 @@ from discover.loop import FreeForm
 from discover.protocols.kinematics import MODULI
 from discover.words import (
     FIGURE_SYMBOLS,
+    LEVEL,
     effect_title,
     estimate,
     interval,
@@ -91,7 +92,7 @@ def terms_text(outcome: LearnerOutcome) -> str:
     for term in outcome.terms:
         text = f"{estimate(term.coefficient, term.ci95)} {_factor(readable(term.term))}"
         if term.ci95 is not None:
-            text += f" (95 %: {interval(term.ci95)})"
+            text += f" ({LEVEL} {interval(term.ci95)})"
         parts.append(text)
     return ", ".join(parts)
 

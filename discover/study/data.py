@@ -12,6 +12,7 @@ from discover.dataset.load import folder_roots, load_dataset, resolve_folder
 from discover.dataset.material_functions import TABLES
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
+from discover.dataset.run_table import temperature_of
 from discover.dataset.tables.table import read_bytes, read_toml
 from discover.errors import InputError
 from discover.laws.multimode import Fluid
@@ -36,6 +37,12 @@ class StudyData:
     def truth(self) -> Fluid | None:
         """The fluid that made synthetic data, or None."""
         return self.dataset.truth if isinstance(self.dataset, SyntheticDataset) else None
+
+
+def temperature(study: Study, dataset: Dataset) -> float | None:
+    """Return the temperature of moduli and times in °C; None where nobody gave it."""
+    given = study.data.temperature_C
+    return temperature_of(dataset) if given is None else given
 
 
 def load_study_data(study: Study, seed: int | None = None) -> StudyData:

@@ -46,7 +46,7 @@ class EarlierResult:
             for (effect, name), (low, high) in self.intervals.items()
             if effect not in replaced
         )
-        open_ends = f" (95 %: {had})" if had else ""
+        open_ends = f" (95 % CI {had})" if had else ""
         exact = f" Constants count as exact: no interval here allows for theirs{open_ends}."
         return f"{self.text}{exact}{self.doubt}"
 

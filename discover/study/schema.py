@@ -155,6 +155,9 @@ class Data(Section):
     """Data computed from a known law, in place of a folder."""
     material: Annotated[str, Field(max_length=80)] = ""
     """Name of the material, for titles."""
+    temperature_C: Annotated[float, Field(ge=-273.15)] | None = None
+    """Temperature of the moduli and times in °C: of shifted data the reference. By default that of
+    `runs.csv`."""
     fit: tuple[str, ...] | None = None
     """Runs to fit, by file name; all that are not held out where left out."""
     held_out: tuple[str, ...] | Literal["each"] = ()

@@ -78,11 +78,20 @@ def test_fitted_runs_alone_are_a_residual():
 
 
 def test_both_normal_stresses_rest_on_the_law_where_it_settles_them():
-    close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001)}
+    close = {"N1": Spread(0.01, 0.02), "N2": Spread(0.001, 0.001, -0.09)}
     told = errors_by_quantity(result(FITTED, spread_of_laws=close), "Giesekus")
     assert "if Giesekus" in told["N1"].note
-    assert "if Giesekus" in told["N2"].note
+    assert told["N2"].note == "−9 % of N1 if Giesekus"
+    assert told["N2"].missing == "untested"
     assert not told["N2"].is_known
+    affine = {**close, "N2": Spread(0.0, 0.0, 1e-9)}  # but for the integrator
+    assert (
+        errors_by_quantity(result(FITTED, spread_of_laws=affine), "")["N2"].note == "0 by this law"
+    )
+    wide = {**close, "N2": Spread(0.3, 0.4, -0.09)}
+    unsettled = errors_by_quantity(result(FITTED, spread_of_laws=wide), "Giesekus")["N2"]
+    assert unsettled.missing == "not determined"
+    assert unsettled.note == "laws that fit as well differ by 30 % of N1"
     apart = errors_by_quantity(result(FITTED), "Giesekus")
     assert apart["N1"].note == "laws that fit as well differ by 60 %"
     assert {apart[kind].missing for kind in ("N1", "uniaxial")} == {"not determined"}

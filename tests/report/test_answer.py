@@ -1,5 +1,6 @@
 """The answer: its first line, its tolerance, and the first screen that shows it."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -8,12 +9,14 @@ from test_loop_report import loop_result
 from discover.answer import Answer, Constant, Discrepancy, ExpectedError, Mode, Range, Suspect
 from discover.answer.naming import named_law
 from discover.answer.sentences import tolerance
+from discover.answer.simple_material import material_of
 from discover.effects.registry import named_effects
 from discover.equations import Equation
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.answering import rest_of_h
 from discover.report.loop.report import write_loop
+from discover.report.mathtext import formula
 from discover.report.page import answer_screen, render
 from discover.study import RunFolder
 from discover.study.schema import Verdict
@@ -28,7 +31,7 @@ MELT = Answer(
     ),
     range=Range(rate_1_s=(0.003, 3.0)),
     expected_error={
-        "sigma12": ExpectedError(0.06, note="unseen runs, noise subtracted"),
+        "sigma12": ExpectedError(0.06, note="unseen runs"),
         "N1": ExpectedError(missing="not determined", note="laws that fit as well differ by 40 %"),
     },
     suspects=(Suspect("stress_gain", (Constant("gain_error", -0.11, (-0.36, 0.02)),)),),
@@ -39,11 +42,15 @@ MELT = Answer(
 
 def test_the_first_line_has_law_constants_error_and_range():
     assert MELT.headline == (
-        "Linear PTT, ε = 0.82 (95 %: 0.58–1.07), 2 modes. Error on unseen runs 6 % "
-        "(4–7 %), besides 0.25 % noise. Use in shear, 0.003–3 1/s."
+        "Linear PTT, ε = 0.82 (95 % CI 0.58–1.07), 2 modes. Error on unseen runs 6 % "
+        "(4–7 %), plus 0.25 % noise. Use in shear, 0.003–3 1/s, if 6 % error is acceptable."
     )
     useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)))
     assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
+    good = replace(MELT, tolerance=0.1).headline
+    assert good.endswith("Use in shear, 0.003–3 1/s.")
+    loud = replace(MELT, noise=0.08).headline
+    assert "Error on unseen runs 6 % (4–7 %), less than the noise (8 %)." in loud
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits within noise (1 %)." in exact.headline
 
@@ -84,7 +91,7 @@ def test_the_first_screen_shows_the_answer_in_at_most_sixty_words():
     words = [one for one in " ".join(prose).split() if any(c.isalnum() for c in one)]
     assert len(words) <= 60  # numbers are words too
     page = render("answer.html", screen=screen)
-    order = ("Linear PTT", "<math", "answer-table", 'id="modes"', "Next:", "data-copy")
+    order = ("Linear PTT", "Next:", "<math", "answer-table", 'id="modes"', "data-copy")
     places = [page.index(text) for text in order]
     assert places == sorted(places)
     assert all(one["text"] for one in screen["copies"])
@@ -105,8 +112,10 @@ def test_the_level_of_the_intervals_is_said_once():
     assert fluid.headline.count("95 %") == 1
     assert "K = 4.00 Pa sⁿ (3.90–4.10)" in fluid.headline
     declared = replace(fluid, constants=(Constant("alpha", 0.2), sums))
-    assert declared.headline.count("(95 %: 3.90–4.10)") == 1  # α has no interval that could say it
-    behind = replace(MELT, alternative="Best classical law: Giesekus, α = 0.74 (95 %: 0.7–0.8).")
+    assert (
+        declared.headline.count("(95 % CI 3.90–4.10)") == 1
+    )  # α has no interval that could say it
+    behind = replace(MELT, alternative="Best classical law: Giesekus, α = 0.74 (95 % CI 0.7–0.8).")
     screen = answer_screen(behind)
     said = " ".join([screen["headline"], screen["quality"], *screen["lines"]])
     assert said.count("(95") == 1
@@ -155,13 +164,19 @@ def test_what_cannot_be_written_out_is_one_equation_with_the_law_it_is_added_to(
 
 
 def test_a_suspect_is_a_row_of_the_table_with_its_interval():
-    *_, row = answer_screen(MELT)["constants"]
-    assert row[0] == "stress gain"
+    (row,) = answer_screen(MELT)["suspects"]
+    assert row[:2] == ("stress gain", "may be zero")
     assert row[2].startswith("−11")
     assert row[3] == "−36\N{NO-BREAK SPACE}to\N{NO-BREAK SPACE}2"
     two = replace(MELT, suspects=(*MELT.suspects, Suspect("wall_slip")))
-    rows = answer_screen(two)["constants"][-2:]
-    assert [one[2] for one in rows] == ["not separable"] * 2
+    rows = answer_screen(two)["suspects"]
+    assert [one[2] for one in rows] == ["sizes not separable"] * 2
+    page = render("answer.html", screen=answer_screen(MELT))
+    heading = page.index("not part of the law")
+    assert page.index("<th>constant</th>") < heading < page.index("stress gain")
+    assert "not part of the law" not in render(
+        "answer.html", screen=answer_screen(replace(MELT, suspects=()))
+    )
 
 
 def test_an_equation_has_the_digits_of_its_intervals_and_three_at_most():
@@ -184,12 +199,12 @@ def test_numbers_without_units_say_what_they_are():
 
 
 def test_a_suspected_share_is_a_percentage_of_something_and_others_have_units():
-    assert MELT.suspects[0].text == "stress gain −11 % (95 %: −36 to 2), not established"
+    assert MELT.suspects[0].text == "stress gain −11 % (95 % CI −36 to 2), not established"
     loss = Constant("loss", 0.018, (0.012, 0.022), meaning="of the stress per unit strain")
     said = Suspect("edge_fracture", (loss,)).text
-    assert said.startswith("edge fracture 1.80 % of the stress per unit strain (95 %: 1.20–2.20)")
+    assert said.startswith("edge fracture 1.80 % of the stress per unit strain (95 % CI 1.20–2.20)")
     lag = Constant("tau", 0.35, (0.13, 0.48), "s", meaning="tau")
-    assert Suspect("transducer_lag", (lag,)).text == "transducer lag 0.35 s (95 %: 0.13–0.48)"
+    assert Suspect("transducer_lag", (lag,)).text == "transducer lag 0.35 s (95 % CI 0.13–0.48)"
 
 
 def test_a_residual_of_fitted_runs_is_no_expected_error():
@@ -198,10 +213,14 @@ def test_a_residual_of_fitted_runs_is_no_expected_error():
         discrepancy=Discrepancy(0.06, (0.06, 0.06)),
         expected_error={"sigma12": ExpectedError(0.06, is_residual=True)},
     )
-    assert "Residual of the fitted runs 6 %, besides" in fitted.headline
-    assert "<th>fit residual</th>" in render("answer.html", screen=answer_screen(fitted))
+    assert "Residual of the fitted runs 6 %, plus" in fitted.headline
+    assert "<th>fit residual besides noise</th>" in render(
+        "answer.html", screen=answer_screen(fitted)
+    )
     assert not any("xpected error" in line for line in fitted.lines)
-    assert "<th>expected error</th>" in render("answer.html", screen=answer_screen(MELT))
+    assert "<th>expected error besides noise</th>" in render(
+        "answer.html", screen=answer_screen(MELT)
+    )
     met = replace(fitted, tolerance=0.1)
     assert tolerance(met) == "Tolerance 10 %: met by the fitted runs."
 
@@ -218,15 +237,17 @@ def test_a_tolerance_names_the_worst_run_and_quantities_besides_stress():
 
 
 def test_a_value_at_the_end_of_its_range_is_a_bound():
-    inertia = Constant("inertia", 1000.0, (130.0, 1000.0), "Pa s^2")
+    inertia = Constant("inertia", 1000.0, (130.0, 1000.0), "Pa s^2", end="high")
     at_end = Suspect("instrument_inertia", (inertia,))
-    assert at_end.text == "instrument inertia ≥ 130 Pa s², at the end of its range"
-    low = replace(inertia, value=0.0, ci95=(0.0, 40.0))
+    assert at_end.text == "instrument inertia ≥ 130 Pa s² (95 % CI, best fit 1000 Pa s²)"
+    low = replace(inertia, value=0.0, ci95=(0.0, 40.0), end="low")
     assert low.text.startswith("inertia ≤ 40 Pa s²")
-    assert "(95 %: 130–1000)" in replace(inertia, value=500.0).text
+    slow = Constant("x", 1e3, (50.0, 1e3), "s", letter=r"1/\dot\gamma_c", end="high")
+    assert slow.interval.startswith("≤ 0.02")  # told as the rate, whose bound is the other one
+    assert "(95 % CI 130–1000)" in replace(inertia, value=500.0, end="").text
     lag = Suspect("transducer_lag", (Constant("tau", 0.35, (0.13, 0.48), "s"),))
     two = replace(MELT, suspects=(lag, at_end))
-    assert any(line.startswith("Suspects, not separable: ") for line in two.lines)
+    assert any(line.endswith("instrument inertia, sizes not separable.") for line in two.lines)
     sure = replace(MELT, suspects=(lag, replace(lag, effect="time_delay")))
     assert not any("not separable" in line for line in sure.lines)
 
@@ -248,7 +269,7 @@ def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_
     named = replace(MELT, alternative=law)
     fit = replace(named, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None)
     assert fit.headline.startswith("Empirical fit: linear PTT with tr(σ) σ·σ. Error on unseen")
-    assert "6 % (95 %: 4–7 %), besides 0.25 % noise. " + law in fit.headline
+    assert "6 % (95 % CI 4–7 %), plus 0.25 % noise. " + law in fit.headline
     assert fit.lines.count(law) == 0
     assert law in named.lines
 
@@ -276,12 +297,56 @@ def test_a_chance_and_a_level_keep_to_a_line():
     said = replace(MELT, failed="No law reaches the noise (p < 0.001).")
     screen = answer_screen(said)
     gap = "\N{NO-BREAK SPACE}"
-    assert f"(p{gap}<{gap}0.001)" in screen["lines"][-1]
-    assert f"(95{gap}%:{gap}0.58" in screen["headline"]
+    assert f"(p{gap}<{gap}0.001)" in screen["quality"]
+    assert f"(95{gap}%{gap}CI{gap}0.58" in screen["headline"]
 
 
 def test_numbers_keep_to_a_line_with_their_units():
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
-    row, _ = answer_screen(exact)["constants"]
+    (row,) = answer_screen(exact)["constants"]
     assert " " not in row[2].replace(" ×", "")  # a break at most before the power of ten
     assert "ε\N{NO-BREAK SPACE}=\N{NO-BREAK SPACE}0.82" in answer_screen(MELT)["headline"]
+
+
+def test_the_interval_comes_first_where_the_best_fit_is_near_its_end():
+    skewed = Constant("epsilon", 0.80, (0.17, 0.82))
+    assert skewed.text == "ε = 0.17–0.82 (95 % CI, best fit 0.80)"
+    answer = replace(MELT, constants=(skewed, Constant("alpha", 0.1, (0.1, 3.2))))
+    assert answer.headline.startswith(
+        "Linear PTT, ε = 0.17–0.82 (95 % CI, best fit 0.80), α = 0.1–3.2 (best fit 0.1), 2 modes."
+    )
+    # the table gives the value that the equation has, for it goes with the other constants
+    assert answer_screen(answer)["constants"][0][2] == "0.80"
+    assert Constant("epsilon", 0.4, (0.17, 0.82)).text == "ε = 0.40 (95 % CI 0.17–0.82)"
+
+
+def test_a_law_says_at_which_temperature_it_holds():
+    assert "2 modes, at 160 °C." in replace(MELT, temperature_C=160.0).headline
+    assert "at −35 °C." in replace(MELT, temperature_C=-35.0).headline
+    assert "°C" not in MELT.headline
+    assert replace(MELT, temperature_C=160.0).use["temperature_C"] == 160.0
+
+
+def test_what_was_not_tested_stands_behind_the_fit():
+    fitted = replace(MELT, fits_to_the_noise=True, failed="Not tested on unseen runs.")
+    screen = answer_screen(fitted)
+    assert "Not tested on unseen runs. Use in" in screen["quality"]
+    assert not any("Not tested" in line for line in screen["lines"])
+
+
+def test_a_yield_stress_fluid_says_where_it_flows():
+    found = material_of("herschel_bulkley", (12.0, 3.0, 0.5), [(11, 13), (2, 4), (0.4, 0.6)], 0.01)
+    assert plain(found.formula).count("|σ_12| > τ_y") == 1
+    assert "γ̇ = 0" in plain(found.formula)
+    assert found.formula in found.latex
+    assert "no flow up to a stress of 12 Pa" in found.written((), 0.01, 1e3)["python"]
+    newtonian = material_of("newtonian", (2.0,), [(1, 3)], 0.01)
+    assert ">" not in newtonian.formula
+
+
+def test_equations_that_the_answer_rests_on_are_larger_than_text():
+    def height(svg):
+        return float(re.search(r"height:([\d.]+)pt", svg)[1])
+
+    latex = named_effects()["thixotropy"].equation
+    assert height(formula(latex, "a", 15.0)) > 1.3 * height(formula(latex, "b"))

@@ -1,5 +1,6 @@
 """An equation as a piece of a LaTeX document, and the plain lines that every file begins with."""
 
+from discover.effects.letters import Spelled
 from discover.equations.equation import Equation
 from discover.equations.parts import StatePart
 from discover.equations.spelling.markup import PREAMBLE, SEPARATOR, latex_letters, law_latex
@@ -17,8 +18,8 @@ def equation_latex(equation: Equation, digits: int = 9) -> str:
     if where:
         rows = " \\\\\n".join("  " + one.replace(" = ", " &= ", 1) for one in where)
         lines.append(f"\\begin{{align}}\n{rows}\n\\end{{align}}\n")
-    for part in equation.states:
-        lines.append(_state(part, digits))
+    for part, spelled in zip(equation.states, equation.spelled_states, strict=True):
+        lines.append(_state(part, spelled, digits))
     letters = {} if named is None else latex_letters(named, LatexNotation(digits))
     if named is not None:
         lines += [f"% {letters[n]}: {n} of the law {named.law}" for n in named.constants[0]]
@@ -38,15 +39,15 @@ def equation_latex(equation: Equation, digits: int = 9) -> str:
     return "\n".join(lines)
 
 
-def _state(part: StatePart, digits: int) -> str:
+def _state(part: StatePart, spelled: Spelled, digits: int) -> str:
     """Return the equation of a state of the whole fluid, with its numbers."""
     numbers = ",\\quad ".join(
-        f"{p.symbol} = {latex_number(part.values[p.name], digits)}"
+        f"{spelled.symbols[p.name]} = {latex_number(part.values[p.name], digits)}"
         + (rf"\,\mathrm{{{p.unit}}}" if p.unit else "")
         for p in part.own.parameters
     )
     lines = [f"% {part.effect}, of the whole fluid", "\\begin{gather}"]
-    return "\n".join([*lines, f"  {part.own.equation} \\\\", f"  {numbers}", "\\end{gather}\n"])
+    return "\n".join([*lines, f"  {spelled.equation} \\\\", f"  {numbers}", "\\end{gather}\n"])
 
 
 def header_lines(equation: Equation) -> list[str]:

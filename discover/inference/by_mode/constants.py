@@ -1,6 +1,7 @@
 """A constant as finally fitted: one for all modes, or one for each."""
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 _OPEN = 100.0
 """Factor above the value from which on an interval tells nothing: two decades, beyond which records
@@ -26,12 +27,15 @@ class StageParameter:
         Of both.
     ci95_given_effects
         95 % interval if these effects are the right ones; None where only this one is known.
+    at_end
+        Which end of its physical range the value is at; empty inside.
     """
 
     value: float
     ci95: tuple[float, float]
     unit: str
     ci95_given_effects: tuple[float, float] | None = field(default=None, kw_only=True)
+    at_end: Literal["", "low", "high"] = field(default="", kw_only=True)
 
     @property
     def is_open(self) -> bool:
@@ -46,6 +50,12 @@ class StageParameter:
         # a logarithm there and back errs by a rounding
         at_the_end = high >= (1.0 - _ROUNDING) * end
         return self.is_open or (at_the_end and end > _OPEN * max(low, 0.0))
+
+
+def end_of_range(value: float, low: float, high: float) -> Literal["", "low", "high"]:
+    """Return at which end of a range a value is, but for a rounding; empty inside it."""
+    off = _ROUNDING * abs(value)
+    return "low" if value <= low + off else "high" if value >= high - off else ""
 
 
 @dataclass(frozen=True)

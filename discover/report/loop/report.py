@@ -88,7 +88,10 @@ def write_loop(
         explanations=tables.explanations(result),
         inclusion=tables.inclusion(result),
         next_tests=tables.next_tests(result),
-        stages=[tables.stage_row(stage, i) for i, stage in enumerate(result.stages)],
+        stages=[
+            tables.stage_row(stage, i, result.letters.get(stage.effect, {}))
+            for i, stage in enumerate(result.stages)
+        ],
         declared_effects=tables.declared_effects(result),
         rankings=[tables.ranking_rows(ranking) for ranking in result.rankings],
         folds=[tables.fold_row(fold) for fold in result.folds],

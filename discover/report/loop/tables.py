@@ -1,12 +1,11 @@
 """The tables of a closed loop's page, as rows."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from discover.effects.registry import parameters_of
 from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.loop_result import LoopResult
@@ -226,16 +225,13 @@ def noise_range(result: LoopResult) -> list[float] | None:
     return None
 
 
-def _symbols(stage: Stage) -> dict[str, str]:
-    """Return the typeset symbol of each parameter, as the equation has it."""
-    parameters = parameters_of(stage.effect)
+def stage_row(stage: Stage, number: int, letters: Mapping[str, str]) -> dict[str, Any]:
+    """Return what a stage added; its `number` tells its formula's marks from those of others.
+
+    `letters`: of its parameters, as its equation has them.
+    """
     own = safe_name(stage.effect)
-    return {name: formula(one.symbol, f"{own}_{name}") for name, one in parameters.items()}
-
-
-def stage_row(stage: Stage, number: int) -> dict[str, Any]:
-    """Return what a stage added; its `number` tells its formula's marks from those of others."""
-    symbols = _symbols(stage)
+    symbols = {name: formula(letter, f"{own}_{name}") for name, letter in letters.items()}
     return {
         "name": stage.effect,
         "effect": effect_title(stage.effect),
