@@ -81,35 +81,28 @@ class _Found:
     said: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     tests: dict[str, TestName] = field(default_factory=dict)
-    seen: dict[str, set[str]] = field(default_factory=dict)  # names of columns by quantity
+    seen: set[tuple[str, str]] = field(default_factory=set)  # quantities and their columns
     named: set[str] = field(default_factory=set)  # quantities that some block names
     asked_for: set[str] = field(default_factory=set)  # those that a test needs
-    units: UnsaidUnits = field(default_factory=dict)
-    columns: dict[str, list[str]] = field(default_factory=dict)  # files by columns not read
+    units: UnsaidUnits = field(default_factory=list)
+    columns: list[tuple[str, str]] = field(default_factory=list)  # columns not read, and the file
 
     def note(self, readings: Readings, made: Record) -> None:
         """Keep what a test that is imported says of names and units."""
-        for quantity, at in readings.columns.items():
-            if quantity in readings.used:
-                self.seen.setdefault(quantity, set()).add(readings.block.columns[at][0])
-        for key, unit in readings.unsaid.items():
-            if _is_part(key, made):
-                self.units.setdefault((key, unit.column), (readings.name, unit))
-        self.asked_for |= readings.used.keys() | {SAME[k] for k in readings.used if k in SAME}
+        used, names = readings.used.keys(), readings.block.columns
+        self.seen |= {(key, names[at][0]) for key, at in readings.columns.items() if key in used}
+        self.units += [
+            (key, readings.name, unit)
+            for key, unit in readings.unsaid.items()
+            if _is_part(key, made)
+        ]
+        self.asked_for |= used | {SAME[key] for key in used if key in SAME}
 
     def add(self, other: "_Found") -> None:
         """Add what another file holds."""
-        self.records += other.records
-        self.said += other.said
-        self.tests |= other.tests
-        self.unread += other.unread
-        self.named |= other.named
-        self.asked_for |= other.asked_for
-        self.units = {**other.units, **self.units}
-        for key, names in other.seen.items():
-            self.seen.setdefault(key, set()).update(names)
-        for names, files in other.columns.items():
-            self.columns.setdefault(names, []).extend(files)
+        for name, own in vars(self).items():
+            add = own.extend if isinstance(own, list) else own.update
+            add(getattr(other, name))
 
 
 def import_files(
@@ -147,7 +140,10 @@ def import_files(
             "in the mapping file."
         )
     given = {str(key): name for key, name in mapping.columns.items()}
-    if unmatched := sorted(set(given) - set(all_.seen)):
+    names: dict[str, list[str]] = {}
+    for key, name in sorted(all_.seen):
+        names.setdefault(key, []).append(name)
+    if unmatched := sorted(given.keys() - names.keys()):
         key = unmatched[0]
         raise InputError(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
@@ -168,7 +164,7 @@ def import_files(
     files, notes = files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
-    same = {key: next(iter(names)) for key, names in all_.seen.items() if len(names) == 1}
+    same = {key: of[0] for key, of in names.items() if len(of) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
     units, unread = units_taken_as_si(all_.units), unread_columns(all_.columns)
@@ -241,7 +237,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             found.records.append(NamedRecord(own, made, file, wave.name))
             found.said.append(_summary(f"{file}, {wave.name}", of_wave, one, made))
     if unread := [shown(name) for name in there if name not in read]:
-        found.columns[", ".join(unread)] = [file]
+        found.columns.append((", ".join(unread), file))
     if not found.records:
         raise InputError(" ".join(found.unread) or nothing(path, tables, reasons))
     return found

@@ -1,12 +1,11 @@
 """Tests become the files of a folder; what of an export is not read is named."""
 
-import csv
-import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from discover.dataset.importing.quantities import SAME_TEMPERATURE
 from discover.dataset.importing.readings import INSTRUMENT, Readings
@@ -25,7 +24,10 @@ _NO_TEMPERATURE = (
     "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
     "FILE:2=60 for a block. To exchange the two, rename them."
 )
-_CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "step_time_s")
+_INDEX_COLUMNS = [
+    "file", "source_file", "source_block", "flow", "control", "start", "rate_before_1_s",
+    "step_strain", "step_time_s", "temperature_C",
+]  # fmt: skip
 _FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
 _OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
 
@@ -57,9 +59,9 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
         # two names that differ in capitals are one file on some disks
         runs.append(replace(one, name=next(name for name in names if name.lower() not in taken)))
         taken.add(runs[-1].name.lower())
-    files = {f"{one.name}.csv": _csv(one.record) for one in runs}
+    files = {f"{one.name}.csv": _csv(one.record.columns) for one in runs}
     notes: list[str] = []
-    by_temperature: list[tuple[str, str, str]] = []
+    by_temperature: list[dict[str, str]] = []
     of_runs = {one.record.temperature for one in runs}
     for kind, table in TABLES.items():
         records = [one for one in found if one.record.kind == kind and not one.record.is_run]
@@ -75,18 +77,18 @@ def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
             main = not at or group[0].chosen
             base = table if main else f"{table}_{at}C"
             if not main:
-                by_temperature.append((f"{base}.csv", table, at))
-            files[f"{base}.csv"] = _csv(group[0].record)
+                by_temperature.append({"file": f"{base}.csv", "test": table, "temperature_C": at})
+            files[f"{base}.csv"] = _csv(group[0].record.columns)
             for number, one in enumerate(group[1:], start=2):
-                files[f"{base}-{number}.csv"] = _csv(one.record)
+                files[f"{base}-{number}.csv"] = _csv(one.record.columns)
                 notes.append(_not_used(f"{base}-{number}.csv", table, one))
         if len(groups) > 1 and not groups[0][0].chosen:
             at_runs = [g[0] for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
             if len(at_runs) == 1:
-                files[f"{table}.csv"] = _csv(at_runs[0].record)
+                files[f"{table}.csv"] = _csv(at_runs[0].record.columns)
             notes.append(_of_temperatures(table, groups, len(at_runs) == 1))
     if by_temperature:
-        files[TESTS_FILE] = _text([("file", "test", "temperature_C"), *by_temperature])
+        files[TESTS_FILE] = _csv(by_temperature)
     if runs:
         files[INDEX_FILE] = _index(runs)
     return files, notes
@@ -133,34 +135,24 @@ def _merged(records: Sequence[NamedRecord]) -> list[NamedRecord]:
 
 
 def _index(runs: Sequence[NamedRecord]) -> str:
-    used = [key for key in _CONDITIONS if any(key in one.record.conditions for one in runs)]
-    warm = any(one.record.temperature is not None for one in runs)
-    warm = any(one.record.temperature is not None for one in runs)
-    rows = [("file", "source_file", "source_block", *used, *(["temperature_C"] if warm else []))]
+    rows = []
     for one in runs:
-        conditions = [one.record.conditions.get(key, "") for key in used]
         degrees = one.record.temperature
-        last = ["" if degrees is None else f"{degrees:g}"] if warm else []
-        rows.append((f"{one.name}.csv", one.source, one.block, *conditions, *last))
-    return _text(rows)
+        warm = {} if degrees is None else {"temperature_C": f"{degrees:g}"}
+        source = {"source_file": one.source, "source_block": one.block}
+        rows.append({"file": f"{one.name}.csv", **source, **one.record.conditions, **warm})
+    table = pd.DataFrame(rows).reindex(columns=_INDEX_COLUMNS)
+    return _csv(table.dropna(axis="columns", how="all"))
 
 
-def _text(rows: Sequence[tuple[str, ...]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+def _csv(table: object) -> str:
+    return pd.DataFrame(table).to_csv(index=False, lineterminator="\n")
 
 
-def _csv(record: Record) -> str:
-    # repr gives the shortest text that reads back as the same number
-    table = record.columns
-    rows = zip(*(map(repr, column.tolist()) for column in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(row) for row in rows)]) + "\n"
-
-
-def unread_columns(columns: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def unread_columns(columns: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Say once of which columns nothing was read, and what to do to have them."""
-    for names, files in columns.items():
+    for names in dict.fromkeys(names for names, _ in columns):
+        files = [file for other, file in columns if other == names]
         more = f" and {len(files) - 3} more files" if len(files) > 3 else ""
         yield (
             f"{', '.join(files[:3])}{more}: columns not read: {names}. To have one, say what "
