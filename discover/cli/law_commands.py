@@ -167,7 +167,6 @@ def export(
     """Write the law found as Python, SymPy, LaTeX, JSON, UFL or a rheoTool dictionary."""
     from discover.answer.exported import simple_material_text
     from discover.equations.files import choose_law, read_result_laws, write_equation
-    from discover.errors import InputError
     from discover.first_use import enable_x64
     from discover.study.atomic import make_folder, replaceable, write_text
 

@@ -240,10 +240,7 @@ class Run(NotebookView):
     def observing(self, quantity: RecordedQuantity) -> "Run":
         """Return the same run with another quantity fitted or tested, under a name of its own.
 
-        Parameters
-        ----------
-        quantity
-            N1 or N2 in shear, or a modulus of oscillations; InputError if it was not recorded.
+        `quantity`: N1 or N2 in shear, or a modulus of oscillations; InputError without a record.
         """
         seen = replace(
             self, name=f"{self.name} ({quantity})", protocol=recording(self.protocol, quantity)

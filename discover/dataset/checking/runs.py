@@ -40,23 +40,14 @@ Values = Float[np.ndarray, " n"]
 class Finding:
     """One thing that is wrong, doubtful or worth knowing.
 
-    Attributes
-    ----------
-    severity
-        ``error``: the folder cannot be used; ``warning``: it can, but results may mislead;
-        ``note``: how something was understood.
-    subject
-        What it is about, such as ``outliers`` or ``N1``; the same word for the same kind.
-    file
-        The file, or empty if it is about the folder.
-    text
-        A sentence or two in the user's words, with the remedy.
+    An ``error``: the folder cannot be used; a ``warning``: it can, but results may mislead; a
+    ``note``: how something was understood.
     """
 
     severity: Severity
-    subject: str
-    file: str
-    text: str
+    subject: str  # such as ``outliers`` or ``N1``; the same word for the same kind
+    file: str  # empty if it is about the folder
+    text: str  # a sentence or two in the user's words, with the remedy
 
     def __str__(self) -> str:
         return self.text

@@ -81,7 +81,7 @@ class _Found:
     said: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     tests: dict[str, TestName] = field(default_factory=dict)
-    seen: set[tuple[str, str]] = field(default_factory=set)  # quantities and their columns
+    seen: dict[tuple[str, str], None] = field(default_factory=dict)  # quantities and columns
     named: set[str] = field(default_factory=set)  # quantities that some block names
     asked_for: set[str] = field(default_factory=set)  # those that a test needs
     units: UnsaidUnits = field(default_factory=list)
@@ -90,7 +90,8 @@ class _Found:
     def note(self, readings: Readings, made: Record) -> None:
         """Keep what a test that is imported says of names and units."""
         used, names = readings.used.keys(), readings.block.columns
-        self.seen |= {(key, names[at][0]) for key, at in readings.columns.items() if key in used}
+        seen = ((key, names[at][0]) for key, at in readings.columns.items() if key in used)
+        self.seen |= dict.fromkeys(seen)
         self.units += [
             (key, readings.name, unit)
             for key, unit in readings.unsaid.items()
@@ -141,7 +142,7 @@ def import_files(
         )
     given = {str(key): name for key, name in mapping.columns.items()}
     names: dict[str, list[str]] = {}
-    for key, name in sorted(all_.seen):
+    for key, name in all_.seen:
         names.setdefault(key, []).append(name)
     if unmatched := sorted(given.keys() - names.keys()):
         key = unmatched[0]
