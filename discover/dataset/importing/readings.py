@@ -67,6 +67,13 @@ class Readings:
         constant = self._constant(key)
         return None if constant is None else np.full(len(self), constant)
 
+    def unless_wrong(self, key: str) -> Values | None:
+        """Return a quantity; None too where its unit is wrong, which is said later."""
+        try:
+            return self.get(key)
+        except InputError:
+            return None
+
     def has(self, *keys: str) -> bool:
         """Return whether all of these are known, as `get` finds them."""
         return all(self.get(key) is not None for key in keys)

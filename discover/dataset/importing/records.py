@@ -255,10 +255,7 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
     """Return when a block began, if its clock goes on from the block before, and when it ended."""
     if "time" not in readings.columns or readings.mapping.start_time_s:
         return 0.0, last
-    try:
-        time = readings.alone("time")
-    except InputError:  # said where the block is read, if it is
-        return 0.0, last
+    time = readings.unless_wrong("time")
     time = np.empty(0) if time is None else time[np.isfinite(time)]
     if not len(time):
         return 0.0, last
