@@ -3,14 +3,13 @@
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from discover.dataset.importing.files import blocks_of_importer
 from discover.dataset.importing.folder_files import (
-    NamedRecord,
     files_of,
     left_out,
     nothing,
@@ -77,7 +76,7 @@ class ImportedFolder:
 class _Found:
     """Records and messages, of one file or of all."""
 
-    records: list[NamedRecord] = field(default_factory=list)
+    records: list[Record] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     tests: dict[str, TestName] = field(default_factory=dict)
@@ -200,7 +199,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
         if previous is not None and chosen in (None, "creep"):
             recovered = joined(previous, readings)
             if recovered is not None:
-                found.records[-1] = replace(found.records[-1], record=recovered)
+                found.records[-1] = recovered
                 found.tests[key] = "creep"
                 words = "the recovery after the creep before it, added to that run."
                 found.said.append(f"{where}: {words}")
@@ -219,7 +218,8 @@ def _read(path: Path, mapping: Mapping) -> _Found:
                 reasons += [f"block {number} is {why}"] if why else []
                 found.said.append(left_out(where, block, why))
             else:
-                found.records.append(NamedRecord(name, made, file, block.name))
+                made.name = name
+                found.records.append(made)
                 found.tests[key] = made.kind
                 found.note(readings, made)
                 made.notes += readings.notes.values()
@@ -234,8 +234,8 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             of_wave = Readings.of(wave, Mapping(), file)
             one = recognise(of_wave)
             made = record(of_wave, one, None)
-            own = f"{name}-point-{wave.name.rpartition(' ')[2]}"
-            found.records.append(NamedRecord(own, made, file, wave.name))
+            made.name = f"{name}-point-{wave.name.rpartition(' ')[2]}"
+            found.records.append(made)
             found.said.append(_summary(f"{file}, {wave.name}", of_wave, one, made))
     if unread := [shown(name) for name in there if name not in read]:
         found.columns.append((", ".join(unread), file))
@@ -294,7 +294,8 @@ def _read_sweep(path: Path, mapping: Mapping, found: _Found) -> None:
         made = record(readings, one, None)
         found.named |= readings.named()
         found.note(readings, made)
-        found.records.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
+        made.chosen = True
+        found.records.append(made)
         found.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
         return
     raise InputError(
