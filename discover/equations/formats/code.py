@@ -10,57 +10,35 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from tensor_library.notation import Notation, printed
+from tensor_library.notation import TextNotation, printed
 from tensor_library.terms import parse_term
 
 
-class CodeNotation(Notation[str]):
+class CodeNotation(TextNotation):
     """numpy, and what the other texts in Python share with it."""
 
-    def tensor(self, name: str) -> str:
-        """Return the variable that holds the tensor."""
-        return {"I": "unit", "sigma": "s", "gammadot": "d"}[name]
-
-    def contraction(self, tensors: Sequence[str]) -> str:
-        """Return the matrix product."""
-        return " @ ".join(tensors)
-
-    def sum(self, summands: Sequence[str]) -> str:
-        """Return the bracketed sum."""
-        return f"({' + '.join(summands)})"
+    tensors = {"I": "unit", "sigma": "s", "gammadot": "d"}  # noqa: RUF012
+    dot, times, powered = " @ ", " * ", "{} ** {}"
+    # with the cap of the library: beyond it a law is absurd, not infinite
+    exponential_form = "np.expm1(min({rate} * {trace}, 60.0))"
+    saturating_form = "({trace} / (1 + {level} * abs({trace})))"
 
     def trace(self, tensor: str) -> str:
         """Return a call of the method of matrices."""
         return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
 
-    def power(self, scalar: str, exponent: int) -> str:
-        """Return the power."""
-        return f"{scalar} ** {exponent}"
-
-    def number(self, value: float) -> str:
-        """Return all digits of a number, bracketed if negative."""
-        return f"({float(value)!r})" if value < 0 else repr(float(value))
+    def digits_of(self, value: float) -> str:
+        """Return all digits."""
+        return repr(float(value))
 
     def letter(self, name: str) -> str:
         """Refuse: every term of an equation has its numbers."""
         raise ValueError(f"Code needs a number for {name}.")
 
-    def exponential(self, rate: str, trace: str) -> str:
-        """Return exp − 1 with the cap of the library: beyond it a law is absurd, not infinite."""
-        return f"np.expm1(min({rate} * {trace}, 60.0))"
-
-    def saturating(self, level: str, trace: str) -> str:
-        """Return the bracketed fraction."""
-        return f"({trace} / (1 + {level} * abs({trace})))"
-
     def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
         """Return the expression as SymPy prints it."""
         text, _ = printed(expression, letters, self._text)
         return f"({text})" if factor else text
-
-    def product(self, factors: Sequence[str]) -> str:
-        """Return the product."""
-        return " * ".join(factors)
 
     def _text(self, expression: Any) -> str:
         from sympy.printing.numpy import NumPyPrinter
@@ -73,11 +51,8 @@ class CodeNotation(Notation[str]):
 
 
 class _SympyCodeNotation(CodeNotation):
-    def exponential(self, rate: str, trace: str) -> str:
-        return f"(sympy.exp({rate} * {trace}) - 1)"
-
-    def saturating(self, level: str, trace: str) -> str:
-        return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
+    exponential_form = "(sympy.exp({rate} * {trace}) - 1)"
+    saturating_form = "({trace} / (1 + {level} * sympy.Abs({trace})))"
 
     def _text(self, expression: Any) -> str:
         from sympy.printing.pycode import SymPyPrinter

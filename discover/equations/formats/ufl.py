@@ -94,15 +94,14 @@ def in_space(plane):
 
 
 class _UflNotation(CodeNotation):
+    exponential_form = "(exp({rate} * {trace}) - 1)"
+
     def contraction(self, tensors):
         first, *others = tensors
         return f"dot({first}, {self.contraction(others)})" if others else first
 
     def trace(self, tensor: str) -> str:
         return f"tr({tensor})"
-
-    def exponential(self, rate: str, trace: str) -> str:
-        return f"(exp({rate} * {trace}) - 1)"
 
     def _text(self, expression: Any) -> str:
         from sympy.printing.pycode import PythonCodePrinter
