@@ -33,28 +33,21 @@ MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 
 @dataclass(frozen=True)
 class DeclaredModel:
-    """The declared law with starting values for what is to be fitted.
-
-    `law_name`, `parameters`: as declared, with numbers for those to be fitted.
-    `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
-    `free`: names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
-    `by_mode`: parameters of the law, and effects, that may differ from mode to mode.
-    `solid`: what is to be known of an elastic constant among the modes; empty where there is none.
-    """
+    """The declared law with starting values for what is to be fitted."""
 
     law: AbstractConstitutiveLaw  # the dimensionless law
     law_name: str
-    parameters: dict[str, float]
-    modulus: np.ndarray
-    relaxation_time: np.ndarray
-    free: tuple[str, ...]
+    parameters: dict[str, float]  # with numbers for those to be fitted
+    modulus: np.ndarray  # of each mode in Pa, shape (k,)
+    relaxation_time: np.ndarray  # of each mode in s, shape (k,)
+    free: tuple[str, ...]  # to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``
     spectrum: RelaxationSpectrum | None  # where the modes come from, if from a linear sweep
     solvent_viscosity: float = 0.0  # in Pa s
     effects: tuple[KnownEffect, ...] = ()
     source: str = ""  # what was taken from an earlier result, in words; empty where nothing was
-    by_mode: tuple[str, ...] = ()
+    by_mode: tuple[str, ...] = ()  # parameters and effects that may differ from mode to mode
     choice: tuple[str, ...] = ()  # named laws to choose the law from; none where it is declared
-    solid: str = ""
+    solid: str = ""  # what is to be known of an elastic constant among the modes
 
     @property
     def modes_in_words(self) -> str:

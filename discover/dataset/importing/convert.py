@@ -42,9 +42,8 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        given = {str(key): column for key, column in mapping.columns.items()}
         names = name_table(mapping.names)
-        if not any(guess_columns(block, given, names) for block in found):
+        if not any(guess_columns(block, mapping.columns, names) for block in found):
             wave = without_names(rows)
             found = found if wave is None else [wave]
         require_blocks(found, path.name)
@@ -139,7 +138,7 @@ def import_files(
             "No test to import was given. Name one or more exports, or list them under [[source]] "
             "in the mapping file."
         )
-    given = {str(key): name for key, name in mapping.columns.items()}
+    given = mapping.columns
     names: dict[str, list[str]] = {}
     for key, name in all_.seen:
         names.setdefault(key, []).append(name)
@@ -149,7 +148,7 @@ def import_files(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
-    of_units = set(map(str, mapping.units))
+    of_units = set(mapping.units)
     if unused := sorted(of_units - all_.named):
         raise InputError(
             f"--unit {unused[0]} changes nothing: no column or line of these files is known as "

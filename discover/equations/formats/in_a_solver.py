@@ -19,17 +19,13 @@ _TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits 
 
 
 class InASolver(NamedTuple):
-    """Extremes over the edge of a law's box.
-
-    `smallest_eigenvalue`, `of_mode`: of the conformation (I + σ_k/G_k; of chains that end, I +
-    σ_k/(k G_k)), and its mode from 1; NaN where the law diverged. `largest_step`, `limiting_mode`:
-    longest stable step of explicit Euler for the stress of a mode, in s; infinite where nothing
-    decays.
-    """
+    """Extremes over the edge of a law's box."""
 
     weissenberg: float  # largest Wi of the box, at which the flows were
+    # of the conformation, I + σ_k/G_k (of chains that end, I + σ_k/(k G_k)); NaN if it diverged
     smallest_eigenvalue: float
-    of_mode: int
+    of_mode: int  # from 1
+    # stable with explicit Euler for the stress of a mode, in s; infinite where nothing decays
     largest_step: float
     limiting_mode: int
 

@@ -28,37 +28,28 @@ _SLIP = "sigma.gammadot+gammadot.sigma"
 _LINEAR = "tr(sigma)*sigma"
 _PLAIN, _STRESS, _TIME = "[0 0 0 0 0 0 0]", "[1 -1 -2 0 0 0 0]", "[0 0 1 0 0 0 0]"
 _TIMES = ("lambda", "lambdaB", "lambdaS", "lambdaD", "lambdaR", "K", "L")
+_DENSITY, _VISCOSITY = "[1 -3 0 0 0 0 0]", "[1 -1 -1 0 0 0 0]"
 QUANTITIES = {
-    "density": "[1 -3 0 0 0 0 0]",
-    "viscosity": "[1 -1 -1 0 0 0 0]",
-    "stress": _STRESS,
-    "time": _TIME,
+    "density": _DENSITY, "viscosity": _VISCOSITY, "stress": _STRESS, "time": _TIME,
     "number": _PLAIN,
-}
+}  # fmt: skip
 """Dimensions as OpenFOAM writes them."""
 
 _DIMENSIONS = {
-    "rho": QUANTITIES["density"],
-    "etaS": QUANTITIES["viscosity"],
-    "etaP": QUANTITIES["viscosity"],
-    "tau0": _STRESS,
+    "rho": _DENSITY, "etaS": _VISCOSITY, "etaP": _VISCOSITY, "tau0": _STRESS,
     **dict.fromkeys(_TIMES, _TIME),
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class RheoToolModel:
-    """Law in rheoTool's words: `type`, word `options`, and `parameters` over time and modulus.
-
-    `drive`, `relax`: factors on modulus and relaxation rate by terms ``gammadot`` and ``sigma``.
-    `notes`: what was passed over.
-    """
+    """Law in rheoTool's words."""
 
     type: str  # entry ``type``
     options: dict[str, str]  # entries that are words
-    parameters: dict[str, float]
-    drive: float = 1.0
-    relax: float = 1.0
+    parameters: dict[str, float]  # over time and modulus
+    drive: float = 1.0  # factor on the modulus by terms ``gammadot``
+    relax: float = 1.0  # factor on the relaxation rate by terms ``sigma``
     notes: tuple[str, ...] = ()  # what was passed over
 
 
