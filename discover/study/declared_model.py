@@ -123,7 +123,9 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
             for value, first in zip(given, start, strict=True)
         )
         if model.elastic_modulus_Pa:
-            still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
+            timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
+            longest = max((float(run.time[-1]) for run in timed), default=1.0)
+            still = _UNRELAXED * max(longest, float(np.max(relaxation_time)))
             solid = (
                 f"the material is a solid, with an elastic constant of {model.elastic_modulus_Pa:g}"
                 f" Pa. A law of a fluid holds it as a mode of {still:.3g} s: do not use what it "
@@ -186,12 +188,6 @@ def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
             'for that many exactly. Write fewer, or modes = "lve".'
         )
     return spectrum
-
-
-def _longest(dataset: Dataset) -> float:
-    """Return the longest duration of a run in s."""
-    timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
-    return max((float(run.time[-1]) for run in timed), default=1.0)
 
 
 FOUND_LAW = "a law found before"

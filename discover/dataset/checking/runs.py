@@ -217,7 +217,7 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
             continue
         rates = np.array([abs(run.rate[0]) for run in alike])
         for what, quantity, rises in (
-            ("The stress", _largest, True),
+            ("The stress", lambda run: np.max(np.abs(run.stress)), True),
             ("The time at which the stress rises", _half_time, False),
         ):
             values = np.array([quantity(run) for run in alike])
@@ -235,10 +235,6 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         cold, hot = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
         names: dict[str, Any] = {"cold": cold, "hot": hot}
         yield found("two_temperatures", **names, lowest=known[cold], highest=known[hot])
-
-
-def _largest(run: Run) -> float:
-    return float(np.max(np.abs(run.stress)))
 
 
 def _half_time(run: Run) -> float:

@@ -78,8 +78,10 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
     made = _table(readings, found, needed)
     if "time" in made.table:
         _begin(made, readings)
-    if found.kind == "flow_curve":
-        _as_forward(made)
+    both = [made.table[key] for key in ("shear_rate", "stress") if found.kind == "flow_curve"]
+    if both and np.median(both[0]) < 0.0 and np.median(both[1]) < 0.0:
+        made.table |= {"shear_rate": -both[0], "stress": -both[1]}
+        made.notes.append("rate and stress, both negative, are taken without their signs")
     if needed.positive:
         made.keep(np.all([made.table[k] > 0.0 for k in needed.positive], axis=0), needed.why)
     if "tensile_stress" in made.table:
@@ -164,13 +166,6 @@ def _begin(made: Record, readings: Readings) -> None:
     later = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     if 0 < np.sum(~later) <= max(2, 0.1 * len(time)):
         made.keep(later, "a time that was there already")
-
-
-def _as_forward(made: Record) -> None:
-    rate, stress = made.table["shear_rate"], made.table["stress"]
-    if np.median(rate) < 0.0 and np.median(stress) < 0.0:
-        made.table |= {"shear_rate": -rate, "stress": -stress}
-        made.notes.append("rate and stress, both negative, are taken without their signs")
 
 
 def _note_steadiness(made: Record, time: Values | None) -> None:

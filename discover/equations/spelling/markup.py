@@ -43,14 +43,8 @@ def law_latex(
     defined: list[tuple[str, str]] = []
     if named is not None:
         spelled = latex_letters(named, notation)
-        defined, summands = named.function.spell(notation, spelled)
+        summands, defined = _named(named, notation, spelled, r"\dot{{{}}}")
         text += "".join(f" + {summand}" for summand in summands)
-        defined = [(spelled[name], value) for name, value in defined]
-        rates = named.function.spell_rates(notation, spelled)
-        defined = [(rf"\dot{{{spelled[name]}}}", value) for name, value in rates] + defined
-        constants = named.constants[0].items()
-        fixed = [(spelled[n], v) for n, v in constants if n not in named.differing]
-        defined += [(letter, latex_number(value, digits)) for letter, value in fixed]
     letters: dict[str, float] = {}
     for term in terms:
         # a letter has one value in an equation; where it has another, that number stands itself
@@ -62,6 +56,24 @@ def law_latex(
     text += r" = \dot{\boldsymbol{\gamma}}"
     defined += [(notation.letter(n), latex_number(v, digits)) for n, v in letters.items()]
     return text + "".join(f"{SEPARATOR}{letter} = {value}" for letter, value in defined)
+
+
+def _named(
+    named: NamedPart, notation: TextNotation, letters: Mapping[str, str], rate: str
+) -> tuple[Sequence[str], list[tuple[str, str]]]:
+    """Return the summands of a named law, and what its rates, scalars and constants are."""
+    function, fixed = named.function, named.constants[0]
+    defined, summands = function.spell(notation, letters)
+    rates = function.spell_rates(notation, letters)
+    return summands, [
+        *((rate.format(letters[name]), value) for name, value in rates),
+        *((letters[name], value) for name, value in defined),
+        *(
+            (letters[n], notation.digits_of(v))
+            for n, v in fixed.items()
+            if n not in named.differing
+        ),
+    ]
 
 
 def _factor(term: LawTerm) -> float | None:
@@ -202,17 +214,11 @@ def law_element(
         function = named.function
         names = (*function.constants, *function.where, *function.rates)
         letters = {n: notation.letter(n) for n in names}
-        defined, summands = function.spell(notation, letters)
+        dotted = "<mover><mrow>{}</mrow><mo>˙</mo></mover>"
+        summands, defined = _named(named, notation, letters, dotted)
         extra = [_SIGN.format("+") + one for one in summands] + extra
-        first = named.constants[0]
-        fixed = [(n, number(first[n])) for n in first if n not in named.differing]
-        rates = [
-            (f"<mover><mrow>{letters[n]}</mrow><mo>˙</mo></mover>", value)
-            for n, value in function.spell_rates(notation, letters)
-        ]
         where = [
-            f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}"
-            for left, value in [*rates, *((letters[n], value) for n, value in [*defined, *fixed])]
+            f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}" for left, value in defined
         ]
     # all on the left, so that each term has the sign that tables and files give it
     time = notation.time if isinstance(notation, InUnitsNotation) else ""
