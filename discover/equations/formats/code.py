@@ -65,7 +65,7 @@ class _SympyCodeNotation(CodeNotation):
 
 
 # Lines of templates that begin so are for laws with a name, structure variables or states alone
-_MARKS = ("N|", "V|", "S|")
+_MARKS: tuple[str, ...] = ("N|", "V|", "S|")
 
 _NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.
 

@@ -36,8 +36,9 @@ class _Tested(Section):
     worst_errors: dict[str, float] = Field(default_factory=dict)
 
     def read(self) -> Tested:
-        boxes = [one and Box(one.Wi, one.De) for one in (self.learned_in, self.judged_in)]
-        return Tested(*boxes, self.worst_errors)  # pyright: ignore[reportArgumentType]
+        learned, judged = self.learned_in, self.judged_in
+        box = Box(learned.Wi, learned.De)
+        return Tested(box, judged and Box(judged.Wi, judged.De), self.worst_errors)
 
 
 class _Named(Section):
