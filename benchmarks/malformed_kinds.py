@@ -292,7 +292,6 @@ def options(root: Path, source: random.Random) -> Case:
         ["data", "import", trios, *out, "--start-time", "0"],
         ["data", "import", trios, *out, "--geometry", "cone_plate:radius_mm=25,angle_deg=1"],
         ["data", "fetch", "polyisoprene"],
-        ["distil", "--teacher", "giesekus:alpha=0.2", "--student", "nobody"],
     )))  # fmt: skip
     i = source.randrange(1, len(right))
     key, equals, _ = right[i].partition("=")

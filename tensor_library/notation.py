@@ -69,6 +69,61 @@ class Notation(ABC, Generic[T]):
         """Return scalars times one tensor, in this order."""
 
 
+class TextNotation(Notation[str]):
+    """Text by patterns, in which ``{}`` stands for what is written."""
+
+    tensors: Mapping[str, str]
+    dot: str  # between tensors
+    plus = " + "
+    times: str  # between factors
+    brackets = "({})"
+    whole = "{}"  # around a product
+    traced: str
+    powered: str  # of a trace and its exponent
+    exponential_form: str  # of ``rate`` and ``trace``
+    saturating_form: str  # of ``level`` and ``trace``
+
+    def tensor(self, name: str) -> str:
+        """Return its letter."""
+        return self.tensors[name]
+
+    def contraction(self, tensors: Sequence[str]) -> str:
+        """Return the tensors with dots between them."""
+        return self.dot.join(tensors)
+
+    def sum(self, summands: Sequence[str]) -> str:
+        """Return the bracketed sum."""
+        return self.brackets.format(self.plus.join(summands))
+
+    def trace(self, tensor: str) -> str:
+        """Return the trace of a contraction."""
+        return self.traced.format(tensor)
+
+    def power(self, scalar: str, exponent: int) -> str:
+        """Return a trace raised to a power of 2 or more."""
+        return self.powered.format(scalar, exponent)
+
+    def number(self, value: float) -> str:
+        """Return a number, bracketed if it is negative."""
+        return self.brackets.format(self.digits_of(value)) if value < 0 else self.digits_of(value)
+
+    def digits_of(self, value: float) -> str:
+        """Return a number with the digits that it is given."""
+        raise NotImplementedError
+
+    def exponential(self, rate: str, trace: str) -> str:
+        """Return exp(rate · trace) − 1, as a factor."""
+        return self.exponential_form.format(rate=rate, trace=trace)
+
+    def saturating(self, level: str, trace: str) -> str:
+        """Return trace/(1 + level |trace|), as a factor."""
+        return self.saturating_form.format(level=level, trace=trace)
+
+    def product(self, factors: Sequence[str]) -> str:
+        """Return scalars times one tensor, in this order."""
+        return self.whole.format(self.times.join(factors))
+
+
 def printed(
     expression: Any,
     letters: Mapping[str, str],
@@ -101,63 +156,38 @@ def greek_letter(name: str) -> str | None:
         return None
 
 
-_TENSORS = {
-    "I": r"\boldsymbol{I}",
-    "sigma": r"\boldsymbol{\sigma}",
-    "gammadot": r"\dot{\boldsymbol{\gamma}}",
-}
-
-
 def latex_number(value: float, digits: int) -> str:
     """Return a number as LaTeX, powers of ten typeset."""
     mantissa, _, exponent = f"{value:.{digits}g}".partition("e")
     return mantissa + (rf" \times 10^{{{int(exponent)}}}" if exponent else "")
 
 
-class LatexNotation(Notation[str]):
+class LatexNotation(TextNotation):
     """LaTeX with so many significant digits in its numbers."""
+
+    tensors = {  # noqa: RUF012
+        "I": r"\boldsymbol{I}",
+        "sigma": r"\boldsymbol{\sigma}",
+        "gammadot": r"\dot{\boldsymbol{\gamma}}",
+    }
+    dot, times, brackets = r" \cdot ", r" \, ", r"\left({}\right)"
+    traced = r"\operatorname{{tr}}\left({}\right)"
+    powered = r"\left({}\right)^{{{}}}"  # tr(σ)² could be taken for tr(σ²)
+    exponential_form = r"\left(e^{{{rate} \, {trace}}} - 1\right)"
+    saturating_form = r"\frac{{{trace}}}{{1 + {level} \, \left|{trace}\right|}}"
 
     def __init__(self, digits: int = 5):
         self.digits = digits
 
-    def tensor(self, name: str) -> str:
-        """Return a bold letter."""
-        return _TENSORS[name]
-
-    def contraction(self, tensors: Sequence[str]) -> str:
-        r"""Return the tensors with ``\cdot`` between them."""
-        return r" \cdot ".join(tensors)
-
-    def sum(self, summands: Sequence[str]) -> str:
-        """Return the bracketed sum."""
-        return _bracketed(" + ".join(summands))
-
-    def trace(self, tensor: str) -> str:
-        r"""Return ``\operatorname{tr}`` of the bracketed contraction."""
-        return r"\operatorname{tr}" + _bracketed(tensor)
-
-    def power(self, scalar: str, exponent: int) -> str:
-        """Return the bracketed trace and its exponent: tr(σ)² could be taken for tr(σ²)."""
-        return f"{_bracketed(scalar)}^{{{exponent}}}"
-
-    def number(self, value: float) -> str:
-        """Return a number, bracketed if negative."""
-        text = latex_number(value, self.digits)
-        return _bracketed(text) if text.startswith("-") else text
+    def digits_of(self, value: float) -> str:
+        """Return a number, powers of ten typeset."""
+        return latex_number(value, self.digits)
 
     def letter(self, name: str) -> str:
         """Return a Greek letter, or the name in upright letters."""
         if greek_letter(name):
             return rf"\{name}"
         return r"\mathrm{" + name.replace("_", r"\_") + "}"
-
-    def exponential(self, rate: str, trace: str) -> str:
-        """Return the bracketed exponential minus one."""
-        return _bracketed(rf"e^{{{rate} \, {trace}}} - 1")
-
-    def saturating(self, level: str, trace: str) -> str:
-        """Return a fraction."""
-        return rf"\frac{{{trace}}}{{1 + {level} \, \left|{trace}\right|}}"
 
     def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
         """Return the expression as SymPy typesets it."""
@@ -166,17 +196,11 @@ class LatexNotation(Notation[str]):
         def printer(found: Any) -> str:
             # thin spaces as between the factors of a term; a power is one of the whole letter
             text = sympy.latex(found, mul_symbol=r" \, ")
-            return re.sub(r"scalar[a-z]of(?=\^)", lambda one: _bracketed(one[0]), text)
+            return re.sub(r"scalar[a-z]of(?=\^)", lambda one: self.brackets.format(one[0]), text)
 
         times = r" \times "
-        known = {n: _bracketed(one) if times in one else one for n, one in letters.items()}
+        known = {
+            n: self.brackets.format(one) if times in one else one for n, one in letters.items()
+        }
         text, is_sum = printed(expression, known, printer)
-        return _bracketed(text) if factor and is_sum else text
-
-    def product(self, factors: Sequence[str]) -> str:
-        """Return the factors with thin spaces between them."""
-        return r" \, ".join(factors)
-
-
-def _bracketed(text: str) -> str:
-    return rf"\left({text}\right)"
+        return self.brackets.format(text) if factor and is_sum else text

@@ -42,10 +42,6 @@ _PAGE = "report.html"
 _JSON_FILES = {"compare": "comparison.json", "close-loop": "loop.json"}
 
 
-def nothing_to_note(study: Study) -> None:
-    """Take no note of a study."""
-
-
 @dataclass(frozen=True)
 class TaskResult:
     """Where a task's results lie, and what they say in a few lines."""
@@ -74,7 +70,7 @@ class _Task:
         seed: int | None,
         overwrite: bool,
         progress: Progress,
-        note: Note = nothing_to_note,
+        note: Note = lambda study: None,
         tolerance: float | None = None,
     ) -> TaskResult:
         """Run the task.
@@ -200,7 +196,7 @@ def run_batch(
     seed: int | None = None,
     overwrite: bool = False,
     progress: Progress = lambda label, fraction: None,
-    note: Note = nothing_to_note,
+    note: Note = lambda study: None,
 ) -> BatchResult:
     """Run studies into folders of their own; one that fails does not stop the others.
 

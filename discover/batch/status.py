@@ -72,7 +72,7 @@ def read_row(folder: Path) -> StudyRow:
 
 def _comparison(content: Mapping[str, Any]) -> StudyRow:
     learners = {
-        str(name): LearnerRow(tuple(_term(t) for t in learner["terms"]), _worst(learner["errors"]))
+        str(name): LearnerRow(tuple(map(_term, learner["terms"])), _worst(learner["errors"]))
         for name, learner in content["learners"].items()
     }
     details = content["learners"].get("tensor_sindy", {}).get("details") or {}

@@ -4,9 +4,9 @@ import json
 import logging
 import subprocess
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
@@ -171,7 +171,7 @@ def run_on_cluster(
     installed, or no scheduler answers at the address.
     """
     try:
-        from distributed import as_completed
+        from distributed import Client, as_completed
     except ImportError:
         raise InputError(
             "--scheduler needs dask: install discover-rheology[batch], or use --workers."
@@ -183,7 +183,17 @@ def run_on_cluster(
             "address.",
             stacklevel=2,
         )
-    with _client_of(scheduler) as client:
+    try:
+        client = Client(scheduler, timeout="20s")
+    except Exception as error:  # each kind of address fails in its own way
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        if scheduler.startswith("tls://"):
+            reason += "; its certificates are those of dask's settings distributed.comm.tls"
+        raise InputError(
+            f"No dask scheduler answers at {scheduler[:100]!r} ({reason}). Give the address that "
+            "it prints when it starts, such as tcp://10.0.0.1:8786, and check that it runs."
+        ) from None
+    with client:
         topic = f"discover-{uuid4()}"
         client.subscribe_topic(topic, lambda event: say(*event[1]))
         futures = {}
@@ -210,24 +220,6 @@ def _is_protected(scheduler: str) -> bool:
         return ip_address(host).is_loopback
     except ValueError:
         return host == "localhost"
-
-
-@contextmanager
-def _client_of(scheduler: str) -> Iterator[Any]:
-    from distributed import Client
-
-    try:
-        client = Client(scheduler, timeout="20s")
-    except Exception as error:  # each kind of address fails in its own way
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        if scheduler.startswith("tls://"):
-            reason += "; its certificates are those of dask's settings distributed.comm.tls"
-        raise InputError(
-            f"No dask scheduler answers at {scheduler[:100]!r} ({reason}). Give the address that "
-            "it prints when it starts, such as tcp://10.0.0.1:8786, and check that it runs."
-        ) from None
-    with client:
-        yield client
 
 
 def _run_on_worker(

@@ -11,7 +11,7 @@ from discover._version import __version__
 from discover.accelerators import use_the_processor_from_the_start
 from discover.cli.console import heard_or_not, obeying_interrupts
 from discover.cli.data_commands import data_app, fetch_data
-from discover.cli.law_commands import distil, effects, export, fit, laws
+from discover.cli.law_commands import effects, export, fit, laws
 from discover.cli.study_commands import batch, close_loop, compare, demo
 from discover.linear_algebra_threads import use_one_thread_from_the_start
 from discover.report.plots import keep_out_of_the_working_directory
@@ -46,7 +46,6 @@ app.command("compare")(compare)
 app.command("close-loop")(close_loop)
 app.command("batch")(batch)
 app.command("fit")(fit)
-app.command("distil")(distil)
 app.command("export")(export)
 app.command("laws")(laws)
 app.command("effects")(effects)

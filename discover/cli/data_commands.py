@@ -74,6 +74,7 @@ def show(
 ) -> None:
     """Show the runs of a data set, in a table and on a page."""
     from discover.cli.import_options import write_page
+    from discover.dataset.checking.folder import check_folder
     from discover.dataset.load import load_dataset
     from discover.dataset.run_table import run_line
 
@@ -82,7 +83,12 @@ def show(
     rows = [run_line(run) for run in dataset]
     sweep = dataset.linear_sweep
     n_sweep = 0 if sweep is None else len(sweep.angular_frequency)
-    page, kept = (None, []) if out is None else write_page(dataset, name, out)
+    page, kept = None, []
+    if out is not None:
+        here = Path(name)
+        # where the study lies a relative path would be another one
+        folder = here.resolve().as_posix() if here.is_dir() else name
+        page, kept = write_page(dataset, folder, out, check_folder(name))
     if as_json:
         content = {"name": dataset.name, "runs": rows, "tables": tables, "lve_points": n_sweep}
         written = {"page": None if page is None else str(page), "kept": kept}
@@ -291,19 +297,12 @@ def import_data(
     from discover.dataset.load import DATA_FILES
 
     out = _required(out)
-    layout = {"format": form, "delimiter": delimiter, "decimal": decimal, "encoding": encoding}
-    merged = options.merge_mapping(
-        mapping,
-        columns=column,
-        units=unit,
-        names=names,
-        geometry=geometry,
-        blocks=block,
-        start_time_s=start_time,
-        tests=test,
-        temperatures=temperature,
-        layout={**layout, "header_row": header_row},
-    )
+    layout = {
+        "format": form, "delimiter": delimiter, "decimal": decimal, "header_row": header_row,
+        "encoding": encoding,
+    }  # fmt: skip
+    pairs = {"columns": column, "units": unit, "tests": test, "temperatures": temperature}
+    merged = options.merge_mapping(mapping, pairs, layout, names, geometry, block, start_time)
     paths, sweep, changed = options.sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
     options.write_folder(imported, out, overwrite, mapping)

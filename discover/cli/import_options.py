@@ -29,29 +29,23 @@ from discover.study.atomic import make_folder, write_text
 
 def merge_mapping(
     path: Path | None,
-    columns: Sequence[str] | None = None,
-    units: Sequence[str] | None = None,
+    pairs: AnyMapping[str, Sequence[str] | None],
+    layout: AnyMapping[str, object],
+    names: Path | None = None,
     geometry: str | None = None,
     blocks: Sequence[int] | None = None,
     start_time_s: float | None = None,
-    layout: AnyMapping[str, object] | None = None,
-    tests: Sequence[str] | None = None,
-    temperatures: Sequence[str] | None = None,
-    names: Path | None = None,
 ) -> Mapping:
     """Return the mapping of a file with the options of the command line on top.
 
-    `columns`, `units`: as ``stress=Shear stress``. `geometry`: as
-    ``cone_plate:radius_mm=25,angle_deg=1``. `tests`: ``creep``, ``melt.txt=creep`` or
-    ``melt.txt:2=creep``. `temperatures`: ``40``, the one to import, or ``melt.txt=40``, that of a
-    file; in °C, or as ``313K``. Raises InputError if the file or an option is wrong.
+    `pairs`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
+    ``melt.txt=creep`` or ``melt.txt:2=creep``; ``temperatures``, ``40``, the one to import, or
+    ``melt.txt=40``, that of a file, in °C, or as ``313K``. `geometry`: as
+    ``cone_plate:radius_mm=25,angle_deg=1``. Raises InputError if the file or an option is wrong.
     """
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
-    for key, options, example in (
-        ("columns", columns, "stress='Shear stress'"),
-        ("units", units, "stress=kPa"),
-    ):
-        content[key] = {**content.get(key, {}), **_pairs(options or (), example)}
+    for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
+        content[key] = {**content.get(key, {}), **_pairs(pairs[key] or (), example)}
     if names is not None:
         content["names"] = {**content.get("names", {}), **read_names(names)}
     if geometry is not None:
@@ -66,7 +60,7 @@ def merge_mapping(
     if start_time_s is not None:
         content["start_time_s"] = start_time_s
     of_files = dict(content.get("temperatures", {}))
-    for option in temperatures or ():
+    for option in pairs["temperatures"] or ():
         file, equals, value = option.rpartition("=")
         degrees = _degrees(value if equals else option)
         if equals:
@@ -74,12 +68,11 @@ def merge_mapping(
         else:
             content["temperature_C"] = degrees
     content["temperatures"] = of_files
-    spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in tests or ()]
-    content["tests"] = {**content.get("tests", {}), **_pairs(spelled, "melt.txt:2=creep")}
-    if any(one.startswith(f"{EVERY_BLOCK}=") for one in spelled):
-        # what was said of every block now goes before what was found of each
-        content["tests"] = dict(_pairs(spelled, "melt.txt:2=creep"))
-    known = {key: value for key, value in (layout or {}).items() if value is not None}
+    spelled = [one if "=" in one else f"{EVERY_BLOCK}={one}" for one in pairs["tests"] or ()]
+    said = _pairs(spelled, "melt.txt:2=creep")
+    # what is said of every block now goes before what was found of each
+    content["tests"] = said if EVERY_BLOCK in said else {**content.get("tests", {}), **said}
+    known = {key: value for key, value in layout.items() if value is not None}
     content["layout"] = {**content.get("layout", {}), **known}
     return make_mapping(content, "the options" if path is None else f"{path.name} and the options")
 
@@ -186,21 +179,32 @@ _MARK = '<meta name="generator" content="discover data">'
 _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 
 
-def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str]]:
-    """Write a page on a data folder and a first study; return its path, and what was kept."""
-    from discover.dataset.checking.folder import check_folder
+def write_page(
+    dataset: "Dataset",
+    folder: str,
+    out: Path,
+    findings: Sequence["Finding"],
+    said: Sequence[str] = (),
+    names: tuple[str, str] = (PAGE, IMPORT_PAGE),
+) -> tuple[Path, list[str]]:
+    """Write a page on a data folder, and a first study unless there is one.
 
-    here = Path(name)
-    # where the study lies a relative path would be another one
-    folder = here.resolve().as_posix() if here.is_dir() else name
+    `folder`: as the study names it. `names`: of the page, the second where a result has the first.
+    Returns the page's path, and what was kept, in words.
+    """
+    from discover.report.data import data_page, first_study
+
     make_folder(out)
-    path = _place_for_page(out, PAGE, IMPORT_PAGE)
-    kept = [] if path.name == PAGE else [f"{out / PAGE} is not a data page and is kept."]
-    _write_page(dataset, folder, path, check_folder(name))
-    if not _write_study(dataset, folder, out):
+    path, place = _place_for_page(out, *names), out / STUDY_FILE
+    kept = [] if path.name == names[0] else [f"{out / names[0]} is not a data page and is kept."]
+    write_text(path, data_page(dataset, findings, folder, said))
+    study = first_study(dataset, folder)
+    if not os.path.lexists(place):
+        write_text(place, study)
+    elif not place.is_file() or place.read_bytes() != study.encode("utf-8", "backslashreplace"):
         kept.append(
-            f"{out / STUDY_FILE} was there before and is kept. For a new one remove it, or choose "
-            "another --out."
+            f"{place} was there before and is kept. For a new one remove it, or choose another "
+            "--out."
         )
     return path, kept
 
@@ -208,10 +212,7 @@ def write_page(dataset: "Dataset", name: str, out: Path) -> tuple[Path, list[str
 def write_import_page(
     folder: Path, findings: Sequence["Finding"], said: Sequence[str]
 ) -> Path | None:
-    """Write the page on an imported folder into it, and a first study unless there is one.
-
-    Returns the page's path, None if the folder cannot be read.
-    """
+    """Write the page on an imported folder into it; None if the folder cannot be read."""
     from discover.dataset.load import load_dataset
 
     place = folder.resolve().as_posix()
@@ -219,8 +220,7 @@ def write_import_page(
         dataset = load_dataset(place)
     except InputError:
         return None  # the check says why
-    _write_study(dataset, place, folder)
-    return _write_page(dataset, place, _place_for_page(folder, IMPORT_PAGE, PAGE), findings, said)
+    return write_page(dataset, place, folder, findings, said, (IMPORT_PAGE, PAGE))[0]
 
 
 def _place_for_page(folder: Path, *names: str) -> Path:
@@ -236,26 +236,3 @@ def _place_for_page(folder: Path, *names: str) -> Path:
         f"{folder} holds a {names[0]} and a {names[1]} that are no pages on data, and they are "
         "not written over. Choose another --out."
     )
-
-
-def _write_study(dataset: "Dataset", folder: str, out: Path) -> bool:
-    """Write a first study; return whether what is there now is that."""
-    from discover.report.data import first_study
-
-    study, path = first_study(dataset, folder), out / STUDY_FILE
-    if os.path.lexists(path):
-        return path.is_file() and path.read_bytes() == study.encode("utf-8", "backslashreplace")
-    write_text(path, study)
-    return True
-
-
-def _write_page(
-    dataset: "Dataset",
-    folder: str,
-    path: Path,
-    findings: Sequence["Finding"],
-    said: Sequence[str] = (),
-) -> Path:
-    from discover.report.data import data_page
-
-    return write_text(path, data_page(dataset, findings, folder, said))

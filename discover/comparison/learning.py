@@ -137,7 +137,7 @@ def require_teacher(study: Study) -> None:
     if study.compare.distillation and study.data.synthetic is None:
         raise InputError(
             "compare.distillation needs a known law as teacher, so [data] must say synthetic = "
-            "{...}. Use discover distil for laws by name."
+            "{...}. Teach laws by name with discover.learners.distillation.distil."
         )
 
 

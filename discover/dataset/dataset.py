@@ -174,13 +174,7 @@ class Dataset(NotebookView):
         yield self.left_out
 
     def select(self, names: Sequence[str]) -> "Dataset":
-        """Return the data set of the named runs, in the order given.
-
-        Raises
-        ------
-        InputError
-            If a run does not exist.
-        """
+        """Return the data set of the named runs, in that order; InputError if there is no such."""
         if isinstance(names, str) or not _are_names(names):
             raise InputError(f"Runs are named in a list; got {short(names)}.")
         problems, runs = Problems(), []
@@ -191,19 +185,11 @@ class Dataset(NotebookView):
         return replace(self, runs=tuple(runs))
 
     def with_material_functions(self, kinds: Sequence[str] | None = None) -> "Dataset":
-        """Return the data with its tables as runs.
+        """Return the data with its tables as runs; InputError if there is no such table.
 
-        Parameters
-        ----------
-        kinds
-            Of `material_functions`, or ``lve`` for the linear sweep; by default all tables, and the
-            linear sweep only where there is nothing else. G′ and G″ of a sweep become a run
-            each, such as ``"amplitude_sweep.csv (loss_modulus)"``.
-
-        Raises
-        ------
-        InputError
-            If the data have no such table.
+        `kinds`: of `material_functions`, or ``lve`` for the linear sweep; by default all tables,
+        and the linear sweep only where there is nothing else. G′ and G″ of a sweep become a run
+        each, such as ``"amplitude_sweep.csv (loss_modulus)"``.
         """
         there = dict(self.material_functions)
         if self.linear_sweep is not None:
@@ -242,17 +228,8 @@ class Dataset(NotebookView):
     ) -> "tuple[Dataset, Dataset]":
         """Return the runs to fit and the held-out runs, as two data sets.
 
-        Parameters
-        ----------
-        held_out
-            Names of the runs that no fit may see.
-        fit
-            Names of the runs to fit; by default all others.
-
-        Raises
-        ------
-        InputError
-            If a run does not exist or is in both, or one of the two would be empty.
+        `held_out`: names of the runs that no fit may see. `fit`: of those to fit; by default all
+        others. Raises InputError if a run does not exist or is in both, or one would be empty.
         """
         for label, names in (("held_out", held_out), ("fit", fit)):
             if isinstance(names, str):

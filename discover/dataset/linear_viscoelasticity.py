@@ -98,43 +98,23 @@ class LinearSweep:
 class RelaxationSpectrum:
     """Discrete relaxation spectrum, G(t) = Σ G_k exp(−t/λ_k), with a solvent.
 
-    Attributes
-    ----------
-    modulus
-        G_k in Pa, shape (k,), positive.
-    relaxation_time
-        λ_k in s, shape (k,), increasing.
-    relative_error
-        Root mean square of the relative misfit over all G′ and G″.
-    best_error
-        The smallest such error with any number of modes tried.
-    errors
-        Error against the number of modes, the best for each number.
-    modulus_covariance
-        Of the moduli in Pa², shape (k, k), as the misfit of the sweep leaves them; with a solvent
-        its row and column come last, in Pa s. None where they do not come from a sweep.
-    pattern
-        Root mean square of what in that misfit is no noise, and may be of too few modes; 0 where
-        all may be noise, None where no number of modes follows the sweep.
-    solvent_viscosity
-        η_s in Pa s; 0 where there is none.
-    elastic_modulus
-        G_e in Pa; 0 where there is none. It is the last and slowest mode, whose time is the
-        shortest that the sweep cannot tell from a constant.
-    solid
-        What is to be known where it is more than G″ at the lowest frequency; else empty.
+    An elastic constant is the last and slowest mode, whose time is the shortest that the sweep
+    cannot tell from a constant.
     """
 
-    modulus: Float[np.ndarray, " k"]
-    relaxation_time: Float[np.ndarray, " k"]
-    relative_error: float
-    best_error: float
-    errors: dict[int, float]
+    modulus: Float[np.ndarray, " k"]  # G_k in Pa, positive
+    relaxation_time: Float[np.ndarray, " k"]  # λ_k in s, increasing
+    relative_error: float  # root mean square of the relative misfit over all G′ and G″
+    best_error: float  # the smallest of any number of modes tried
+    errors: dict[int, float]  # the smallest by number of modes
+    # of the moduli in Pa², with a solvent's row and column last, in Pa s; None without a sweep
     modulus_covariance: Float[np.ndarray, "c c"] | None = None
+    # root mean square of what in the misfit is no noise, and may be of too few modes; 0 where all
+    # may be noise, None where no number of modes follows the sweep
     pattern: float | None = 0.0
-    solvent_viscosity: float = 0.0
-    elastic_modulus: float = 0.0
-    solid: str = ""
+    solvent_viscosity: float = 0.0  # η_s in Pa s
+    elastic_modulus: float = 0.0  # G_e in Pa
+    solid: str = ""  # what is to be known where G_e is more than G″ at the lowest frequency
 
     def __len__(self) -> int:
         return self.modulus.shape[0]
@@ -180,23 +160,11 @@ def relaxation_spectrum(
     positive and times up to a decade beyond the sweep, are fitted to the relative misfit. Evidence
     decides on the number of modes, solvent and elastic constant (`ModeSearch`).
 
-    Parameters
-    ----------
-    sweep
-        G′ and G″.
-    most_modes
-        Largest number of modes, that of an elastic constant included.
-    tolerance
-        Factor, 1 or more, by which fewer modes may fit worse than those of the highest evidence.
-    modes
-        Exact number of modes, that of an elastic constant included; None leaves it to evidence.
-    solvent_viscosity, elastic_modulus
-        In Pa s and Pa where known beforehand; ``"fit"`` includes it without asking for evidence.
-
-    Raises
-    ------
-    InputError
-        If the sweep is too short or an argument is out of range.
+    `most_modes`, `modes`: largest and exact number, that of an elastic constant included.
+    `tolerance`: factor by which fewer modes may fit worse than those of the highest evidence.
+    `solvent_viscosity`, `elastic_modulus`: in Pa s and Pa where known beforehand; ``"fit"``
+    includes it without asking for evidence. Raises InputError if the sweep is too short or an
+    argument is out of range.
     """
     count, measured, needs = len(sweep), sweep.measured, "A relaxation spectrum needs"
     if count < 2:

@@ -183,7 +183,10 @@ def load_dataset(
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
-    return Dataset(name, tuple(runs), sweep, _provenance(root), {**unused, **aside}, tables)
+    provenance, path = "", root / PROVENANCE_FILE
+    if os.path.isfile(path) and _is_inside(root, PROVENANCE_FILE):
+        provenance = read_bytes(path, path.name).decode("utf-8", "replace")
+    return Dataset(name, tuple(runs), sweep, provenance, {**unused, **aside}, tables)
 
 
 def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"] | None:
@@ -203,13 +206,6 @@ def rates_before(index: Table, column: str | None) -> Float[np.ndarray, " runs"]
     rates = np.zeros(len(index))
     rates[steady] = index.rows(steady).numbers(column)
     return rates * units.heading_factor(column, units.SHEAR_RATE)
-
-
-def _provenance(root: Path) -> str:
-    path = root / PROVENANCE_FILE
-    if not (os.path.isfile(path) and _is_inside(root, PROVENANCE_FILE)):
-        return ""
-    return read_bytes(path, path.name).decode("utf-8", "replace")
 
 
 def read_index(root: Path) -> Table:

@@ -87,16 +87,16 @@ def _creep(table: Table) -> Run:
     )  # fmt: skip
 
 
-def read_over_time(
-    path: Path, kind: str
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+def read_over_time(path: Path, kind: str) -> list[Float[np.ndarray, " n"]]:
     """Return times in s and the ``relaxation`` modulus in Pa, or ``creep`` compliance in 1/Pa."""
-    quantity = {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind]
-    table = read_table(path)
-    time, values = table.all_required(units.TIME, quantity)
+    table, quantity = (
+        read_table(path),
+        {"relaxation": RELAXATION_MODULUS, "creep": COMPLIANCE}[kind],
+    )
+    columns = table.all_required(units.TIME, quantity)
     table.require_positive(units.TIME)
-    order = np.argsort(time, kind="stable")  # clocks that are written short repeat themselves
-    return time[order], values[order]
+    order = np.argsort(columns[0], kind="stable")  # clocks that are written short repeat themselves
+    return [values[order] for values in columns]
 
 
 def _amplitude_sweep(table: Table) -> Run:
@@ -123,9 +123,7 @@ def _oscillations(name, what, strain, frequency, storage, loss) -> Run:
     return Run(name, counts, flow, rate, stress, strain=strain, metadata={"test": what}, **moduli)
 
 
-def _over_time(
-    table: Table, quantity: units.Quantity
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"]]:
+def _over_time(table: Table, quantity: units.Quantity) -> list[Float[np.ndarray, " n"]]:
     time, values = table.all_required(units.TIME, quantity)
     table.require_positive(units.TIME, quantity)
     if len(time) < 3 or np.any(np.diff(time) <= 0):
@@ -133,7 +131,7 @@ def _over_time(
             f"time in {table.name} must increase strictly, over 3 samples or more; got "
             f"{len(time)}. Sort the rows and remove repeated times."
         )
-    return time, values
+    return [time, values]
 
 
 _READERS: Mapping[str, Callable[[Table], Run]] = {

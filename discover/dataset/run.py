@@ -240,10 +240,7 @@ class Run(NotebookView):
     def observing(self, quantity: RecordedQuantity) -> "Run":
         """Return the same run with another quantity fitted or tested, under a name of its own.
 
-        Parameters
-        ----------
-        quantity
-            N1 or N2 in shear, or a modulus of oscillations; InputError if it was not recorded.
+        `quantity`: N1 or N2 in shear, or a modulus of oscillations; InputError without a record.
         """
         seen = replace(
             self, name=f"{self.name} ({quantity})", protocol=recording(self.protocol, quantity)
@@ -307,13 +304,13 @@ class Run(NotebookView):
 def require_signal(runs: Sequence[Run]) -> None:
     """Refuse runs of which none can teach a law."""
     names = ", ".join(run.name for run in runs[:3]) + (" …" if len(runs) > 3 else "")
-    if runs and not any(run.flows for run in runs):
-        raise InputError(
-            f"The shear rate is zero in every run ({names}), so there is nothing to learn a law "
-            "from. Add runs with flow, or check the unit of the column."
-        )
-    if runs and not any(np.any(run.stress) for run in runs):
-        raise InputError(
-            f"The stress is zero throughout in every run ({names}), so there is nothing to learn a "
-            "law from. Check the column."
-        )
+    flows, stressed = (any(run.flows for run in runs), any(np.any(run.stress) for run in runs))
+    if not runs or (flows and stressed):
+        return
+    what = "stress is zero throughout" if flows else "shear rate is zero"
+    remedy = (
+        "Check the column." if flows else "Add runs with flow, or check the unit of the column."
+    )
+    raise InputError(
+        f"The {what} in every run ({names}), so there is nothing to learn a law from. {remedy}"
+    )

@@ -1,9 +1,8 @@
-"""Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool; and back."""
+"""Laws as they leave this package: SymPy, LaTeX, JSON, Python, UFL, rheoTool."""
 
 from discover.equations.equation import Box, Equation, HasEquation, Tested
 from discover.equations.files import FORMATS, read_result_laws, write_equation
 from discover.equations.formats.json_format import equation_from_json, equation_to_json
-from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.equations.parts import (
     AugmentedLaw,
     NamedPart,
@@ -18,5 +17,5 @@ from discover.equations.parts import (
 __all__ = [
     "FORMATS", "AugmentedLaw", "Box", "Equation", "HasEquation", "NamedPart", "StatePart", "Tested",
     "combined", "effect_terms", "equation_from_json", "equation_to_json", "law_parts",
-    "law_parts_by_mode", "law_terms", "read_result_laws", "read_rheotool", "write_equation",
+    "law_parts_by_mode", "law_terms", "read_result_laws", "write_equation",
 ]  # fmt: skip

@@ -30,14 +30,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Box:
-    """Range of flows.
+    """Range of flows."""
 
-    `weissenberg`: least and largest Wi = λ̄ max|γ̇|. `deborah`: of De, λ̄ω in oscillation and λ̄
-    over the length of the run else.
-    """
-
-    weissenberg: Interval
-    deborah: Interval
+    weissenberg: Interval  # least and largest Wi = λ̄ max|γ̇|
+    deborah: Interval  # of De, λ̄ω in oscillation and λ̄ over the length of the run else
 
     @property
     def text(self) -> str:
@@ -47,15 +43,11 @@ class Box:
 
 @dataclass(frozen=True)
 class Tested:
-    """Where a law was learned and where it was tested.
+    """Where a law was learned and where it was tested."""
 
-    `learned_in`: flows that the fit saw. `judged_in`: others in which something is known; None
-    without. `worst_errors`: largest relative error of each quantity in the latter.
-    """
-
-    learned_in: Box
-    judged_in: Box | None = None
-    worst_errors: Mapping[str, float] = field(default_factory=dict)
+    learned_in: Box  # flows that the fit saw
+    judged_in: Box | None = None  # others in which something is known
+    worst_errors: Mapping[str, float] = field(default_factory=dict)  # the largest there, relative
 
     @property
     def lines(self) -> list[str]:
@@ -72,25 +64,6 @@ class Tested:
 class Equation(NotebookView):
     """A fluid in words: λ dσ/dt = Gλγ̇ + λ(L·σ + σ·Lᵀ) − σ − G h(σ/G, λγ̇) for every mode.
 
-    Attributes
-    ----------
-    terms
-        h as a sum, dimensionless: stress over G, time over λ.
-    modulus, relaxation_time
-        G_k in Pa and λ_k in s, one value for each mode.
-    linear_relaxation
-        Whether the −σ is there beside h.
-    solvent_viscosity
-        η_s in Pa s.
-    title, notes
-        Where the law comes from, and what its user has to know.
-    tested
-        Where it was learned and tested; None where unknown.
-    named
-        Law that is no sum of terms, to whose h the terms are added; None for UCM.
-    states
-        Of the whole fluid, which scale the stress or the relaxation times of all modes.
-
     Examples
     --------
     A Giesekus fluid with a mobility of 0.2, 100 Pa and 2 s:
@@ -102,16 +75,16 @@ class Equation(NotebookView):
     2.0
     """
 
-    terms: tuple[LawTerm, ...]
-    modulus: tuple[float, ...] = (1.0,)
-    relaxation_time: tuple[float, ...] = (1.0,)
-    linear_relaxation: bool = True
-    solvent_viscosity: float = 0.0
-    title: str = ""
-    notes: tuple[str, ...] = ()
-    tested: Tested | None = None
-    named: NamedPart | None = None
-    states: tuple[StatePart, ...] = ()
+    terms: tuple[LawTerm, ...]  # h as a sum, dimensionless: stress over G, time over λ
+    modulus: tuple[float, ...] = (1.0,)  # G_k in Pa, one for each mode
+    relaxation_time: tuple[float, ...] = (1.0,)  # λ_k in s, one for each mode
+    linear_relaxation: bool = True  # whether the −σ is there beside h
+    solvent_viscosity: float = 0.0  # η_s in Pa s
+    title: str = ""  # where the law comes from
+    notes: tuple[str, ...] = ()  # what its user has to know
+    tested: Tested | None = None  # where it was learned and tested; None where unknown
+    named: NamedPart | None = None  # no sum of terms, to whose h the terms are added; None for UCM
+    states: tuple[StatePart, ...] = ()  # of the whole fluid: they scale stress or relaxation times
 
     def __post_init__(self):
         numbers = [*self.modulus, *self.relaxation_time]

@@ -204,14 +204,7 @@ def fingerprint(study: Study, *extra: object) -> str:
     The study, the files it names, the version of this software, and what the caller adds (task,
     seed). Raises InputError if the data folder or a file in it cannot be read.
     """
-    # a page without overlays is what it was before there were any
-    left_out: dict[str, Any] = {} if study.report.overlay else {"report": True}
-    if study.verdict == type(study.verdict)():  # and without a tolerance of its own
-        left_out["verdict"] = True
-    for part in ("loop", "compare"):  # and so is a task without loadings of its own
-        if getattr(study, part).loading is None:
-            left_out[part] = {"loading"}
-    digest = hashlib.sha256(study.model_dump_json(exclude=left_out).encode())
+    digest = hashlib.sha256(study.model_dump_json().encode())
     for item in (__version__, *extra):
         digest.update(f"|{item!r}".encode())
     if study.data.folder is not None:

@@ -33,28 +33,21 @@ MODE_CONSTANTS = ("modulus_Pa", "relaxation_time_s")
 
 @dataclass(frozen=True)
 class DeclaredModel:
-    """The declared law with starting values for what is to be fitted.
-
-    `law_name`, `parameters`: as declared, with numbers for those to be fitted.
-    `modulus`, `relaxation_time`: of each mode, shape (k,), in Pa and s.
-    `free`: names of the quantities to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``.
-    `by_mode`: parameters of the law, and effects, that may differ from mode to mode.
-    `solid`: what is to be known of an elastic constant among the modes; empty where there is none.
-    """
+    """The declared law with starting values for what is to be fitted."""
 
     law: AbstractConstitutiveLaw  # the dimensionless law
     law_name: str
-    parameters: dict[str, float]
-    modulus: np.ndarray
-    relaxation_time: np.ndarray
-    free: tuple[str, ...]
+    parameters: dict[str, float]  # with numbers for those to be fitted
+    modulus: np.ndarray  # of each mode in Pa, shape (k,)
+    relaxation_time: np.ndarray  # of each mode in s, shape (k,)
+    free: tuple[str, ...]  # to be fitted: parameters, ``modulus_Pa``, ``relaxation_time_s``
     spectrum: RelaxationSpectrum | None  # where the modes come from, if from a linear sweep
     solvent_viscosity: float = 0.0  # in Pa s
     effects: tuple[KnownEffect, ...] = ()
     source: str = ""  # what was taken from an earlier result, in words; empty where nothing was
-    by_mode: tuple[str, ...] = ()
+    by_mode: tuple[str, ...] = ()  # parameters and effects that may differ from mode to mode
     choice: tuple[str, ...] = ()  # named laws to choose the law from; none where it is declared
-    solid: str = ""
+    solid: str = ""  # what is to be known of an elastic constant among the modes
 
     @property
     def modes_in_words(self) -> str:
@@ -130,7 +123,9 @@ def declared_model(study: Study, dataset: Dataset) -> DeclaredModel:
             for value, first in zip(given, start, strict=True)
         )
         if model.elastic_modulus_Pa:
-            still = _UNRELAXED * max(_longest(dataset), float(np.max(relaxation_time)))
+            timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
+            longest = max((float(run.time[-1]) for run in timed), default=1.0)
+            still = _UNRELAXED * max(longest, float(np.max(relaxation_time)))
             solid = (
                 f"the material is a solid, with an elastic constant of {model.elastic_modulus_Pa:g}"
                 f" Pa. A law of a fluid holds it as a mode of {still:.3g} s: do not use what it "
@@ -193,12 +188,6 @@ def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:
             'for that many exactly. Write fewer, or modes = "lve".'
         )
     return spectrum
-
-
-def _longest(dataset: Dataset) -> float:
-    """Return the longest duration of a run in s."""
-    timed = (run for run in dataset if run.protocol.control in ("rate", "stress"))
-    return max((float(run.time[-1]) for run in timed), default=1.0)
 
 
 FOUND_LAW = "a law found before"

@@ -25,17 +25,16 @@ _AGAIN = "Run the command that made it again with --overwrite."
 
 @dataclass(frozen=True)
 class EarlierResult:
-    """What a study takes over from an earlier result.
-
-    `of_modes`: for every effect with constants of its own in each mode, its values by mode.
-    `intervals`: 95 % intervals of constants, by effect, or "" of a term of the law, and name.
-    """
+    """What a study takes over from an earlier result."""
 
     file: Path  # where it was read
     equation: Equation  # the law with its modes
     effects: tuple[KnownEffect, ...]  # effects beside the law, with their values
-    of_modes: tuple[tuple[KnownEffect, ...], ...]
+    of_modes: tuple[
+        tuple[KnownEffect, ...], ...
+    ]  # values by mode of effects with constants of each
     text: str  # what was taken, in words
+    # 95 % intervals of constants, by effect, or "" of a term of the law, and name
     intervals: Mapping[tuple[str, str], tuple[float, float]]
     doubt: str  # that it did not explain its own data, in words, or empty
 

@@ -23,9 +23,6 @@ HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only tests: a data set of its own, or names of runs of the data set."""
 
 
-_OF_EACH_MODE = "a law with constants of its own in each mode"
-
-
 def data_in_memory(data: Dataset, held_out: HeldOut = ()) -> StudyData:
     """Return data divided into runs to fit and runs held out.
 
@@ -87,7 +84,9 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
             "Fluid(law, modulus, relaxation_time) or Fluid.from_sweep(data.linear_sweep)."
         )
     check_law(base.law)
-    own = _OF_EACH_MODE if differs_by_mode(base.law) else type(base.law).__name__
+    own = type(base.law).__name__
+    if differs_by_mode(base.law):
+        own = "a law with constants of its own in each mode"
     name, parameters = name_of(base.law) or (own, {})
     modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)

@@ -55,7 +55,8 @@ class RunFolder:
                     shutil.rmtree(self._state)
             found = None
         elif found is not None and found.get("fingerprint") != fingerprint:
-            if not found.get("complete") and not self._has_parts():
+            parts = (file.name for file in self._state.glob("*.json") if file.name != STATE_FILE)
+            if not found.get("complete") and not any(parts):
                 found = None  # claimed, but nothing was computed: nothing can be lost
             else:
                 raise InputError(
@@ -108,9 +109,6 @@ class RunFolder:
         self._write_state(True)
         self.complete = True
         self._lock.release()
-
-    def _has_parts(self) -> bool:
-        return any(file.name != STATE_FILE for file in self._state.glob("*.json"))
 
     def _write_state(self, complete: bool) -> None:
         content: dict[str, Any] = {"fingerprint": self.fingerprint, "complete": complete}

@@ -245,21 +245,6 @@ def test_data_commands(tmp_path, monkeypatch):
     assert invoke("data", "list").exit_code == 2
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["--teacher", "giesekus:alpha=0.2"],
-        ["--teacher", "giesekus:alpha", "--student", "ucm"],
-        ["--teacher", "nobody:a=1", "--student", "ucm"],
-        ["--teacher", "giesekus:alpha=0.2", "--student", "nobody"],
-    ],
-)
-def test_distil_refuses_what_it_cannot_read(arguments):
-    result = invoke("distil", *arguments)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("discover: ")
-
-
 def test_a_batch_goes_on_past_a_study_that_fails(tmp_path, trained, undrawn):
     data_folder(tmp_path / "one")
     (tmp_path / "good.toml").write_text(ONE_RUN)

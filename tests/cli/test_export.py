@@ -8,6 +8,7 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from readers import rheotool_modes
 from typer.testing import CliRunner
 
 from discover.cli import app
@@ -21,7 +22,6 @@ from discover.equations import (
 )
 from discover.equations import Tested as Where
 from discover.equations.files import read_result_laws
-from discover.equations.formats.rheotool_reader import read_rheotool
 from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
@@ -211,7 +211,7 @@ def test_a_constant_that_differs_by_mode_is_written_for_each(tmp_path):
         pytest.param("non_affine_motion", "zeta", "johnson_segalman", marks=pytest.mark.slow),
     ],
 )
-def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_read_back_from_rheotool(
+def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_that_law_in_rheotool(
     tmp_path, effect, entry, law
 ):
     found = DeclaredEffect(effect, "constitutive", {"amplitude": by_mode((0.1, 0.3))})
@@ -221,14 +221,18 @@ def test_an_effect_by_mode_that_makes_a_law_with_a_name_is_read_back_from_rheoto
     values = re.findall(rf"{entry} \[0 0 0 0 0 0 0\] (\S+);", text)
     assert [float(v) for v in values] == pytest.approx([0.1, 0.3])
     constant = next(iter(LAWS[law].parameters))
-    for k, value in enumerate((0.1, 0.3)):
-        # rheoTool's own names: what comes back is the law of each mode
-        mode = read_rheotool(text).mode(k)
-        wanted = make_law(law, {constant: value})
-        stress, rate = jnp.array([0.4, -0.1, 0.2, 0.3]), jnp.asarray(0.7)
-        np.testing.assert_allclose(
-            mode.law().stress_rate(stress, rate), wanted.stress_rate(stress, rate), rtol=1e-12
+    xx, yy, zz, xy = 0.4, -0.1, 0.2, 0.3
+    stress, gradient = np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]]), np.zeros((3, 3))
+    gradient[0, 1] = 0.7
+    for mode, value in zip(rheotool_modes(text), (0.1, 0.3), strict=True):
+        # rheoTool's own equations, in Pa and s
+        time, modulus = mode.e["lambda"], mode.e["etaP"] / mode.e["lambda"]
+        found = mode.rate(modulus * stress, gradient / time) * time / modulus
+        wanted = make_law(law, {constant: value}).stress_rate(
+            jnp.array([xx, yy, zz, xy]), jnp.asarray(0.7)
         )
+        own = [found[0, 0], found[1, 1], found[2, 2], found[0, 1]]
+        np.testing.assert_allclose(own, wanted, rtol=1e-12)
     ufl = invoke("export", tmp_path, "--format", "ufl").stdout
     assert "0.1" in ufl
     assert "0.3" in ufl

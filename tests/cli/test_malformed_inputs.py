@@ -115,7 +115,7 @@ def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, 
     monkeypatch.setattr("sys.argv", ["discover", "data", "show", "--help"])
     with pytest.raises(SystemExit):
         cli.main()
-    print("σ12", file=stream, flush=True)  # as the table of distil says it
+    print("σ12", file=stream, flush=True)
     assert b"\\u03c312" in stream.buffer.getvalue()
 
 

@@ -187,8 +187,7 @@ def test_python_m_discover_is_the_command_on_the_processor_and_its_help_loads_no
     assert "__main__" not in said
     # half a second on an idle machine; what takes longer is numbers, and shells
     assert said.splitlines()[-1] == "cpu"
-    for shown in ("--show-completion", "demo", "compare", "close-loop", "batch", "data", "distil",
-                  "export"):  # fmt: skip
+    for shown in ("--show-completion", "demo", "compare", "close-loop", "batch", "data", "export"):
         assert shown in said
 
 

@@ -26,8 +26,10 @@ _RUN_QUANTITIES = (
     units.TIME, units.SHEAR_RATE, units.SHEAR_STRESS, *units.NORMAL_STRESS_DIFFERENCES,
     units.STRAIN, units.HENCKY_RATE, units.TENSILE_STRESS, units.HENCKY_STRAIN,
 )  # fmt: skip
-_SWEEP_QUANTITIES = (units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS)
-_OF_TABLES = material_functions.COMPLIANCE, material_functions.RELAXATION_MODULUS
+_TABLE_QUANTITIES = (
+    units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS,
+    material_functions.COMPLIANCE, material_functions.RELAXATION_MODULUS,
+)  # fmt: skip
 _TABLE_FILES = [f"{kind}.csv" for kind in material_functions.TABLES]
 _BEFORE_WORDS = ("rate_before", "shear_rate_before", "initial_rate", "initial_shear_rate")
 _CLOCK_WORDS = ("time_factor", "shift_factor", "clock_factor", "a_t", "at")
@@ -62,7 +64,7 @@ def check_folder(
         before = load.rates_before(index, None)
     except InputError as wrong:
         return Findings([*findings, *_errors(*place, wrong)])
-    columns, names = _Columns(), index.columns["file"]
+    names, read = index.columns["file"], []
     runs: list[Run] = []
     for row, name in enumerate(names):
         try:
@@ -75,10 +77,8 @@ def check_folder(
         except InputError as wrong:
             findings += _errors("run", name, wrong)
             continue
-        findings += [*run_checks.doubts_of_run(runs[-1]), *columns.of_run(table)]
-    for column, files in columns.unused.items():
-        words = {"column": shown(column), "files": _files(files)}
-        findings.append(found("unused", files[0], **words))
+        read.append(table)
+        findings += run_checks.doubts_of_run(runs[-1])
     sweep, spectrum, of_sweep = None, None, []
     try:
         sweep = load.find_sweep(root)
@@ -88,16 +88,13 @@ def check_folder(
         if sweep is None:
             of_sweep = [found("no_sweep", SWEEP_FILE)]
         else:
-            columns.note_conversions(read_table(root / SWEEP_FILE), _SWEEP_QUANTITIES)
             spectrum, of_sweep = _spectrum(sweep)
-    for name in _TABLE_FILES:
+    beside = []
+    for name in (SWEEP_FILE, *_TABLE_FILES):
         if name not in names and (root / name).is_file():
             with suppress(InputError):  # said when it is read
-                known = (*_RUN_QUANTITIES, *_SWEEP_QUANTITIES, *_OF_TABLES)
-                columns.note_conversions(read_table(root / name), known)
-    for text, files in columns.converted.items():
-        findings.append(found("converted", files[0], files=_files(files), how=text))
-    findings += of_sweep
+                beside.append(read_table(root / name))
+    findings += [*_of_columns(read, beside), *of_sweep]
     transients = [run for run in runs if run.protocol.control == "rate"]
     for run in transients:
         findings += start_up.doubts_of_start(run, sweep, spectrum)
@@ -174,47 +171,37 @@ def _before(index: Table) -> Iterator[Finding]:
         yield found("rate_before", INDEX_FILE, column=name, unit=unit)
 
 
-def _files(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more files"
-
-
-class _Columns:
-    """What the columns of the files are read as, over all of them."""
-
-    def __init__(self):
-        self.unused: dict[str, list[str]] = {}  # files by column
-        self.converted: dict[str, list[str]] = {}  # files by what is done to a column
-
-    def note_conversions(
-        self, table: Table, quantities: Sequence[units.Quantity]
-    ) -> dict[units.Quantity, str]:
-        """Keep which columns of a file are converted; return the column of each quantity."""
-        known = {}
-        for quantity in quantities:
-            if (column := units.find_column(tuple(table.columns), quantity)) is not None:
-                known[quantity] = column
+def _of_columns(runs: Sequence[Table], beside: Sequence[Table]) -> Iterator[Finding]:
+    """Yield what looks like a slip, what nobody reads, and what is converted, of all files."""
+    unused: dict[str, list[str]] = {}  # files by column
+    converted: dict[str, list[str]] = {}  # files by what is done to a column
+    for is_run, table in (*((True, one) for one in runs), *((False, one) for one in beside)):
+        names = tuple(table.columns)
+        wanted = _RUN_QUANTITIES if is_run else (*_RUN_QUANTITIES, *_TABLE_QUANTITIES)
+        try:
+            columns = {quantity: units.find_column(names, quantity) for quantity in wanted}
+        except InputError:  # two columns of a quantity that is not the run's
+            continue
+        known = {quantity: column for quantity, column in columns.items() if column is not None}
         for quantity, (column, factor) in known.items():
             if text := units.conversion_note(column, factor, quantity):
-                self.converted.setdefault(text, []).append(table.name)
-        return {quantity: column for quantity, (column, _) in known.items()}
-
-    def of_run(self, table: Table) -> Iterator[Finding]:
-        """Yield what looks like a slip in the columns of a run; keep those that nobody reads."""
-        try:
-            known = self.note_conversions(table, _RUN_QUANTITIES)
-        except InputError:  # two columns of a quantity that is not the run's
-            return
+                converted.setdefault(text, []).append(table.name)
         missing = [one for one in _RUN_QUANTITIES if one not in known]
-        for column in (one for one in table.columns if one not in known.values()):
+        read = {column for column, _ in known.values()}
+        for column in (one for one in names if is_run and one not in read):
             plain = column.lower()
             meant = [q for q in missing if plain in (q.stem.lower(), q.column.lower())]
             slips = [q for q in missing if column.startswith(f"{q.stem}_")]
             if plain == "strain" or not (meant or slips):
-                self.unused.setdefault(column, []).append(table.name)
+                unused.setdefault(column, []).append(table.name)
                 continue
             check, quantity = ("misnamed", meant[0]) if meant else ("no_unit", slips[0])
             words = {"stem": quantity.stem, "name": quantity.column}
             yield found(check, table.name, column=shown(column), **words)
+    for check, by_text in (("unused", unused), ("converted", converted)):
+        for text, files in by_text.items():
+            several = f"{files[0]} and {len(files) - 1} more files" if len(files) > 1 else files[0]
+            yield found(check, files[0], files=several, column=shown(text), how=text)
 
 
 def _others(root: Path, names: Sequence[str]) -> Iterator[Finding]:

@@ -40,23 +40,14 @@ Values = Float[np.ndarray, " n"]
 class Finding:
     """One thing that is wrong, doubtful or worth knowing.
 
-    Attributes
-    ----------
-    severity
-        ``error``: the folder cannot be used; ``warning``: it can, but results may mislead;
-        ``note``: how something was understood.
-    subject
-        What it is about, such as ``outliers`` or ``N1``; the same word for the same kind.
-    file
-        The file, or empty if it is about the folder.
-    text
-        A sentence or two in the user's words, with the remedy.
+    An ``error``: the folder cannot be used; a ``warning``: it can, but results may mislead; a
+    ``note``: how something was understood.
     """
 
     severity: Severity
-    subject: str
-    file: str
-    text: str
+    subject: str  # such as ``outliers`` or ``N1``; the same word for the same kind
+    file: str  # empty if it is about the folder
+    text: str  # a sentence or two in the user's words, with the remedy
 
     def __str__(self) -> str:
         return self.text
@@ -226,7 +217,7 @@ def doubts_among_runs(runs: Sequence[Run]) -> Iterator[Finding]:
             continue
         rates = np.array([abs(run.rate[0]) for run in alike])
         for what, quantity, rises in (
-            ("The stress", _largest, True),
+            ("The stress", lambda run: np.max(np.abs(run.stress)), True),
             ("The time at which the stress rises", _half_time, False),
         ):
             values = np.array([quantity(run) for run in alike])
@@ -244,10 +235,6 @@ def doubts_of_temperature(runs: Sequence[Run]) -> Iterator[Finding]:
         cold, hot = min(known, key=known.__getitem__), max(known, key=known.__getitem__)
         names: dict[str, Any] = {"cold": cold, "hot": hot}
         yield found("two_temperatures", **names, lowest=known[cold], highest=known[hot])
-
-
-def _largest(run: Run) -> float:
-    return float(np.max(np.abs(run.stress)))
 
 
 def _half_time(run: Run) -> float:

@@ -3,14 +3,13 @@
 import hashlib
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from discover.dataset.importing.files import blocks_of_importer
 from discover.dataset.importing.folder_files import (
-    NamedRecord,
     files_of,
     left_out,
     nothing,
@@ -43,9 +42,8 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        given = {str(key): column for key, column in mapping.columns.items()}
         names = name_table(mapping.names)
-        if not any(guess_columns(block, given, names) for block in found):
+        if not any(guess_columns(block, mapping.columns, names) for block in found):
             wave = without_names(rows)
             found = found if wave is None else [wave]
         require_blocks(found, path.name)
@@ -77,39 +75,33 @@ class ImportedFolder:
 class _Found:
     """Records and messages, of one file or of all."""
 
-    records: list[NamedRecord] = field(default_factory=list)
+    records: list[Record] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
     tests: dict[str, TestName] = field(default_factory=dict)
-    seen: dict[str, set[str]] = field(default_factory=dict)  # names of columns by quantity
+    seen: dict[tuple[str, str], None] = field(default_factory=dict)  # quantities and columns
     named: set[str] = field(default_factory=set)  # quantities that some block names
     asked_for: set[str] = field(default_factory=set)  # those that a test needs
-    units: UnsaidUnits = field(default_factory=dict)
-    columns: dict[str, list[str]] = field(default_factory=dict)  # files by columns not read
+    units: UnsaidUnits = field(default_factory=list)
+    columns: list[tuple[str, str]] = field(default_factory=list)  # columns not read, and the file
 
     def note(self, readings: Readings, made: Record) -> None:
         """Keep what a test that is imported says of names and units."""
-        for quantity, at in readings.columns.items():
-            if quantity in readings.used:
-                self.seen.setdefault(quantity, set()).add(readings.block.columns[at][0])
-        for key, unit in readings.unsaid.items():
-            if _is_part(key, made):
-                self.units.setdefault((key, unit.column), (readings.name, unit))
-        self.asked_for |= readings.used.keys() | {SAME[k] for k in readings.used if k in SAME}
+        used, names = readings.used.keys(), readings.block.columns
+        seen = ((key, names[at][0]) for key, at in readings.columns.items() if key in used)
+        self.seen |= dict.fromkeys(seen)
+        self.units += [
+            (key, readings.name, unit)
+            for key, unit in readings.unsaid.items()
+            if _is_part(key, made)
+        ]
+        self.asked_for |= used | {SAME[key] for key in used if key in SAME}
 
     def add(self, other: "_Found") -> None:
         """Add what another file holds."""
-        self.records += other.records
-        self.said += other.said
-        self.tests |= other.tests
-        self.unread += other.unread
-        self.named |= other.named
-        self.asked_for |= other.asked_for
-        self.units = {**other.units, **self.units}
-        for key, names in other.seen.items():
-            self.seen.setdefault(key, set()).update(names)
-        for names, files in other.columns.items():
-            self.columns.setdefault(names, []).extend(files)
+        for name, own in vars(self).items():
+            add = own.extend if isinstance(own, list) else own.update
+            add(getattr(other, name))
 
 
 def import_files(
@@ -146,14 +138,17 @@ def import_files(
             "No test to import was given. Name one or more exports, or list them under [[source]] "
             "in the mapping file."
         )
-    given = {str(key): name for key, name in mapping.columns.items()}
-    if unmatched := sorted(set(given) - set(all_.seen)):
+    given = mapping.columns
+    names: dict[str, list[str]] = {}
+    for key, name in all_.seen:
+        names.setdefault(key, []).append(name)
+    if unmatched := sorted(given.keys() - names.keys()):
         key = unmatched[0]
         raise InputError(
             f"No test in these files has a column {given[key]!r} for {key}, or needs it (torque, "
             "angle and force need --geometry). Correct --column."
         )
-    of_units = set(map(str, mapping.units))
+    of_units = set(mapping.units)
     if unused := sorted(of_units - all_.named):
         raise InputError(
             f"--unit {unused[0]} changes nothing: no column or line of these files is known as "
@@ -168,7 +163,7 @@ def import_files(
     files, notes = files_of(all_.records)
     # a name that differs from block to block is guessed again when the import is repeated, and
     # units are read again from the files
-    same = {key: next(iter(names)) for key, names in all_.seen.items() if len(names) == 1}
+    same = {key: of[0] for key, of in names.items() if len(of) == 1}
     tests = {**all_.tests, **mapping.tests}
     used = {"columns": {**same, **given}, "source": tuple(sources), "tests": tests}
     units, unread = units_taken_as_si(all_.units), unread_columns(all_.columns)
@@ -203,7 +198,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
         if previous is not None and chosen in (None, "creep"):
             recovered = joined(previous, readings)
             if recovered is not None:
-                found.records[-1] = replace(found.records[-1], record=recovered)
+                found.records[-1] = recovered
                 found.tests[key] = "creep"
                 words = "the recovery after the creep before it, added to that run."
                 found.said.append(f"{where}: {words}")
@@ -222,7 +217,8 @@ def _read(path: Path, mapping: Mapping) -> _Found:
                 reasons += [f"block {number} is {why}"] if why else []
                 found.said.append(left_out(where, block, why))
             else:
-                found.records.append(NamedRecord(name, made, file, block.name))
+                made.name = name
+                found.records.append(made)
                 found.tests[key] = made.kind
                 found.note(readings, made)
                 made.notes += readings.notes.values()
@@ -237,11 +233,11 @@ def _read(path: Path, mapping: Mapping) -> _Found:
             of_wave = Readings.of(wave, Mapping(), file)
             one = recognise(of_wave)
             made = record(of_wave, one, None)
-            own = f"{name}-point-{wave.name.rpartition(' ')[2]}"
-            found.records.append(NamedRecord(own, made, file, wave.name))
+            made.name = f"{name}-point-{wave.name.rpartition(' ')[2]}"
+            found.records.append(made)
             found.said.append(_summary(f"{file}, {wave.name}", of_wave, one, made))
     if unread := [shown(name) for name in there if name not in read]:
-        found.columns[", ".join(unread)] = [file]
+        found.columns.append((", ".join(unread), file))
     if not found.records:
         raise InputError(" ".join(found.unread) or nothing(path, tables, reasons))
     return found
@@ -297,7 +293,8 @@ def _read_sweep(path: Path, mapping: Mapping, found: _Found) -> None:
         made = record(readings, one, None)
         found.named |= readings.named()
         found.note(readings, made)
-        found.records.append(NamedRecord("lve", made, path.name, block.name, chosen=True))
+        made.chosen = True
+        found.records.append(made)
         found.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
         return
     raise InputError(

@@ -1,14 +1,12 @@
 """Tests become the files of a folder; what of an export is not read is named."""
 
-import csv
-import io
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
-from discover.dataset.importing.quantities import SAME_TEMPERATURE
 from discover.dataset.importing.readings import INSTRUMENT, Readings
 from discover.dataset.importing.records import Record
 from discover.dataset.importing.text_export import Block
@@ -25,75 +23,62 @@ _NO_TEMPERATURE = (
     "Nothing says its temperature; if it is another, give it, as in --temperature FILE=60 or "
     "FILE:2=60 for a block. To exchange the two, rename them."
 )
-_CONDITIONS = ("flow", "control", "start", "rate_before_1_s", "step_strain", "step_time_s")
+_INDEX_COLUMNS = [
+    "file", "source_file", "source_block", "flow", "control", "start", "rate_before_1_s",
+    "step_strain", "step_time_s", "temperature_C",
+]  # fmt: skip
 _FLOW = (("time",), ("shear_rate", "strain"), ("stress",))
 _OSCILLATION = (("omega",), ("Gp",), ("Gpp",))
 
 
-@dataclass(frozen=True)
-class NamedRecord:
-    """A test and where it comes from."""
-
-    name: str  # of its file, if it is a run, without ending
-    record: Record
-    source: str  # name of the file
-    block: str  # what that calls the block
-    chosen: bool = False  # by the user, as the table of its kind
-
-    def near(self, celsius: float | None) -> bool:
-        """Return whether it is at a temperature, or nobody says one of the two."""
-        has = self.record.temperature
-        return has is None or celsius is None or abs(has - celsius) <= SAME_TEMPERATURE
-
-
-def files_of(found: Sequence[NamedRecord]) -> tuple[dict[str, str], list[str]]:
+def files_of(found: Sequence[Record]) -> tuple[dict[str, str], list[str]]:
     """Return the text of every file of a folder by name, and what is to be said of them."""
-    runs: list[NamedRecord] = []
+    runs: list[Record] = []
     taken: set[str] = set()
-    for one in (one for one in found if one.record.is_run):
+    for one in (one for one in found if one.is_run):
         # a file called creep.txt is no table of compliances
         own = f"{one.name}-run" if f"{one.name}.csv" in _TAKEN else one.name
         names = (f"{own}{end}" for end in ("", *(f"_{k}" for k in range(2, len(found) + 2))))
         # two names that differ in capitals are one file on some disks
         runs.append(replace(one, name=next(name for name in names if name.lower() not in taken)))
         taken.add(runs[-1].name.lower())
-    files = {f"{one.name}.csv": _csv(one.record) for one in runs}
+    files = {f"{one.name}.csv": _csv(one.columns) for one in runs}
     notes: list[str] = []
-    by_temperature: list[tuple[str, str, str]] = []
-    of_runs = {one.record.temperature for one in runs}
+    by_temperature: list[dict[str, str]] = []
+    of_runs = {one.temperature for one in runs}
     for kind, table in TABLES.items():
-        records = [one for one in found if one.record.kind == kind and not one.record.is_run]
+        records = [one for one in found if one.kind == kind and not one.is_run]
         records.sort(key=lambda one: not one.chosen)
-        groups: list[list[NamedRecord]] = []  # by temperature
+        groups: list[list[Record]] = []  # by temperature
         for one in _merged(records) if kind == "amplitude_sweep" else records:
-            group = next((g for g in groups if g[0].near(one.record.temperature)), None)
+            group = next((g for g in groups if g[0].near(one.temperature)), None)
             if group is None:
                 groups.append(group := [])
             group.append(one)
         for group in groups:
-            at = f"{group[0].record.temperature:g}" if len(groups) > 1 else ""
+            at = f"{group[0].temperature:g}" if len(groups) > 1 else ""
             main = not at or group[0].chosen
             base = table if main else f"{table}_{at}C"
             if not main:
-                by_temperature.append((f"{base}.csv", table, at))
-            files[f"{base}.csv"] = _csv(group[0].record)
+                by_temperature.append({"file": f"{base}.csv", "test": table, "temperature_C": at})
+            files[f"{base}.csv"] = _csv(group[0].columns)
             for number, one in enumerate(group[1:], start=2):
-                files[f"{base}-{number}.csv"] = _csv(one.record)
+                files[f"{base}-{number}.csv"] = _csv(one.columns)
                 notes.append(_not_used(f"{base}-{number}.csv", table, one))
         if len(groups) > 1 and not groups[0][0].chosen:
             at_runs = [g[0] for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
             if len(at_runs) == 1:
-                files[f"{table}.csv"] = _csv(at_runs[0].record)
+                files[f"{table}.csv"] = _csv(at_runs[0].columns)
             notes.append(_of_temperatures(table, groups, len(at_runs) == 1))
     if by_temperature:
-        files[TESTS_FILE] = _text([("file", "test", "temperature_C"), *by_temperature])
+        files[TESTS_FILE] = _csv(by_temperature)
     if runs:
         files[INDEX_FILE] = _index(runs)
     return files, notes
 
 
-def _not_used(name: str, table: str, one: NamedRecord) -> str:
-    known = one.record.temperature is not None
+def _not_used(name: str, table: str, one: Record) -> str:
+    known = one.temperature is not None
     same = "at the same temperature, " if known else ""
     remedy = "To exchange the two, rename them." if known else _NO_TEMPERATURE
     return (
@@ -102,8 +87,8 @@ def _not_used(name: str, table: str, one: NamedRecord) -> str:
     )
 
 
-def _of_temperatures(table: str, groups: list[list[NamedRecord]], at_runs: bool) -> str:
-    first, last = (f"{g[0].record.temperature:g}" for g in (groups[0], groups[-1]))
+def _of_temperatures(table: str, groups: list[list[Record]], at_runs: bool) -> str:
+    first, last = (f"{g[0].temperature:g}" for g in (groups[0], groups[-1]))
     text = f"{table}: {len(groups)} temperatures, {first} to {last} °C, a file each, listed in "
     text += f"{TESTS_FILE}; "
     if at_runs:
@@ -112,55 +97,45 @@ def _of_temperatures(table: str, groups: list[list[NamedRecord]], at_runs: bool)
     return f"{text}, or make one of all with discover data shift." if table == "lve" else f"{text}."
 
 
-def _merged(records: Sequence[NamedRecord]) -> list[NamedRecord]:
+def _merged(records: Sequence[Record]) -> list[Record]:
     """Return amplitude sweeps at one temperature and different frequencies as one table."""
 
-    def goes_into(one: NamedRecord, into: NamedRecord) -> bool:
-        here, there = one.record.table.get("omega"), into.record.table.get("omega")
-        if here is None or there is None or not into.near(one.record.temperature):
+    def goes_into(one: Record, into: Record) -> bool:
+        here, there = one.table.get("omega"), into.table.get("omega")
+        if here is None or there is None or not into.near(one.temperature):
             return False
         return not (np.abs(there[:, None] - here) < 0.02 * there[:, None]).any()
 
-    kept: list[NamedRecord] = []
+    kept: list[Record] = []
     for one in records:
         into = next((into for into in kept if goes_into(one, into)), None)
         if into is None:
             kept.append(one)
         else:
-            table = into.record.table
-            table |= {k: np.concatenate([table[k], one.record.table[k]]) for k in table}
+            table = into.table
+            table |= {k: np.concatenate([table[k], one.table[k]]) for k in table}
     return kept
 
 
-def _index(runs: Sequence[NamedRecord]) -> str:
-    used = [key for key in _CONDITIONS if any(key in one.record.conditions for one in runs)]
-    warm = any(one.record.temperature is not None for one in runs)
-    warm = any(one.record.temperature is not None for one in runs)
-    rows = [("file", "source_file", "source_block", *used, *(["temperature_C"] if warm else []))]
+def _index(runs: Sequence[Record]) -> str:
+    rows = []
     for one in runs:
-        conditions = [one.record.conditions.get(key, "") for key in used]
-        degrees = one.record.temperature
-        last = ["" if degrees is None else f"{degrees:g}"] if warm else []
-        rows.append((f"{one.name}.csv", one.source, one.block, *conditions, *last))
-    return _text(rows)
+        degrees = one.temperature
+        warm = {} if degrees is None else {"temperature_C": f"{degrees:g}"}
+        source = {"source_file": one.source, "source_block": one.block}
+        rows.append({"file": f"{one.name}.csv", **source, **one.conditions, **warm})
+    table = pd.DataFrame(rows).reindex(columns=_INDEX_COLUMNS)
+    return _csv(table.dropna(axis="columns", how="all"))
 
 
-def _text(rows: Sequence[tuple[str, ...]]) -> str:
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+def _csv(table: object) -> str:
+    return pd.DataFrame(table).to_csv(index=False, lineterminator="\n")
 
 
-def _csv(record: Record) -> str:
-    # repr gives the shortest text that reads back as the same number
-    table = record.columns
-    rows = zip(*(map(repr, column.tolist()) for column in table.values()), strict=True)
-    return "\n".join([",".join(table), *(",".join(row) for row in rows)]) + "\n"
-
-
-def unread_columns(columns: Mapping[str, Sequence[str]]) -> Iterator[str]:
+def unread_columns(columns: Sequence[tuple[str, str]]) -> Iterator[str]:
     """Say once of which columns nothing was read, and what to do to have them."""
-    for names, files in columns.items():
+    for names in dict.fromkeys(names for names, _ in columns):
+        files = [file for other, file in columns if other == names]
         more = f" and {len(files) - 3} more files" if len(files) > 3 else ""
         yield (
             f"{', '.join(files[:3])}{more}: columns not read: {names}. To have one, say what "

@@ -23,7 +23,6 @@ from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import Block, Said, said_of
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.records.thinning import SPREAD_OF_BENDS, bends
-from discover.errors import InputError
 
 CONSTANT = 0.03  # spread of the middle nine tenths up to which an imposed quantity is constant
 AT_REST = 0.02  # rate or stress over the largest, below which it is none
@@ -339,11 +338,8 @@ def _how_many(blocks: Sequence[Block], mapping: Mapping, file: str) -> int:
     all_are = said is not None and said.test in ("loop", "intervals")
     ways: list[tuple[np.ndarray, np.ndarray]] = []  # rates and stresses
     for block in blocks if all_are else blocks[:3]:
-        try:
-            readings = Readings.of(block, mapping, file)
-            rate, stress = readings.get("shear_rate"), readings.get("stress")
-        except InputError:  # said where the block is read
-            break
+        readings = Readings.of(block, mapping, file)
+        rate, stress = map(readings.unless_wrong, ("shear_rate", "stress"))
         if rate is None or stress is None or readings.has("omega", "Gp"):
             break
         kept = np.isfinite(rate) & np.isfinite(stress)

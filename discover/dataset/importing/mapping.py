@@ -6,22 +6,24 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import quote, unquote_to_bytes
 
-from pydantic import Field, Strict, model_validator
+from pydantic import AfterValidator, Field, Strict, model_validator
 
 from discover.dataset.importing.names import check_names
+from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.tables.table import read_toml, toml_string
 from discover.validation import Section, validated
+from discover.words import unknown_name
 
 MAPPING_FILE = "import.toml"
 
-QuantityName = Literal[
-    "time", "shear_rate", "stress", "strain", "N1", "N2", "torque", "angular_velocity", "angle",
-    "normal_force", "omega", "Gp", "Gpp", "hencky_rate", "tensile_stress", "hencky_strain",
-    "relaxation_modulus", "compliance", "viscosity", "strain_amplitude", "stress_amplitude",
-    "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor", "temperature", "psi1",
-    "psi2", "extensional_viscosity", "radius", "diameter", "gap", "cone_angle", "strain_wave",
-    "stress_wave", "wave_time", "point",
-]  # fmt: skip
+
+def _known_quantity(name: str) -> str:
+    if name not in QUANTITIES:
+        raise ValueError(unknown_name("quantity", name, QUANTITIES))
+    return name
+
+
+QuantityName = Annotated[str, AfterValidator(_known_quantity)]
 
 TestName = Literal[
     "frequency_sweep", "amplitude_sweep", "flow_curve", "relaxation", "creep", "run", "none"

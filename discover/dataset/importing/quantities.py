@@ -244,13 +244,16 @@ def _of_ratio(made: Values, raw: Values, factors: dict[str, float], why: str):
     return next(((unit, why) for unit in near), None)
 
 
-UnsaidUnits = dict[tuple[str, str], tuple[str, UnsaidUnit]]
-"""Units that no file gives, with the first such file, by quantity and name of the column."""
+UnsaidUnits = list[tuple[str, str, UnsaidUnit]]
+"""Quantities and files that do not give their units."""
 
 
 def _unsaid(found: UnsaidUnits, how: str) -> tuple[list[tuple[str, UnsaidUnit]], str]:
-    """Return the quantities whose unit is told so, and the files, in words."""
-    said = [(key, file, one) for (key, _), (file, one) in found.items() if one.how == how]
+    """Return the quantities whose unit is told so, once for each column, and the first files."""
+    first: dict[tuple[str, str], tuple[str, UnsaidUnit]] = {}
+    for key, file, one in found:
+        first.setdefault((key, one.column), (file, one))
+    said = [(key, file, one) for (key, _), (file, one) in first.items() if one.how == how]
     files = list(dict.fromkeys(file for _, file, _ in said))
     return [(key, one) for key, _, one in said], listed(files) if files else ""
 

@@ -46,8 +46,7 @@ class Readings:
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return readings of a block; InputError if a given name stands above two columns."""
-        given = {str(key): column for key, column in mapping.columns.items()}
-        columns = quantities.guess_columns(block, given, name_table(mapping.names))
+        columns = quantities.guess_columns(block, mapping.columns, name_table(mapping.names))
         found = cls(block, columns, mapping, name, mapping.geometry)
         if found.geometry is None:
             found.geometry = found._geometry()
@@ -66,6 +65,13 @@ class Readings:
             return made
         constant = self._constant(key)
         return None if constant is None else np.full(len(self), constant)
+
+    def unless_wrong(self, key: str) -> Values | None:
+        """Return a quantity; None too where its unit is wrong, which is said later."""
+        try:
+            return self.get(key)
+        except InputError:
+            return None
 
     def has(self, *keys: str) -> bool:
         """Return whether all of these are known, as `get` finds them."""
@@ -99,8 +105,7 @@ class Readings:
 
     def _unit_given(self, key: str) -> str:
         """Return the unit that the user says; of a strain also by the name of its amplitude."""
-        given = {str(name): unit for name, unit in self.mapping.units.items()}
-        other = SAME.get(key, "")
+        given, other = self.mapping.units, SAME.get(key, "")
         return given.get(key) or ("" if other in self.columns else given.get(other, ""))
 
     def _temperature(self) -> Values | None:

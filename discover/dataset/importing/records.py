@@ -9,7 +9,7 @@ from jaxtyping import Float
 from discover.dataset.importing.in_time import AT_REST, CONSTANT, spread, strain_of, up_and_down
 from discover.dataset.importing.mapping import TestName
 from discover.dataset.importing.oscillations import alternates, goes_on
-from discover.dataset.importing.quantities import QUANTITIES
+from discover.dataset.importing.quantities import QUANTITIES, SAME_TEMPERATURE
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.recognition import Recognised
 from discover.errors import InputError
@@ -30,6 +30,10 @@ class Record:
     temperature: float | None = None  # mean, in °C; None where nobody says it
     dropped: int = 0  # rows left out, for want of a number or because they cannot be
     notes: list[str] = field(default_factory=list)  # what else was done or is to be known
+    name: str = ""  # of its file, if it is a run, without ending
+    source: str = ""  # file that it is from
+    block: str = ""  # what that calls the block
+    chosen: bool = False  # by the user, as the table of its kind
 
     @property
     def is_run(self) -> bool:
@@ -40,6 +44,11 @@ class Record:
     def columns(self) -> Table:
         """The table by the names of columns."""
         return {QUANTITIES[key].column: values for key, values in self.table.items()}
+
+    def near(self, celsius: float | None) -> bool:
+        """Return whether it is at a temperature, or nobody says one of the two."""
+        has = self.temperature
+        return has is None or celsius is None or abs(has - celsius) <= SAME_TEMPERATURE
 
     def keep(self, rows: np.ndarray, why: str) -> None:
         """Leave out the other rows, with a note why; InputError if none is left."""
@@ -58,7 +67,7 @@ class _Needed(NamedTuple):
     keys: tuple[str, ...]
     besides: tuple[str, ...] = ()
     positive: tuple[str, ...] = ()
-    why: str = ""
+    why: str = ""  # of rows where something is not positive
 
 
 def record(readings: Readings, found: Recognised, before: Record | None) -> Record:
@@ -69,8 +78,10 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
     made = _table(readings, found, needed)
     if "time" in made.table:
         _begin(made, readings)
-    if found.kind == "flow_curve":
-        _as_forward(made)
+    both = [made.table[key] for key in ("shear_rate", "stress") if found.kind == "flow_curve"]
+    if both and np.median(both[0]) < 0.0 and np.median(both[1]) < 0.0:
+        made.table |= {"shear_rate": -both[0], "stress": -both[1]}
+        made.notes.append("rate and stress, both negative, are taken without their signs")
     if needed.positive:
         made.keep(np.all([made.table[k] > 0.0 for k in needed.positive], axis=0), needed.why)
     if "tensile_stress" in made.table:
@@ -99,17 +110,14 @@ def record(readings: Readings, found: Recognised, before: Record | None) -> Reco
 
 
 def _needed(readings: Readings, kind: TestName) -> _Needed:
-    normal, has = ("N1", "N2"), readings.has
-    sweep = ("omega", "Gp", "Gpp") if has("omega") else ("Gp", "Gpp")
-    moved = "strain" if has("strain") else "shear_rate"
+    normal, both, moduli, has = ("N1", "N2"), ("shear_rate", "stress"), ("Gp", "Gpp"), readings.has
     if kind == "frequency_sweep":
-        keys = ("omega", "Gp", "Gpp")
         why = "a modulus that is not positive, beyond the reach of the instrument"
-        return _Needed(keys, (), keys, why)
+        return _Needed(("omega", *moduli), (), ("omega", *moduli), why)
     if kind == "amplitude_sweep":
-        return _Needed(("strain_amplitude", *sweep), (), ("strain_amplitude",), "no strain")
+        keys = ("strain_amplitude", *(("omega",) if has("omega") else ()), *moduli)
+        return _Needed(keys, (), ("strain_amplitude",), "no strain")
     if kind == "flow_curve":
-        both = ("shear_rate", "stress")
         return _Needed(both, normal, both, "no steady flow")
     if kind == "run" and has("tensile_stress"):
         how = "hencky_rate" if has("hencky_rate") else "hencky_strain"
@@ -118,6 +126,7 @@ def _needed(readings: Readings, kind: TestName) -> _Needed:
         return _Needed(("time", "shear_rate", "stress"), (*normal, "strain"))
     if kind == "run" or (kind == "relaxation" and has("stress", "strain")):
         return _Needed(("time", "strain", "stress"), normal)
+    moved = "strain" if has("strain") else "shear_rate"
     if kind == "creep" and has("stress", moved):
         return _Needed(("time", "stress", moved))
     # as the instrument's software computed it
@@ -144,7 +153,8 @@ def _table(readings: Readings, found: Recognised, needed: _Needed) -> Record:
             f"{', '.join(there)}. Name other columns."
         )
     table = {key: there[key][rows] for key in QUANTITIES if key in there}
-    return Record(found.kind, table, dropped=int(np.sum(found.rows) - np.sum(rows)))
+    dropped, whence = int(np.sum(found.rows) - np.sum(rows)), (readings.name, readings.block.name)
+    return Record(found.kind, table, dropped=dropped, source=whence[0], block=whence[1])
 
 
 def _begin(made: Record, readings: Readings) -> None:
@@ -156,13 +166,6 @@ def _begin(made: Record, readings: Readings) -> None:
     later = np.concatenate([[True], time[1:] > np.maximum.accumulate(time)[:-1]])
     if 0 < np.sum(~later) <= max(2, 0.1 * len(time)):
         made.keep(later, "a time that was there already")
-
-
-def _as_forward(made: Record) -> None:
-    rate, stress = made.table["shear_rate"], made.table["stress"]
-    if np.median(rate) < 0.0 and np.median(stress) < 0.0:
-        made.table |= {"shear_rate": -rate, "stress": -stress}
-        made.notes.append("rate and stress, both negative, are taken without their signs")
 
 
 def _note_steadiness(made: Record, time: Values | None) -> None:
@@ -255,10 +258,7 @@ def clock_before(readings: Readings, last: float) -> tuple[float, float]:
     """Return when a block began, if its clock goes on from the block before, and when it ended."""
     if "time" not in readings.columns or readings.mapping.start_time_s:
         return 0.0, last
-    try:
-        time = readings.alone("time")
-    except InputError:  # said where the block is read, if it is
-        return 0.0, last
+    time = readings.unless_wrong("time")
     time = np.empty(0) if time is None else time[np.isfinite(time)]
     if not len(time):
         return 0.0, last

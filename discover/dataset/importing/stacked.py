@@ -22,7 +22,6 @@ from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
 from discover.dataset.importing.text_rows import Constant, is_number
 from discover.dataset.tables import units
 from discover.dataset.tables.units import name_and_unit, read_unit
-from discover.errors import InputError
 
 # what a test measures; a table of several tests has one of these several times
 _ANSWERS = {
@@ -315,10 +314,7 @@ def _restarts(values: Float[np.ndarray, " m"]) -> list[int]:
 
 def _values(readings: Readings, key: str, piece: _Piece) -> Float[np.ndarray, " m"] | None:
     """Return a column of its own in the rows of a test; None if it lacks one in some."""
-    try:
-        values = readings.alone(key)
-    except InputError:  # said where the block is read, if it is
-        return None
+    values = readings.unless_wrong(key) if key in readings.columns else None
     values = np.empty(0) if values is None else values[piece.rows]
     return values if len(values) > 2 * _FEWEST - 1 and np.all(np.isfinite(values)) else None
 
@@ -335,9 +331,6 @@ def _sweeps(readings: Readings, piece: _Piece) -> bool:
 
 
 def _strain_varies(readings: Readings) -> bool:
-    try:
-        strain = readings.get("strain_amplitude")
-    except InputError:
-        return False
+    strain = readings.unless_wrong("strain_amplitude")
     size = np.empty(0) if strain is None else np.abs(strain[np.isfinite(strain)])
     return bool(len(size) and np.max(size) > 1.2 * np.min(size))

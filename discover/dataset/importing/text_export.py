@@ -51,56 +51,24 @@ _INVALID = re.compile(r"\((invalid|invalide|ungültig)\)", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class Block:
-    """Lines of numbers under one header.
+    """Lines of numbers under one header."""
 
-    Attributes
-    ----------
-    name
-        What the file calls it, or empty.
-    columns
-        Name and unit of each column; the unit is empty where the file gives none.
-    cells
-        Text of the rows, with decimal points.
-    line
-        Line of the file on which the numbers begin.
-    constants
-        What the lines above say of the whole block, such as the gap or the rate.
-    over
-        What stands above the name of each column and those to the right of it; empty if nothing.
-    apart
-        Whether what stands before it in the file is another sample, or another temperature.
-    told_by
-        Names of the columns that tell it from the other tests of one table.
-    above
-        Those lines: of the file's head, and since the block before, the nearest last.
-    """
-
-    name: str
-    columns: tuple[tuple[str, str], ...]
-    cells: tuple[tuple[str, ...], ...]
-    line: int
-    constants: tuple[Constant, ...] = ()
-    over: tuple[str, ...] = ()
-    apart: bool = False
-    told_by: tuple[str, ...] = ()
-    above: tuple[tuple[str, ...], ...] = ()
+    name: str  # what the file calls it, or empty
+    columns: tuple[tuple[str, str], ...]  # name and unit of each; empty where the file has none
+    cells: tuple[tuple[str, ...], ...]  # text of the rows, with decimal points
+    line: int  # of the file, on which the numbers begin
+    constants: tuple[Constant, ...] = ()  # what the lines above say of all of it, such as the gap
+    over: tuple[str, ...] = ()  # what stands above the name of a column, or of one left of it
+    apart: bool = False  # whether what stands before it is another sample, or temperature
+    told_by: tuple[str, ...] = ()  # columns that tell it from the other tests of one table
+    above: tuple[tuple[str, ...], ...] = ()  # the file's head, and lines since the block before
 
     @classmethod
     def of(cls, columns: Mapping[str, tuple[str, ArrayLike]], name: str = "") -> "Block":
         """Return columns of numbers as a block, as if a file had held them as text.
 
-        Parameters
-        ----------
-        columns
-            Unit, empty for a pure number, and values of each column, by its name. All have one
-            shape (n,); a value that is nan is an empty cell.
-        name
-            What the file calls the block.
-
-        Raises
-        ------
-        InputError
-            If a column is no list of numbers, or they differ in length.
+        `columns`: unit, empty for a pure number, and values of each by its name, all of one shape
+        (n,); nan is an empty cell. Raises InputError if they are none.
         """
         values = [np.asarray(numbers, dtype=float) for _, numbers in columns.values()]
         if not values or {one.shape for one in values} != {(values[0].size,)}:

@@ -1,6 +1,6 @@
 """Linear tests at several temperatures, the spectrum of one, and whether it predicts the others."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -134,8 +134,11 @@ def over_time(kind: str, time: Values, values: Values) -> LinearTest:
     return LinearTest(kind, 10.0**mean_x, 10.0 ** mean_y[None], spread)
 
 
-def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
-    """Kind, temperature in °C and file of each test in ``tests.csv``; InputError if wrong."""
+def read_linear_tests(root: Path) -> dict[str, dict[float, LinearTest]]:
+    """Return the linear tests of a folder by kind and temperature, as ``tests.csv`` lists them.
+
+    Raises InputError if the list or a file is wrong, or no kind of test has two temperatures.
+    """
     missing = "Tests at several temperatures are listed there; write one with the columns file, "
     table = read_table(root / TESTS_FILE, TESTS_FILE, missing + "test and temperature_C.")
     problems = Problems()
@@ -146,7 +149,8 @@ def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
                 f"{did_you_mean(column, table.columns)} Add it."
             )
     problems.require_none(TESTS_FILE)
-    degrees, seen = table.numbers("temperature_C"), set()
+    found: dict[str, dict[float, LinearTest]] = {}
+    degrees = table.numbers("temperature_C")
     names, tests = table.columns["file"], table.columns["test"]
     for celsius, name, test in zip(degrees.tolist(), names, tests, strict=True):
         kind = test.strip()
@@ -154,22 +158,12 @@ def listed_tests(root: Path) -> Iterator[tuple[str, float, Path]]:
             continue
         if Path(name).name != name:
             raise InputError(f"{TESTS_FILE} names {name!r}; put the file itself in the folder.")
-        if (kind, celsius) in seen:
+        at = found.setdefault(kind, {})
+        if celsius in at:
             raise InputError(
                 f"{TESTS_FILE} has two tests {kind!r} at {celsius:g} °C; keep one of them."
             )
-        seen.add((kind, celsius))
-        yield kind, celsius, root / name
-
-
-def read_linear_tests(root: Path) -> dict[str, dict[float, LinearTest]]:
-    """Return the linear tests of a folder by kind and temperature, as ``tests.csv`` lists them.
-
-    Raises InputError if the list or a file is wrong, or no kind of test has two temperatures.
-    """
-    found: dict[str, dict[float, LinearTest]] = {}
-    for kind, celsius, path in listed_tests(root):
-        at = found.setdefault(kind, {})
+        path = root / name
         if kind == SWEEP:
             at[celsius] = of_sweep(read_sweep(path))
             continue

@@ -98,18 +98,15 @@ class ModeSearch:
     @cached_property
     def _target(self) -> Float[np.ndarray, " rows"]:
         """What the fitted constants have to give: one, less what known ones give."""
-        held = [0.0 if isinstance(v, str) or v is None else v for v in self._asked]
+        asked = self.solvent_viscosity, self.elastic_modulus
+        held = [0.0 if isinstance(v, str) or v is None else v for v in asked]
         return 1.0 - self._design(np.zeros(0), True, True) @ np.array(held)
-
-    @property
-    def _asked(self) -> tuple[Any, Any]:
-        return self.solvent_viscosity, self.elastic_modulus
 
     def fits(self, fewest: int = 0) -> Iterator[ModeFit]:
         """Yield fits of so many modes and more, with and without solvent and elastic constant."""
         choices = [
             (True,) if value == "fit" else (False, True) if value is None else (False,)
-            for value in self._asked
+            for value in (self.solvent_viscosity, self.elastic_modulus)
         ]
         for solvent, elastic in product(*choices):
             yield from self._path(solvent, elastic, fewest)
@@ -149,7 +146,8 @@ class ModeSearch:
         most = max((len(self.frequency) - solvent - elastic) // 2, fewest - elastic, 1)
         least = max(fewest - elastic, 0 if elastic else 1)
         while True:
-            fit = self._at(times, solvent, elastic)
+            amounts, squared = solved(self._design(times, solvent, elastic), self._target)
+            fit = self._named(np.sort(times), amounts, solvent, elastic, squared)
             if len(times) <= most:
                 fit = self._fitted(fit, _ROUGHLY)
                 if np.all(np.append(fit.modulus, fit.extra) > 0.0):
@@ -179,10 +177,6 @@ class ModeSearch:
             for t in trials
         ]  # fmt: skip
         return trials[int(np.argmin(costs))]
-
-    def _at(self, times: np.ndarray, solvent: bool, elastic: bool) -> ModeFit:
-        amounts, squared = solved(self._design(times, solvent, elastic), self._target)
-        return self._named(np.sort(times), amounts, solvent, elastic, squared)
 
     def _named(self, times, amounts, solvent: bool, elastic: bool, squared: float) -> ModeFit:
         viscosity = float(amounts[len(times)]) if solvent else None

@@ -47,17 +47,18 @@ class ShiftLaw:
         return _LAWS[self.name][0](celsius, reference, *self.values.values())
 
 
-def _wlf(celsius, reference, c1, c2):
-    return -c1 * (celsius - reference) / (c2 + celsius - reference)
-
-
-def _arrhenius(celsius, reference, energy):
-    return energy / R / np.log(10.0) * (1.0 / (celsius + 273.15) - 1.0 / (reference + 273.15))
-
-
+# log10 a_T at temperatures and a reference in °C, and the constants with values to start from
 _LAWS = {
-    "WLF": (_wlf, {"C1": 10.0, "C2_K": 100.0}),
-    "Arrhenius": (_arrhenius, {"activation_energy_J_mol": 5e4}),
+    "WLF": (
+        lambda celsius, at, c1, c2: -c1 * (celsius - at) / (c2 + celsius - at),
+        {"C1": 10.0, "C2_K": 100.0},
+    ),
+    "Arrhenius": (
+        lambda celsius, at, energy: (
+            energy / R / np.log(10.0) * (1.0 / (celsius + 273.15) - 1.0 / (at + 273.15))
+        ),
+        {"activation_energy_J_mol": 5e4},
+    ),
 }
 
 
@@ -192,7 +193,6 @@ def superpose(
     celsius = np.array(sorted(found))
     shifts = np.array([found[t][0] for t in celsius])
     errors = np.sqrt([np.diag(found[t][1]) for t in celsius])
-    at = int(np.flatnonzero(celsius == reference)[0])
     at = int(np.flatnonzero(celsius == reference)[0])
     fitted = (_fit_law(name, celsius, shifts[:, 0], at) for name in _LAWS)
     laws = tuple(law for law in fitted if law is not None)

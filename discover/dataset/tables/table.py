@@ -62,8 +62,8 @@ class Table:
         columns = {name: [cells[i] for i in chosen] for name, cells in self.columns.items()}
         return replace(self, columns=columns, lines=[self.lines[i] for i in chosen])
 
-    def numbers(self, column: str) -> Float[np.ndarray, " n"]:
-        """Return a column as finite numbers, those next to nothing as 0; InputError if none."""
+    def numbers(self, column: str, factor: float = 1.0) -> Float[np.ndarray, " n"]:
+        """Return a column times a factor, what is next to nothing as 0; InputError if no number."""
         text = self.columns[column]
         # as Python reads them: pandas before 3 drops the last of many digits
         values = np.array([float(c) if _NUMBER.fullmatch(c) else np.nan for c in text])
@@ -74,14 +74,16 @@ class Table:
                 f"{column} in {self.name} must hold finite numbers; line {self.lines[row]} holds "
                 f"{shown(text[row])}. {_remedy(text[row], row)}{self.like_it(rows)}"
             )
-        row = int(np.argmax(np.abs(values) > LARGEST_VALUE))
+        values = np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values * factor)
+        row = int(np.argmax(np.abs(values)))
         if abs(values[row]) > LARGEST_VALUE:
+            made = "" if factor == 1.0 else f", which is {values[row]:g} in SI units"
             raise InputError(
-                f"{column} in {self.name} holds {values[row]:g} on line {self.lines[row]}, more "
-                f"than any measurement (the limit is {LARGEST_VALUE:g}). Correct or remove that "
-                "line."
+                f"{column} in {self.name} holds {shown(text[row])} on line {self.lines[row]}{made}:"
+                f" more than any measurement (the limit is {LARGEST_VALUE:g}). Correct that line, "
+                "or the unit in the heading."
             )
-        return np.where(np.abs(values) < SMALLEST_VALUE, 0.0, values)
+        return values
 
     def like_it(self, rows: Int[np.ndarray, " faulty"]) -> str:
         """Return which lines of the file have the fault of the first of some rows too."""
@@ -107,18 +109,7 @@ class Table:
             found = find_column(tuple(self.columns), quantity)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from error
-        if found is None:
-            return None
-        column, factor = found
-        values = self.numbers(column) * factor
-        if np.any(np.abs(values) > LARGEST_VALUE):
-            row = int(np.argmax(np.abs(values)))
-            raise InputError(
-                f"{column} in {self.name} holds {self.columns[column][row]} on line "
-                f"{self.lines[row]}, which is {values[row]:g} {quantity.unit}, more than any "
-                "measurement. Correct that line, or the unit in the heading."
-            )
-        return values
+        return None if found is None else self.numbers(*found)
 
     def required(self, quantity: Quantity) -> Float[np.ndarray, " n"]:
         """Return a quantity in SI units; InputError if no column holds it, or it is wrong."""

@@ -10,58 +10,35 @@ from typing import Any
 
 from discover.equations.equation import Equation
 from discover.equations.formats.latex_file import header_lines
-from discover.equations.formats.structure_code import NOTHING, stepped, structure_fields
-from tensor_library.notation import Notation, printed
+from tensor_library.notation import TextNotation, printed
 from tensor_library.terms import parse_term
 
 
-class CodeNotation(Notation[str]):
+class CodeNotation(TextNotation):
     """numpy, and what the other texts in Python share with it."""
 
-    def tensor(self, name: str) -> str:
-        """Return the variable that holds the tensor."""
-        return {"I": "unit", "sigma": "s", "gammadot": "d"}[name]
-
-    def contraction(self, tensors: Sequence[str]) -> str:
-        """Return the matrix product."""
-        return " @ ".join(tensors)
-
-    def sum(self, summands: Sequence[str]) -> str:
-        """Return the bracketed sum."""
-        return f"({' + '.join(summands)})"
+    tensors = {"I": "unit", "sigma": "s", "gammadot": "d"}  # noqa: RUF012
+    dot, times, powered = " @ ", " * ", "{} ** {}"
+    # with the cap of the library: beyond it a law is absurd, not infinite
+    exponential_form = "np.expm1(min({rate} * {trace}, 60.0))"
+    saturating_form = "({trace} / (1 + {level} * abs({trace})))"
 
     def trace(self, tensor: str) -> str:
         """Return a call of the method of matrices."""
         return f"{tensor if tensor.isidentifier() else f'({tensor})'}.trace()"
 
-    def power(self, scalar: str, exponent: int) -> str:
-        """Return the power."""
-        return f"{scalar} ** {exponent}"
-
-    def number(self, value: float) -> str:
-        """Return all digits of a number, bracketed if negative."""
-        return f"({float(value)!r})" if value < 0 else repr(float(value))
+    def digits_of(self, value: float) -> str:
+        """Return all digits."""
+        return repr(float(value))
 
     def letter(self, name: str) -> str:
         """Refuse: every term of an equation has its numbers."""
         raise ValueError(f"Code needs a number for {name}.")
 
-    def exponential(self, rate: str, trace: str) -> str:
-        """Return exp − 1 with the cap of the library: beyond it a law is absurd, not infinite."""
-        return f"np.expm1(min({rate} * {trace}, 60.0))"
-
-    def saturating(self, level: str, trace: str) -> str:
-        """Return the bracketed fraction."""
-        return f"({trace} / (1 + {level} * abs({trace})))"
-
     def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
         """Return the expression as SymPy prints it."""
         text, _ = printed(expression, letters, self._text)
         return f"({text})" if factor else text
-
-    def product(self, factors: Sequence[str]) -> str:
-        """Return the product."""
-        return " * ".join(factors)
 
     def _text(self, expression: Any) -> str:
         from sympy.printing.numpy import NumPyPrinter
@@ -74,11 +51,8 @@ class CodeNotation(Notation[str]):
 
 
 class _SympyCodeNotation(CodeNotation):
-    def exponential(self, rate: str, trace: str) -> str:
-        return f"(sympy.exp({rate} * {trace}) - 1)"
-
-    def saturating(self, level: str, trace: str) -> str:
-        return f"({trace} / (1 + {level} * sympy.Abs({trace})))"
+    exponential_form = "(sympy.exp({rate} * {trace}) - 1)"
+    saturating_form = "({trace} / (1 + {level} * sympy.Abs({trace})))"
 
     def _text(self, expression: Any) -> str:
         from sympy.printing.pycode import SymPyPrinter
@@ -89,6 +63,9 @@ class _SympyCodeNotation(CodeNotation):
 
         return re.sub(r"sympy\.functions(\.\w+)+\.", "sympy.", str(Printer().doprint(expression)))
 
+
+# Lines of templates that begin so are for laws with a name, structure variables or states alone
+_MARKS: tuple[str, ...] = ("N|", "V|", "S|")
 
 _NUMPY_TEMPLATE = '''"""Constitutive law, written by discover. Needs numpy only.
 
@@ -108,32 +85,79 @@ MODULUS_PA = np.array({modulus})
 RELAXATION_TIME_S = np.array({time})
 SOLVENT_VISCOSITY_PA_S = {solvent}
 TESTED = {tested}
-{constants}{structure}
+N|CONSTANTS = {constants}
+S|STRUCTURE = {state_constants}
+S|STRUCTURE_AT_REST = {at_rest}
+
 
 def extra_term(s, d{mode}{also}):
     """Return h, dimensionless, shape (3, 3), of scaled stress s and scaled rate d."""
     unit = np.eye(3)
 {where}    return {extra}
 
-{variables_rate}
+
 def stress_rate(stress, velocity_gradient{also}{structured}):
     """Return d(stress)/dt of every mode in Pa/s, shape (modes, 3, 3).
 
     stress: of every mode in Pa, shape (modes, 3, 3); zero at rest.
-    velocity_gradient: in 1/s, shape (3, 3).{of_variables}{structure_of}
+    velocity_gradient: in 1/s, shape (3, 3).
+V|    variables: {variables} of every mode, dimensionless, shape (modes, number); zero at rest.
+S|    structure: {state_names}, one value each for the whole fluid.
     """
     rate = np.empty_like(stress)
-    for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times})):
+    for k, (modulus, time) in enumerate(zip(MODULUS_PA, {time_factor}RELAXATION_TIME_S)):
         s, gradient = stress[k] / modulus, time * velocity_gradient
         d = gradient + gradient.T
         change = d + gradient @ s + s @ gradient.T{relaxation} - extra_term(s, d{of_mode}{also_k})
         rate[k] = modulus / time * change
     return rate
 
+V|
+V|def variables_rate(stress, velocity_gradient, variables{structured}):
+V|    """Return the rates of change of {variables} in 1/s, shape (modes, {count}).
+V|
+V|    Parameters as of `stress_rate`.
+V|    """
+V|    d = velocity_gradient + velocity_gradient.T
+V|    return np.array([
+V|        scaled_rates(stress[k] / modulus, time * d, k, variables[k]) / time
+V|        for k, (modulus, time) in enumerate(zip(MODULUS_PA, {time_factor}RELAXATION_TIME_S))
+V|    ])
+V|
+V|
+V|def scaled_rates(s, d, mode, variables):
+V|    """Return the rates of change of {variables}, times the relaxation time."""
+V|    unit = np.eye(3)
+V|{where}    return np.array([{rates}])
+V|
+S|
+S|def structure_factors(structure):
+S|    """Return the factors on the stress and on the relaxation time of every mode.
+S|
+S|    structure: {state_names}.
+S|    """
+S|    {state_names}, = structure
+S|    return {on_modulus}, {on_time}
+S|
+S|
+S|def structure_rate(stress, velocity_gradient, structure):
+S|    """Return the rates of change of {state_names} in 1/s, which are of the whole fluid.
+S|
+S|    stress, velocity_gradient: as of `stress_rate`. Of the stress that counts which a shear of the
+S|    same rate has that does the same work; where nothing flows, the component 12.
+S|    """
+S|    {state_names}, = structure
+S|    d = velocity_gradient + velocity_gradient.T
+S|    own = structure_factors(structure)[0] * stress.sum(axis=0)
+S|    shear_rate = np.sqrt(0.5 * np.sum(d * d))
+S|    shear_stress = 0.5 * np.sum(own * d) / shear_rate if shear_rate > 0.0 else own[0, 1]
+S|    return np.array([{state_rates}])
+S|
 
 def total_stress(stress, velocity_gradient{structured}):
     """Return the extra stress in Pa, shape (3, 3): all modes and the solvent."""
-    return {total}
+    viscous = SOLVENT_VISCOSITY_PA_S * (velocity_gradient + velocity_gradient.T)
+    return {modulus_factor}stress.sum(axis=0) + viscous
 
 
 def simulate_shear(shear_rate, times, step=0.02):
@@ -150,17 +174,28 @@ def simulate_shear(shear_rate, times, step=0.02):
         return g
 
     def change(t, state):
-        stress = state[:, :9].reshape(-1, 3, 3){taken}
-        return {change}
+        stress = state[:, :9].reshape(-1, 3, 3)
+V|        variables = state[:, 9:{last}]
+S|        structure = state[0, {last}:]
+        rates = [stress_rate(stress, gradient(t){also}{structured}).reshape(-1, 9)]
+V|        rates.append(variables_rate(stress, gradient(t), variables{structured}))
+S|        of_structure = structure_rate(stress, gradient(t), structure)
+S|        rates.append(np.tile(of_structure, (len(stress), 1)))  # every mode carries it along
+        return np.hstack(rates)
 
     def components(t, state):
-        total = total_stress(state[:, :9].reshape(-1, 3, 3), gradient(t){last})
+        stress = state[:, :9].reshape(-1, 3, 3)
+S|        structure = state[0, {last}:]
+        total = total_stress(stress, gradient(t){structured})
         return total[0, 1], total[0, 0] - total[1, 1], total[1, 1] - total[2, 2]
 
-    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size})){begun}
+    t, state = float(times[0]), np.zeros((len(MODULUS_PA), {size}))
+S|    state[:, {last}:] = STRUCTURE_AT_REST
     rows = [components(t, state)]
     for end in times[1:]:
-        fastest = max({fastest}, abs(shear_rate(t)), abs(shear_rate(end)))
+S|        structure = state[0, {last}:]
+        shortest = np.min({time_factor}RELAXATION_TIME_S)
+        fastest = max(1.0 / shortest, abs(shear_rate(t)), abs(shear_rate(end)))
         n = max(1, int(np.ceil((end - t) * fastest / step)))
         h = (end - t) / n
         for _ in range(n):
@@ -201,32 +236,20 @@ tested = {tested}
 {constants}
 {where}extra_term = {extra}
 stress_rate = d + gradient @ s + s @ gradient.T{relaxation} - extra_term
-{variables_rate}{structure}'''
-
-_NUMPY_RATES = '''
-def variables_rate(stress, velocity_gradient, variables{structured}):
-    """Return the rates of change of {names} in 1/s, shape (modes, {count}).
-
-    Parameters as of `stress_rate`.
-    """
-    return np.array([
-        scaled_rates(
-            stress[k] / modulus, time * (velocity_gradient + velocity_gradient.T), k, variables[k]
-        ) / time
-        for k, (modulus, time) in enumerate(zip(MODULUS_PA, {times}))
-    ])
-
-
-def scaled_rates(s, d, mode, variables):
-    """Return the rates of change of {names}, times the relaxation time."""
-    unit = np.eye(3)
-{where}    return np.array([{rates}])
-
+V|# of the structure variables, with time in lambda_k; each is 0 at rest
+V|variables = [{variables}]
+V|variables_rate = [{rates}]
+S|
+S|# states of the whole fluid, from structure_at_rest; their rates in 1/s follow the size of the
+S|# rate of deformation, sqrt(d:d/2) in 1/s, and the stress in Pa of a shear of that size that does
+S|# the same work. The factors are those on the stress of every mode and on every lambda_k
+S|structure = {state_names}, = sympy.symbols("{state_names},", real=True)
+S|structure_at_rest = {at_rest}
+S|shear_rate, shear_stress = sympy.symbols("shear_rate shear_stress", real=True)
+S|structure_rate = [{state_rates}]
+S|modulus_factor = sympy.sympify({on_modulus})
+S|time_factor = sympy.sympify({on_time})
 '''
-_SYMPY_RATES = """# of the structure variables, with time in lambda_k; each is 0 at rest
-variables = [{names}]
-variables_rate = [{rates}]
-"""
 
 
 def numpy_code(equation: Equation) -> str:
@@ -234,10 +257,7 @@ def numpy_code(equation: Equation) -> str:
 
     Raises InputError if the equation has a named law without written form.
     """
-    return filled(
-        _NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))", rates=_NUMPY_RATES,
-        structure=structure_fields(equation, CodeNotation(), "numpy"),
-    )  # fmt: skip
+    return filled(_NUMPY_TEMPLATE, equation, CodeNotation(), "np.zeros((3, 3))")
 
 
 def sympy_code(equation: Equation) -> str:
@@ -257,63 +277,86 @@ def sympy_code(equation: Equation) -> str:
         )
     for name in () if named is None else named.function.rates:
         constants += f'{name} = sympy.Symbol("{name}", real=True)\n'
-    return filled(
-        _SYMPY_TEMPLATE, equation, _SympyCodeNotation(), "sympy.zeros(3, 3)", constants, "",
-        _SYMPY_RATES, structure_fields(equation, _SympyCodeNotation(), "sympy"),
-    )  # fmt: skip
-
-
-_OF_VARIABLES = """
-    variables: {names} of every mode, dimensionless, shape (modes, number); zero at rest."""
+    notation, nothing = _SympyCodeNotation(), "sympy.zeros(3, 3)"
+    return filled(_SYMPY_TEMPLATE, equation, notation, nothing, constants, indent="")
 
 
 def filled(
     template: str, equation: Equation, notation: CodeNotation, nothing: str,
-    constants: str | None = None, indent: str = "    ", rates: str = "",
-    structure: Mapping[str, str] = NOTHING,
+    constants: str | None = None, indent: str = "    ",
 ) -> str:  # fmt: skip
     """Return a module: a template with the law in a notation.
 
-    `constants`: holder of a named law's constants; by default a list with a table for each mode.
-    `rates`: template of the rates of structure variables. `structure`: from `structure_fields`.
+    `constants`: of a named law, as text; by default a list with a table for each mode.
+    `indent`: of what stands in functions; empty where nothing does.
     """
     named = equation.named
     pairs = zip(equation.modulus, equation.relaxation_time, strict=True)
     lines = [parse_term(t.term).spell(notation, t.coefficient, t.inner) for t in equation.terms]
-    where, table, changing, variables = "", "", "", ()
+    where, rates, variables = "", "", ()
     if named is not None:
         function = named.function
         variables = tuple(function.rates)
         letters = {name: f'constant["{name}"]' for name in function.constants}
         letters |= {name: name for name in (*function.where, *variables)}
         defined, summands = function.spell(notation, letters)
+        rates = ", ".join(text for _, text in function.spell_rates(notation, letters))
         where = "".join(f"{indent}{name} = {value}\n" for name, value in defined)
         lines = summands + lines
-        table = f"CONSTANTS = {_constants(equation)}\n"
+        constants = _constants(equation) if constants is None else constants
         if indent:
             given = "".join(f"{indent}{n} = variables[{i}]\n" for i, n in enumerate(variables))
             where = f"{indent}constant = CONSTANTS[mode]\n" + given + where
-        if variables:
-            changing = rates.format(
-                names=", ".join(variables),
-                count=len(variables),
-                where=where,
-                rates=", ".join(text for _, text in function.spell_rates(notation, letters)),
-                **structure,
-            )
-    return template.format(
+    there = dict(zip(_MARKS, (named, variables, equation.states), strict=True))
+    kept = [
+        line[2:] if line[:2] in there else line
+        for line in template.splitlines(keepends=True)
+        if there.get(line[:2], True)
+    ]
+    last = 9 + len(variables)
+    return "".join(kept).format(
         header="\n".join(header_lines(equation)) or "Where it was tested is not recorded.",
         relaxation=" - s" if equation.linear_relaxation else "", modulus=_numbers(equation.modulus),
         time=_numbers(equation.relaxation_time),
         modes="[" + ", ".join(f"({float(g)!r}, {float(time)!r})" for g, time in pairs) + "]",
         solvent=repr(float(equation.solvent_viscosity)), tested=_tested(equation),
-        constants=table if constants is None else constants,
+        constants=constants or "",
         mode=", mode" if variables else ", mode=0" if named else "", of_mode=", k" if named else "",
         also=", variables" if variables else "", also_k=", variables[k]" if variables else "",
-        of_variables=_OF_VARIABLES.format(names=", ".join(variables)) if variables else "",
-        variables_rate=changing, **structure, **stepped(equation, len(variables)), where=where,
+        variables=", ".join(variables), count=len(variables), rates=rates, where=where,
+        last=last, size=last + sum(len(part.names) for part in equation.states),
         extra="(\n        " + "\n        + ".join(lines) + "\n    )" if lines else nothing,
+        **_of_states(equation, notation, by_name=bool(indent)),
     )  # fmt: skip
+
+
+def _of_states(equation: Equation, notation: CodeNotation, by_name: bool) -> dict[str, str]:
+    """Return the fields of a template that say what states of the whole fluid do."""
+    constants, names, rest, rates, moduli, times = {}, [], [], [], [], []
+    for part in equation.states:
+        constants[part.effect] = {name: float(value) for name, value in part.values.items()}
+        names += part.names
+        rest += [float(value) for value in part.at_rest]
+        letters = {name: name for name in (*part.names, "shear_rate", "shear_stress")}
+        for name, value in part.values.items():
+            held = f'STRUCTURE["{part.effect}"]["{name}"]'
+            letters[name] = held if by_name else repr(float(value))
+        own, modulus, time = part.spell(notation.scalar, letters)
+        rates += own
+        moduli += [f"({modulus})"] if modulus != "1" else []
+        times += [f"({time})"] if time != "1" else []
+    there = bool(names)
+    return {
+        "state_constants": repr(constants),
+        "state_names": ", ".join(names),
+        "at_rest": repr(rest),
+        "state_rates": ", ".join(rates),
+        "on_modulus": " * ".join(moduli) or "1.0",
+        "on_time": " * ".join(times) or "1.0",
+        "structured": ", structure" if there else "",
+        "modulus_factor": "structure_factors(structure)[0] * " if there else "",
+        "time_factor": "structure_factors(structure)[1] * " if there else "",
+    }
 
 
 def _constants(equation: Equation) -> str:

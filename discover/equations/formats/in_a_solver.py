@@ -1,7 +1,8 @@
 """Limits of a law in a flow solver: longest stable step, and positivity of the conformation."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from itertools import count
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,19 +18,14 @@ _MOST_EVALUATIONS = 40_000  # some five seconds; a law of ten modes takes about 
 _TRUE_RATE = 1e-6  # of what decays, over 1/λ: slower than this nothing limits a step
 
 
-@dataclass(frozen=True)
-class InASolver:
-    """Extremes over the edge of a law's box.
-
-    `smallest_eigenvalue`, `of_mode`: of the conformation (I + σ_k/G_k; of chains that end, I +
-    σ_k/(k G_k)), and its mode from 1; NaN where the law diverged. `largest_step`, `limiting_mode`:
-    longest stable step of explicit Euler for the stress of a mode, in s; infinite where nothing
-    decays.
-    """
+class InASolver(NamedTuple):
+    """Extremes over the edge of a law's box."""
 
     weissenberg: float  # largest Wi of the box, at which the flows were
+    # of the conformation, I + σ_k/G_k (of chains that end, I + σ_k/(k G_k)); NaN if it diverged
     smallest_eigenvalue: float
-    of_mode: int
+    of_mode: int  # from 1
+    # stable with explicit Euler for the stress of a mode, in s; infinite where nothing decays
     largest_step: float
     limiting_mode: int
 
@@ -58,18 +54,6 @@ class _Spent(Exception):
     """The evaluations that a check may take are used up."""
 
 
-class _Budget:
-    """Evaluations that are left."""
-
-    def __init__(self, left: int):
-        self._left = left
-
-    def take(self) -> None:
-        self._left -= 1
-        if self._left < 0:
-            raise _Spent
-
-
 def in_a_solver(equation: Equation) -> InASolver | str | None:
     """Return how a law behaves at the edge of the box in which it was learned.
 
@@ -82,7 +66,7 @@ def in_a_solver(equation: Equation) -> InASolver | str | None:
         return None
     mean, box = equation.mean_relaxation_time, equation.tested.learned_in
     amplitude = box.weissenberg[1] / mean
-    budget = _Budget(_MOST_EVALUATIONS)
+    evaluations = count()
     eigenvalues, steps = [], []
     for k, time in enumerate(equation.relaxation_time):
         law = equation.mode(k).law()
@@ -93,7 +77,7 @@ def in_a_solver(equation: Equation) -> InASolver | str | None:
                 continue
             flows.append((frequency, _PERIODS * 2.0 * np.pi / frequency))
         try:
-            found = [_extremes(law, time * amplitude, *flow, budget) for flow in flows]
+            found = [_extremes(law, time * amplitude, *flow, evaluations) for flow in flows]
         except _Spent:
             return NOT_CHECKED
         lowest, longest = np.transpose(found)
@@ -101,13 +85,8 @@ def in_a_solver(equation: Equation) -> InASolver | str | None:
         steps.append(time * longest.min())
     worst = int(np.argmin(eigenvalues))  # a NaN counts as the least
     limiting = int(np.argmin(steps))
-    return InASolver(
-        weissenberg=box.weissenberg[1],
-        smallest_eigenvalue=float(eigenvalues[worst]),
-        of_mode=worst + 1,
-        largest_step=float(steps[limiting]),
-        limiting_mode=limiting + 1,
-    )
+    smallest, largest = float(eigenvalues[worst]), float(steps[limiting])
+    return InASolver(box.weissenberg[1], smallest, worst + 1, largest, limiting + 1)
 
 
 @jax.jit
@@ -122,7 +101,7 @@ _jacobians: Callable = jax.jit(jax.vmap(jax.jacfwd(_rate, argnums=1), in_axes=(N
 
 
 def _extremes(
-    law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float, budget: _Budget
+    law: AbstractConstitutiveLaw, amplitude: float, frequency: float, end: float, evaluations: count
 ) -> tuple[float, float]:
     """Return the smallest eigenvalue of A and the longest step; NaN if σ diverges."""
     times = np.linspace(0.0, end, _SAMPLES)
@@ -131,7 +110,8 @@ def _extremes(
         return jnp.asarray(amplitude * np.cos(frequency * t))
 
     def change(t, y):
-        budget.take()
+        if next(evaluations) >= _MOST_EVALUATIONS:
+            raise _Spent
         return np.asarray(_rate(law, jnp.asarray(y), rate_at(t)))
 
     found = solve_ivp(

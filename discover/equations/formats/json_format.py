@@ -29,14 +29,16 @@ class _Box(Section):
     Wi: tuple[float, float]
     De: tuple[float, float]
 
-    def box(self) -> Box:
-        return Box(self.Wi, self.De)
-
 
 class _Tested(Section):
     learned_in: _Box
     judged_in: _Box | None = None
     worst_errors: dict[str, float] = Field(default_factory=dict)
+
+    def read(self) -> Tested:
+        learned, judged = self.learned_in, self.judged_in
+        box = Box(learned.Wi, learned.De)
+        return Tested(box, judged and Box(judged.Wi, judged.De), self.worst_errors)
 
 
 class _Named(Section):
@@ -64,11 +66,12 @@ class _Law(Section):
 
 def equation_to_json(equation: Equation) -> dict[str, Any]:
     """Return an equation as JSON-able values; `equation_from_json` undoes it exactly."""
-    tested, named = equation.tested, equation.named
+    tested, named, beside = equation.tested, equation.named, {}
     # only where there is one: results without stay as they were
-    below = {"law": named.law, "constants": [dict(c) for c in named.constants]} if named else None
-    states = [{"effect": s.effect, "parameters": dict(s.values)} for s in equation.states]
-    beside = ({} if below is None else {"named": below}) | ({"states": states} if states else {})
+    if named is not None:
+        beside["named"] = {"law": named.law, "constants": [dict(c) for c in named.constants]}
+    if states := [{"effect": s.effect, "parameters": dict(s.values)} for s in equation.states]:
+        beside["states"] = states
     return beside | {
         "format": FORMAT,
         "title": equation.title,
@@ -84,11 +87,10 @@ def equation_to_json(equation: Equation) -> dict[str, Any]:
             for g, time in zip(equation.modulus, equation.relaxation_time, strict=True)
         ],
         "solvent_viscosity_Pa_s": equation.solvent_viscosity,
-        "tested": None
-        if tested is None
-        else {
+        "tested": tested
+        and {
             "learned_in": _box(tested.learned_in),
-            "judged_in": None if tested.judged_in is None else _box(tested.judged_in),
+            "judged_in": tested.judged_in and _box(tested.judged_in),
             "worst_errors": dict(tested.worst_errors),
         },
     }
@@ -114,13 +116,7 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
             solvent_viscosity=law.solvent_viscosity_Pa_s,
             title=law.title,
             notes=law.notes,
-            tested=None
-            if tested is None
-            else Tested(
-                tested.learned_in.box(),
-                None if tested.judged_in is None else tested.judged_in.box(),
-                tested.worst_errors,
-            ),
+            tested=None if tested is None else tested.read(),
             named=None if named is None else NamedPart(named.law, named.constants),
             states=tuple(StatePart(state.effect, state.parameters) for state in law.states),
         )

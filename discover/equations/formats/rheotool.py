@@ -28,37 +28,28 @@ _SLIP = "sigma.gammadot+gammadot.sigma"
 _LINEAR = "tr(sigma)*sigma"
 _PLAIN, _STRESS, _TIME = "[0 0 0 0 0 0 0]", "[1 -1 -2 0 0 0 0]", "[0 0 1 0 0 0 0]"
 _TIMES = ("lambda", "lambdaB", "lambdaS", "lambdaD", "lambdaR", "K", "L")
+_DENSITY, _VISCOSITY = "[1 -3 0 0 0 0 0]", "[1 -1 -1 0 0 0 0]"
 QUANTITIES = {
-    "density": "[1 -3 0 0 0 0 0]",
-    "viscosity": "[1 -1 -1 0 0 0 0]",
-    "stress": _STRESS,
-    "time": _TIME,
+    "density": _DENSITY, "viscosity": _VISCOSITY, "stress": _STRESS, "time": _TIME,
     "number": _PLAIN,
-}
+}  # fmt: skip
 """Dimensions as OpenFOAM writes them."""
 
 _DIMENSIONS = {
-    "rho": QUANTITIES["density"],
-    "etaS": QUANTITIES["viscosity"],
-    "etaP": QUANTITIES["viscosity"],
-    "tau0": _STRESS,
+    "rho": _DENSITY, "etaS": _VISCOSITY, "etaP": _VISCOSITY, "tau0": _STRESS,
     **dict.fromkeys(_TIMES, _TIME),
-}
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
 class RheoToolModel:
-    """Law in rheoTool's words: `type`, word `options`, and `parameters` over time and modulus.
-
-    `drive`, `relax`: factors on modulus and relaxation rate by terms ``gammadot`` and ``sigma``.
-    `notes`: what was passed over.
-    """
+    """Law in rheoTool's words."""
 
     type: str  # entry ``type``
     options: dict[str, str]  # entries that are words
-    parameters: dict[str, float]
-    drive: float = 1.0
-    relax: float = 1.0
+    parameters: dict[str, float]  # over time and modulus
+    drive: float = 1.0  # factor on the modulus by terms ``gammadot``
+    relax: float = 1.0  # factor on the relaxation rate by terms ``sigma``
     notes: tuple[str, ...] = ()  # what was passed over
 
 
@@ -215,11 +206,14 @@ def _entries(model: RheoToolModel, g: float, time: float, solvent: float, densit
         "rho": density,
         "etaS": solvent,
         "etaP": modulus * relaxation_time,
-        "lambda": relaxation_time * extension_factor(model.parameters.get("L2")),
+        "lambda": relaxation_time,
     }
+    if "L2" in model.parameters:  # rheoTool's relaxation time over this package's
+        values["lambda"] *= model.parameters["L2"] / (model.parameters["L2"] - 3.0)
     yield f"{'type':<17}{model.type};"
+    units = {_TIME: relaxation_time, _STRESS: modulus}
     for name, value in model.parameters.items():
-        values[name] = value * unit_of(name, modulus, relaxation_time)
+        values[name] = value * units.get(_DIMENSIONS.get(name, _PLAIN), 1.0)
     for name, value in values.items():
         yield _entry(name, _DIMENSIONS.get(name, _PLAIN), float(value))
     for name, word in model.options.items():
@@ -229,17 +223,6 @@ def _entries(model: RheoToolModel, g: float, time: float, solvent: float, densit
 
 def _entry(name: str, dimensions: str, value: float) -> str:
     return f"{name:<17}{name} {dimensions} {value!r};"
-
-
-def unit_of(name: str, modulus: float, relaxation_time: float) -> float:
-    """Return in what an entry is counted in a mode: its modulus in Pa, its time in s, or 1."""
-    units = {_TIME: relaxation_time, _STRESS: modulus}
-    return units.get(_DIMENSIONS.get(name, _PLAIN), 1.0)
-
-
-def extension_factor(limit: float | None) -> float:
-    """Return a = L²/(L² − 3), rheoTool's relaxation time over this package's; 1 without L²."""
-    return 1.0 if limit is None else limit / (limit - 3.0)
 
 
 def _of_name(equation: Equation) -> RheoToolModel:

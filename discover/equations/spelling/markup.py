@@ -7,7 +7,7 @@ from discover.equations.parts import NamedPart
 from tensor_library import LawTerm, parse_term
 from tensor_library.notation import (
     LatexNotation,
-    Notation,
+    TextNotation,
     greek_letter,
     latex_number,
     printed,
@@ -43,14 +43,8 @@ def law_latex(
     defined: list[tuple[str, str]] = []
     if named is not None:
         spelled = latex_letters(named, notation)
-        defined, summands = named.function.spell(notation, spelled)
+        summands, defined = _named(named, notation, spelled, r"\dot{{{}}}")
         text += "".join(f" + {summand}" for summand in summands)
-        defined = [(spelled[name], value) for name, value in defined]
-        rates = named.function.spell_rates(notation, spelled)
-        defined = [(rf"\dot{{{spelled[name]}}}", value) for name, value in rates] + defined
-        constants = named.constants[0].items()
-        fixed = [(spelled[n], v) for n, v in constants if n not in named.differing]
-        defined += [(letter, latex_number(value, digits)) for letter, value in fixed]
     letters: dict[str, float] = {}
     for term in terms:
         # a letter has one value in an equation; where it has another, that number stands itself
@@ -62,6 +56,24 @@ def law_latex(
     text += r" = \dot{\boldsymbol{\gamma}}"
     defined += [(notation.letter(n), latex_number(v, digits)) for n, v in letters.items()]
     return text + "".join(f"{SEPARATOR}{letter} = {value}" for letter, value in defined)
+
+
+def _named(
+    named: NamedPart, notation: TextNotation, letters: Mapping[str, str], rate: str
+) -> tuple[Sequence[str], list[tuple[str, str]]]:
+    """Return the summands of a named law, and what its rates, scalars and constants are."""
+    function, fixed = named.function, named.constants[0]
+    defined, summands = function.spell(notation, letters)
+    rates = function.spell_rates(notation, letters)
+    return summands, [
+        *((rate.format(letters[name]), value) for name, value in rates),
+        *((letters[name], value) for name, value in defined),
+        *(
+            (letters[n], notation.digits_of(v))
+            for n, v in fixed.items()
+            if n not in named.differing
+        ),
+    ]
 
 
 def _factor(term: LawTerm) -> float | None:
@@ -90,6 +102,7 @@ _TENSORS = {"I": _BOLD.format("I"), "sigma": _BOLD.format("σ"), "gammadot": _BO
 _APPLIED = "<mo>&#x2061;</mo>"
 _TRACE = f'<mi mathvariant="normal">tr</mi>{_APPLIED}'
 _SPACE = "<mspace width='0.15em'/>"
+_BRACKETS = "<mrow><mo>(</mo>{}<mo>)</mo></mrow>"
 
 
 def number(value: float) -> str:
@@ -103,49 +116,30 @@ def number(value: float) -> str:
     return body
 
 
-class MathmlNotation(Notation[str]):
+class MathmlNotation(TextNotation):
     """Presentation MathML, without `math` element."""
 
-    def tensor(self, name: str) -> str:
-        """Return a bold letter."""
-        return _TENSORS[name]
+    tensors = _TENSORS
+    dot, plus, times, brackets = "<mo>·</mo>", "<mo>+</mo>", _SPACE, _BRACKETS
+    whole = "<mrow>{}</mrow>"
+    traced = _TRACE + _BRACKETS
+    powered = f"<msup>{_BRACKETS}<mn>{{}}</mn></msup>"  # tr(σ)² could be taken for tr(σ²)
+    exponential_form = _BRACKETS.format(
+        f'<mi mathvariant="normal">exp</mi>{_APPLIED}'
+        f"{_BRACKETS.format(f'{{rate}}{_SPACE}{{trace}}')}<mo>−</mo><mn>1</mn>"
+    )
+    saturating_form = (
+        f"<mfrac><mrow>{{trace}}</mrow><mrow><mn>1</mn><mo>+</mo>{{level}}{_SPACE}"
+        "<mrow><mo>|</mo>{trace}<mo>|</mo></mrow></mrow></mfrac>"
+    )
 
-    def contraction(self, tensors: Sequence[str]) -> str:
-        """Return the tensors with dots between them."""
-        return "<mo>·</mo>".join(tensors)
-
-    def sum(self, summands: Sequence[str]) -> str:
-        """Return the bracketed sum."""
-        return _bracketed("<mo>+</mo>".join(summands))
-
-    def trace(self, tensor: str) -> str:
-        """Return tr of the bracketed contraction."""
-        return f"{_TRACE}{_bracketed(tensor)}"
-
-    def power(self, scalar: str, exponent: int) -> str:
-        """Return the bracketed trace and its exponent: tr(σ)² could be taken for tr(σ²)."""
-        return f"<msup>{_bracketed(scalar)}<mn>{exponent}</mn></msup>"
-
-    def number(self, value: float) -> str:
-        """Return a number, bracketed if negative."""
-        return _bracketed(number(value)) if value < 0 else number(value)
+    def digits_of(self, value: float) -> str:
+        """Return a number."""
+        return number(value)
 
     def letter(self, name: str) -> str:
         """Return a Greek letter, or the name itself."""
         return f"<mi>{greek_letter(name) or name}</mi>"
-
-    def exponential(self, rate: str, trace: str) -> str:
-        """Return the bracketed exponential minus one."""
-        exponential = _bracketed(f"{rate}{_SPACE}{trace}")
-        return _bracketed(
-            f'<mi mathvariant="normal">exp</mi>{_APPLIED}{exponential}<mo>−</mo><mn>1</mn>'
-        )
-
-    def saturating(self, level: str, trace: str) -> str:
-        """Return a fraction."""
-        size = f"<mrow><mo>|</mo>{trace}<mo>|</mo></mrow>"
-        below = f"<mn>1</mn><mo>+</mo>{level}{_SPACE}{size}"
-        return f"<mfrac><mrow>{trace}</mrow><mrow>{below}</mrow></mfrac>"
 
     def scalar(self, expression: Any, letters: Mapping[str, str], factor: bool = False) -> str:
         """Return the expression as SymPy typesets it."""
@@ -155,19 +149,11 @@ class MathmlNotation(Notation[str]):
             return sympy.mathml(found, printer="presentation")
 
         known = {
-            name: _bracketed(text) if text.startswith(_TRACE) else text
+            name: _BRACKETS.format(text) if text.startswith(_TRACE) else text
             for name, text in letters.items()
         }
         text, is_sum = printed(expression, known, printer, "<mi>{}</mi>")
-        return _bracketed(text) if factor and is_sum else f"<mrow>{text}</mrow>"
-
-    def product(self, factors: Sequence[str]) -> str:
-        """Return the factors with thin spaces between them."""
-        return f"<mrow>{_SPACE.join(factors)}</mrow>"
-
-
-def _bracketed(content: str) -> str:
-    return f"<mrow><mo>(</mo>{content}<mo>)</mo></mrow>"
+        return _BRACKETS.format(text) if factor and is_sum else f"<mrow>{text}</mrow>"
 
 
 def term_mathml(
@@ -228,17 +214,11 @@ def law_element(
         function = named.function
         names = (*function.constants, *function.where, *function.rates)
         letters = {n: notation.letter(n) for n in names}
-        defined, summands = function.spell(notation, letters)
+        dotted = "<mover><mrow>{}</mrow><mo>˙</mo></mover>"
+        summands, defined = _named(named, notation, letters, dotted)
         extra = [_SIGN.format("+") + one for one in summands] + extra
-        first = named.constants[0]
-        fixed = [(n, number(first[n])) for n in first if n not in named.differing]
-        rates = [
-            (f"<mover><mrow>{letters[n]}</mrow><mo>˙</mo></mover>", value)
-            for n, value in function.spell_rates(notation, letters)
-        ]
         where = [
-            f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}"
-            for left, value in [*rates, *((letters[n], value) for n, value in [*defined, *fixed])]
+            f"<mo>,</mo><mspace width='1em'/>{left}<mo>=</mo>{value}" for left, value in defined
         ]
     # all on the left, so that each term has the sign that tables and files give it
     time = notation.time if isinstance(notation, InUnitsNotation) else ""
