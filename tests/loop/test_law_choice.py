@@ -185,7 +185,8 @@ def test_a_maxwell_fluid_with_a_structure_and_nothing_else_is_thixotropic(
     theta = problem.zero.copy()
     for name in effects:
         theta[problem.model.positions(name)[0]] = 0.2
-    posterior, fit = Mock(Posterior, problem=problem), Mock(Fit, names=effects, theta=theta, memory={})
+    posterior = Mock(Posterior, problem=problem)
+    fit = Mock(Fit, names=effects, theta=theta, memory={})
     found = law_of(posterior, fit)
     assert (found and found[0]) == law
     assert is_thixotropic_maxwell(posterior, fit) == thixotropic
