@@ -25,7 +25,8 @@ class Fit:
     q). `log_evidence`: of the records given the hypothesis, by Laplace's method; minus infinity
     where an effect ends at zero or the law runs away. `at_an_end`: effects whose amplitude ended at
     zero. `without`: a run whose rows the fit does not see; None for none. `shifts`: what errors of
-    the moduli do to `predicted`, in Pa, shape (rows, k).
+    the moduli do to predictions, in Pa, shape (rows, k). `shifted`: the predictions that these are
+    of, shape (rows,).
     """
 
     names: tuple[str, ...]
@@ -44,6 +45,7 @@ class Fit:
     at_an_end: tuple[str, ...] = ()
     without: int | None = None
     shifts: Float[np.ndarray, "rows k"] | None = None
+    shifted: Float[np.ndarray, " rows"] | None = None
     damping: float = 1e-2
     memory: dict = field(default_factory=dict)
 

@@ -20,6 +20,10 @@ _STEP = 1e-4
 _MOVED = 0.1
 """Standard deviations by which moduli are moved; records at a given rate are linear in them."""
 
+_SHIFTED_ANEW = 0.03
+"""Of the records, how far predictions move before what errors of the moduli do is taken anew: these
+errors are some per cent of the records themselves."""
+
 _TRIALS = ((0.1, 0.0), (0.1, 10.0))
 """What is tried side by side: multiples of the last damping, and the least size over the usual one
 by which runs may differ, for from where they do not, it takes a leap to where they do."""
@@ -51,9 +55,9 @@ class Fitter:
         self.problem, self.rows = problem, rows
         self.noise = NoiseModel(rows, None, problem.noise)
         self._without: dict[int | None, NoiseModel] = {None: self.noise}
-        self._priors: dict[tuple[str, ...], Priors] = {}
+        self._priors: dict[tuple[str, ...], tuple[Priors, np.ndarray]] = {}
         self._moduli = self._moved_moduli()
-        self._shifts = np.zeros((len(rows), len(self._moduli) // 2))
+        self._shifts = np.zeros((len(rows), len(self._moduli)))
         self.errors = LinearErrors(problem, rows, self._shifts.shape[1])
 
     def noise_of(self, fit: Fit) -> NoiseModel:
@@ -65,23 +69,34 @@ class Fitter:
     # errors of moduli -------------------------------------------------------------------------
 
     def _moved_moduli(self) -> Float[np.ndarray, "k c"]:
-        """Return the moduli, moved by each independent error of theirs, up and down."""
+        """Return the moduli, moved by each independent error of theirs."""
         root, moduli = self.problem.modulus_root, self.problem.moduli
         if root is None:
             return np.zeros((0, len(moduli)))
         moves = np.zeros((root.shape[1], len(moduli)))
         moves[:, : len(root)] = _MOVED * root.T
-        return moduli + np.concatenate([moves, -moves])
+        return moduli + moves
 
     def shifts_at(self, theta: Float[np.ndarray, " p"]) -> Float[np.ndarray, "rows k"]:
         """Return what errors of the moduli do to the predictions of a vector, in Pa."""
-        return self._shifts_of(self.predict([theta] * len(self._moduli), self._moduli))
+        moduli = np.vstack([self.problem.moduli, self._moduli])
+        base, *moved = self.predict([theta] * len(moduli), moduli)
+        return self._shifts_of(np.array(moved).reshape(-1, len(base)), base)
 
-    def _shifts_of(self, found: Float[np.ndarray, "moved rows"]) -> Float[np.ndarray, "rows k"]:
-        """Return the change of predictions with each error, of predictions at `_moved_moduli`."""
-        up, down = np.split(found, 2)
+    def _shifts_of(
+        self, moved: Float[np.ndarray, "k rows"], predicted: Float[np.ndarray, " rows"]
+    ) -> Float[np.ndarray, "rows k"]:
+        """Return the change of predictions with each error, of those at `_moved_moduli`."""
         with _running_away():
-            return np.nan_to_num((up - down).T / (2.0 * _MOVED))
+            return np.nan_to_num((moved - predicted).T / _MOVED)
+
+    def _is_shifted_anew(self, fit: Fit) -> bool:
+        """Return whether what errors of the moduli do is to be taken at other constants."""
+        if fit.shifts is None:
+            return len(self._moduli) > 0
+        moved = (fit.predicted - fit.shifted) / self.rows.size
+        with _running_away():
+            return not np.sqrt(np.mean(moved**2)) < _SHIFTED_ANEW
 
     # predictions ------------------------------------------------------------------------------
 
@@ -109,9 +124,9 @@ class Fitter:
         """Return a hypothesis before its first step; what is not in it is not there."""
         key = tuple(names)
         if key not in self._priors:
-            self._priors[key] = Priors(self.priors(key))
-        priors, theta = self._priors[key], theta.copy()
-        absent = np.setdiff1d(np.arange(len(theta)), priors.positions)
+            free = Priors(self.priors(key))
+            self._priors[key] = free, np.setdiff1d(np.arange(len(theta)), free.positions)
+        (priors, absent), theta = self._priors[key], theta.copy()
         theta[absent] = self.problem.zero[absent]
         theta[priors.positions] = np.clip(theta[priors.positions], *priors.range.T)
         linear = np.zeros(len(self.errors)) if linear is None else linear
@@ -248,29 +263,36 @@ class Fitter:
     def linearise(self, fits: Sequence[Fit]) -> None:
         """Set the derivatives of fits, all of whose vectors are predicted side by side.
 
-        What errors of the moduli do is taken at the constants too, for it is in proportion to the
-        stress of each mode.
+        What errors of the moduli do is taken at the constants too where these have moved far, for
+        it is in proportion to the stress of each mode.
         """
         moved = [self._moved(fit) for fit in fits]
-        k, declared = len(self._moduli), self.problem.moduli
-        thetas = [theta for fit, some in zip(fits, moved, strict=True)
-                  for theta in [*some, *[fit.theta] * k]]  # fmt: skip
-        moduli = [one for some in moved for one in [*[declared] * len(some), *self._moduli]]
+        anew = [self._is_shifted_anew(fit) for fit in fits]
+        declared, thetas, moduli = self.problem.moduli, [], []
+        for fit, some, is_anew in zip(fits, moved, anew, strict=True):
+            shifted = self._moduli if is_anew else self._moduli[:0]
+            thetas += [*some, *[fit.theta] * len(shifted)]
+            moduli += [*[declared] * len(some), *shifted]
         found = self.predict(thetas, np.array(moduli).reshape(-1, len(declared)))
         place = 0
-        for fit, some in zip(fits, moved, strict=True):
-            own = found[place : place + len(some) + k]
-            place += len(own)
-            if k:
-                fit.shifts = self._shifts_of(own[len(some) :])
+        for fit, some, is_anew in zip(fits, moved, anew, strict=True):
+            own = found[place : place + len(some)]
+            place += len(some)
+            if is_anew:
+                end = place + len(self._moduli)
+                fit.shifts, place = self._shifts_of(found[place:end], fit.predicted), end
+                fit.shifted = fit.predicted
             with _running_away():
-                slopes = (own[: len(some)] - fit.predicted).T / self._steps(fit)
+                slopes = (own - fit.predicted).T / self._steps(fit)
             fit.slopes = np.where(np.all(np.isfinite(slopes), axis=0), slopes, 0.0)
             self._set_jacobian(fit)
-        if k:
-            usable = [fit for fit in fits if np.isfinite(fit.log_posterior)]
-            known = np.array([fit.predicted for fit in usable])
-            self._set(usable, known.reshape(-1, len(self.rows)))
+        usable = [
+            fit
+            for fit, is_anew in zip(fits, anew, strict=True)
+            if is_anew and np.isfinite(fit.log_posterior)
+        ]
+        if usable:
+            self._set(usable, np.array([fit.predicted for fit in usable]))
 
     def _normal_equations(self, fit: Fit):
         """Return gradient and curvature of the log posterior in the coordinates."""
