@@ -1,6 +1,5 @@
 """Study files: what is accepted, and what the one error says."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -181,13 +180,6 @@ def test_overwrite_leaves_files_alone_that_are_not_ours(tmp_path):
     RunFolder(tmp_path, "one").save("part", {})
     RunFolder(tmp_path, "one", overwrite=True)
     assert (tmp_path / "thesis.txt").read_text() == "mine"
-
-
-def test_a_damaged_part_is_computed_again(tmp_path):
-    folder = RunFolder(tmp_path, "one")
-    folder.save("part", {"x": 1})
-    (tmp_path / "state" / "part.json").write_text(json.dumps({"x": 1})[:-2])
-    assert folder.load("part") is None
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
