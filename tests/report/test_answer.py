@@ -242,6 +242,8 @@ def test_a_value_at_the_end_of_its_range_is_a_bound():
     assert at_end.text == "instrument inertia ≥ 130 Pa s² (95 % CI, best fit 1000 Pa s²)"
     low = replace(inertia, value=0.0, ci95=(0.0, 40.0), end="low")
     assert low.text.startswith("inertia ≤ 40 Pa s²")
+    small = Constant("heating", 1e-6, (5e-7, 1e-6), "1/Pa", letter="b", end="high")
+    assert small.interval == "≥ 5 × 10⁻⁷"
     slow = Constant("x", 1e3, (50.0, 1e3), "s", letter=r"1/\dot\gamma_c", end="high")
     assert slow.interval.startswith("≤ 0.02")  # told as the rate, whose bound is the other one
     assert "(95 % CI 130–1000)" in replace(inertia, value=500.0, end="").text
@@ -269,7 +271,8 @@ def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_
     named = replace(MELT, alternative=law)
     fit = replace(named, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None)
     assert fit.headline.startswith("Empirical fit: linear PTT with tr(σ) σ·σ. Error on unseen")
-    assert "6 % (95 % CI 4–7 %), plus 0.25 % noise. " + law in fit.headline
+    assert "6 % (95 % CI 4–7 %), plus 0.25 % noise. Use in shear" in fit.headline
+    assert fit.headline.endswith(law)  # where to use it is said of the fit
     assert fit.lines.count(law) == 0
     assert law in named.lines
 
