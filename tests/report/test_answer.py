@@ -12,6 +12,8 @@ from discover.answer.sentences import tolerance
 from discover.answer.simple_material import material_of
 from discover.effects.registry import named_effects
 from discover.equations import Equation
+from discover.equations.parts import NamedPart
+from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.answering import rest_of_h
@@ -353,3 +355,11 @@ def test_equations_that_the_answer_rests_on_are_larger_than_text():
 
     latex = named_effects()["thixotropy"].equation
     assert height(formula(latex, "a", 15.0)) > 1.3 * height(formula(latex, "b"))
+
+
+def test_a_constant_of_each_mode_has_its_index():
+    each = tuple({"epsilon": value} for value in (0.2, 0.5))
+    law = law_element((), True, NamedPart("ptt_linear", each), modes=2)
+    assert "<msub><mi>ε</mi><mi>k</mi></msub>" in law
+    one = law_element((), True, NamedPart("ptt_linear", each[:1]), modes=2)
+    assert "<msub><mi>ε</mi>" not in one
