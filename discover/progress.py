@@ -1,7 +1,7 @@
 """Progress of everything that takes long."""
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from threading import Event
@@ -49,20 +49,6 @@ def require_wanted() -> None:
     stop = _stop.get()
     if stop is not None and stop.is_set():
         raise Stopped
-
-
-def by_shares(progress: Progress | None, shares: Mapping[str, float]) -> Callable[[str], Progress]:
-    """Return what gives each part of a task the progress of its measured share of the time."""
-    total, begins, at = sum(shares.values()), {}, 0.0
-    for name, share in shares.items():
-        begins[name], at = at / total, at + share
-
-    def part(name: str) -> Progress:
-        return lambda text, fraction: (progress or silent)(
-            text, begins[name] + fraction * shares[name] / total
-        )
-
-    return part
 
 
 def by_time(
@@ -129,7 +115,12 @@ class FollowedBy:
     ):
         self._progress, self._seconds, self._clock = progress, seconds, clock
         self._crowding = crowding or Crowding()
-        self.begun, self._largest = clock(), 0.0
+        self.begun = progress.begun if isinstance(progress, FollowedBy) else clock()
+        self._largest = 0.0
+
+    def expect(self, seconds: float) -> None:
+        """Set how long others take after the part that begins now; its time counts from before."""
+        self._seconds = seconds
 
     def __call__(self, text: str, fraction: float) -> None:
         """Pass on a line, with the fraction of all time."""

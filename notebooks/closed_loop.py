@@ -20,6 +20,7 @@
 
 # %%
 import matplotlib.pyplot as plt
+import pandas as pd
 
 import discover as dc
 
@@ -41,7 +42,7 @@ result
 # twice the log of the posterior odds that it adds, where it was refitted.
 
 # %%
-result.ranking_table()
+pd.DataFrame(result.rankings[0])
 
 # %%
 for stage in result.stages:

@@ -88,8 +88,7 @@ class Constant:
             return "not determined"
         if (other := self.reciprocal) is not self:
             return other.number
-        unit = "" if self.unit in ("", "1") else f" {self.unit.replace('^2', '²')}"
-        return f"{self._rounded(self.value) or estimate(self.value, self.ci95)}{unit}"
+        return f"{self._plain(self.value)}{self._unit}"
 
     @property
     def interval(self) -> str:
@@ -113,6 +112,15 @@ class Constant:
             return 3
         of_width = math.floor(math.log10(self.ci95[1] - self.ci95[0]))
         return min(max(2 + math.floor(math.log10(abs(self.value))) - of_width, 1), 3)
+
+    @property
+    def _unit(self) -> str:
+        """Unit as it stands behind a number."""
+        return "" if self.unit in ("", "1") else f" {self.unit.replace('^2', '²')}"
+
+    def _plain(self, value: float) -> str:
+        """Return a number of this constant without its unit."""
+        return self._rounded(value) or estimate(value, self.ci95)
 
     def _rounded(self, value: float) -> str:
         """Return a number to two digits of the interval's width; empty where it needs a power.
@@ -158,8 +166,7 @@ class Constant:
         if not self.bound and not self.is_skewed:
             return f"{self.number} ({level}{self.interval})"
         level = f"{level.strip()}, " if level.strip() else ""
-        _, space, unit = self.number.partition(" ")
-        return f"{self.interval}{space}{unit} ({level}best fit {self.number})"
+        return f"{self.interval}{self.reciprocal._unit} ({level}best fit {self.number})"
 
     @property
     def is_skewed(self) -> bool:
@@ -180,7 +187,7 @@ class Constant:
             return ""
         low, high = one.ci95
         sign, value = ("≥", low) if one.end == "high" else ("≤", high)
-        return f"{sign} {replace(one, value=value, end='').number.partition(' ')[0]}"
+        return f"{sign} {one._plain(value)}"
 
 
 _MINUS = "−"

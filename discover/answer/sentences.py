@@ -28,7 +28,7 @@ def headline(answer: Any) -> str:
 def quality(answer: Any) -> str:
     """Return what follows the law: how well it describes, what else there is, where to use it."""
     behind = answer.alternative if answer.is_empirical else ""
-    parts = [description(answer), answer.failed, behind, where(answer)]
+    parts = [description(answer), answer.failed, where(answer), behind]
     return _level_once(answer, " ".join(filter(None, parts)))
 
 

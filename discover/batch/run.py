@@ -22,7 +22,7 @@ from discover.batch.workers import run_in_workers, run_on_cluster
 from discover.compilation_cache import enable_compilation_cache
 from discover.errors import InputError, plain_os_error
 from discover.first_use import enable_x64
-from discover.progress import FollowedBy, Progress, by_shares, on_stop
+from discover.progress import FollowedBy, Progress, on_stop
 from discover.study.atomic import make_folder, require_ours
 from discover.study.data import fingerprint, read_study
 from discover.study.run_folder import RunFolder
@@ -30,10 +30,11 @@ from discover.study.schema import Study, Verdict
 from discover.validation import validated
 from discover.words import counted
 
-_DRAWING = {"compare": 7.0, "close-loop": 3.5}
+_DRAWING = {"compare": 8.0, "close-loop": 4.5}
 """Seconds in which the pictures of a page are drawn, by task, on a machine of its own."""
 
-_DEMO_SHARES = {"comparison": 0.88, "loop": 0.12}
+_DEMO_LOOP = 7.5
+"""Seconds that the loop of the demonstration takes after its comparison, likewise."""
 
 Note = Callable[[Study], None]
 """Called with a study that was read, before anything is done with it."""
@@ -180,11 +181,12 @@ def run_demo(
 
     `out`: folder for the results; the comparison in it, the loop in its folder ``loop``.
     """
-    part = by_shares(progress, _DEMO_SHARES)
+    whole = FollowedBy(progress, _DEMO_LOOP)
     studies = files("discover.batch") / "demo_studies"
     with as_file(studies / "comparison.toml") as comparison, as_file(studies / "loop.toml") as loop:
-        first = run_compare(comparison, out, seed, overwrite, part("comparison"))
-        second = run_close_loop(loop, out / "loop", seed, overwrite, part("loop"))
+        first = run_compare(comparison, out, seed, overwrite, whole)
+        whole.expect(0.0)
+        second = run_close_loop(loop, out / "loop", seed, overwrite, whole)
     return {"Comparison of two learners": first.report, "Closed loop": second.report}
 
 

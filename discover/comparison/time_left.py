@@ -3,12 +3,14 @@
 import time
 from collections.abc import Callable
 
+from discover.compilation_cache import compiled_share
 from discover.loop.search_time import SearchTime
 from discover.progress import Crowding, Progress, by_time
 
-_LEARN, _WEIGH = (15.0, 0.2), (9.0, 0.25)
-"""Seconds in which learners learn, and in which laws are weighed: a constant, which a crowded
-machine prolongs, and a share of the search's. Measured on the demonstration and on LDPE."""
+_LEARN, _WEIGH = (6.0, 20.0, 0.2), (6.5, 14.0, 0.25)
+"""Seconds in which learners learn, and in which laws are weighed: a constant, and what compiling
+adds, which a crowded machine prolongs, and a share of the search's. Measured on the demonstration
+and on LDPE."""
 
 _SLOWER = 2.0
 """Factor by which learning may change what is expected of weighing."""
@@ -21,7 +23,8 @@ class ComparisonTime:
     """Progress of a comparison.
 
     `most`, `several_modes`, `held_out`: as for `SearchTime`. `trainings`: how often all learners
-    learn. `clock`, `crowding`: as for `SearchTime`.
+    learn. `clock`, `crowding`: as for `SearchTime`. `compiled`: share of programs that have to
+    be compiled.
     """
 
     def __init__(
@@ -33,8 +36,10 @@ class ComparisonTime:
         trainings: float,
         clock: Callable[[], float] = time.perf_counter,
         crowding: Callable[[], float] | None = None,
+        compiled: Callable[[], float] = compiled_share,
     ):
         self._clock, self._crowding = clock, crowding or Crowding()
+        self._compiled = compiled
         self._tell, self._trainings = by_time(progress, clock), trainings
         self._searches = SearchTime(
             most, several_modes, held_out=held_out, reported=False, clock=clock,
@@ -84,6 +89,7 @@ class ComparisonTime:
     def _expect(self) -> None:
         crowding = self._crowding()
         learn, self._weigh = (
-            constant * crowding + share * self._search for constant, share in (_LEARN, _WEIGH)
+            (kept + self._compiled() * compiling) * crowding + share * self._search
+            for kept, compiling, share in (_LEARN, _WEIGH)
         )
         self._learn = learn * self._trainings

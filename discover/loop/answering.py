@@ -26,7 +26,7 @@ from discover.equations.equation import flow_numbers
 from discover.equations.formats.rheotool import DENSITY
 from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
-from discover.inference.by_mode.constants import StageParameter
+from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.by_quantity import (
     errors_by_quantity,
@@ -38,7 +38,14 @@ from discover.loop.by_quantity import (
 from discover.loop.parts import STRUCTURES, Stage
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
-from discover.words import effect_title, effects_title, listed, percent_of, readable
+from discover.words import (
+    effect_title,
+    effects_title,
+    listed,
+    percent_of,
+    readable,
+    significant,
+)
 
 _MOST_ADDED = 2
 """Effects added to a law, up to which their sum is told as that law with these."""
@@ -302,12 +309,26 @@ def _constants(
             one.ci95,
             one.unit or "1",
             name not in left_open and not (isinstance(one, StageParameter) and one.is_open),
-            spelled.get(name, ""),
-            meaning=_meaning(effect, known[name]) if name in known else "",
+            _of_mode(one, name, spelled.get(name, "")),
+            meaning=_of_mean_mode(one, _meaning(effect, known[name]) if name in known else ""),
             end=one.at_end if isinstance(one, StageParameter) else "",
         )
         for name, one in parameters.items()
     )
+
+
+def _of_mode(one: Any, name: str, letter: str) -> str:
+    """Return the letter of a constant, with the index of the mode where it differs."""
+    differs = isinstance(one, ConstantByMode) and one.degree
+    return f"{letter or readable(name)}_k" if differs else letter
+
+
+def _of_mean_mode(one: Any, meaning: str) -> str:
+    """Return what a constant is; of one that differs from mode to mode, of which it is shown."""
+    if not isinstance(one, ConstantByMode) or not one.degree:
+        return meaning
+    place = f"at λ = {significant(one.mean_time_s, 2)} s"
+    return f"{meaning}, {place}" if meaning else place
 
 
 def _meaning(effect: str, parameter: EffectParameter) -> str:

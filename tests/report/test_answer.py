@@ -12,6 +12,8 @@ from discover.answer.sentences import tolerance
 from discover.answer.simple_material import material_of
 from discover.effects.registry import named_effects
 from discover.equations import Equation
+from discover.equations.parts import NamedPart
+from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.answering import rest_of_h
@@ -242,6 +244,8 @@ def test_a_value_at_the_end_of_its_range_is_a_bound():
     assert at_end.text == "instrument inertia ≥ 130 Pa s² (95 % CI, best fit 1000 Pa s²)"
     low = replace(inertia, value=0.0, ci95=(0.0, 40.0), end="low")
     assert low.text.startswith("inertia ≤ 40 Pa s²")
+    small = Constant("heating", 1e-6, (5e-7, 1e-6), "1/Pa", letter="b", end="high")
+    assert small.interval == "≥ 5 × 10⁻⁷"
     slow = Constant("x", 1e3, (50.0, 1e3), "s", letter=r"1/\dot\gamma_c", end="high")
     assert slow.interval.startswith("≤ 0.02")  # told as the rate, whose bound is the other one
     assert "(95 % CI 130–1000)" in replace(inertia, value=500.0, end="").text
@@ -269,7 +273,8 @@ def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_
     named = replace(MELT, alternative=law)
     fit = replace(named, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None)
     assert fit.headline.startswith("Empirical fit: linear PTT with tr(σ) σ·σ. Error on unseen")
-    assert "6 % (95 % CI 4–7 %), plus 0.25 % noise. " + law in fit.headline
+    assert "6 % (95 % CI 4–7 %), plus 0.25 % noise. Use in shear" in fit.headline
+    assert fit.headline.endswith(law)  # where to use it is said of the fit
     assert fit.lines.count(law) == 0
     assert law in named.lines
 
@@ -350,3 +355,11 @@ def test_equations_that_the_answer_rests_on_are_larger_than_text():
 
     latex = named_effects()["thixotropy"].equation
     assert height(formula(latex, "a", 15.0)) > 1.3 * height(formula(latex, "b"))
+
+
+def test_a_constant_of_each_mode_has_its_index():
+    each = tuple({"epsilon": value} for value in (0.2, 0.5))
+    law = law_element((), True, NamedPart("ptt_linear", each), modes=2)
+    assert "<msub><mi>ε</mi><mi>k</mi></msub>" in law
+    one = law_element((), True, NamedPart("ptt_linear", each[:1]), modes=2)
+    assert "<msub><mi>ε</mi>" not in one

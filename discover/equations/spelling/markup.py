@@ -214,6 +214,7 @@ def law_element(
         function = named.function
         names = (*function.constants, *function.where, *function.rates)
         letters = {n: notation.letter(n) for n in names}
+        letters |= {n: f"<msub>{letters[n]}<mi>k</mi></msub>" for n in named.differing}
         dotted = "<mover><mrow>{}</mrow><mo>˙</mo></mover>"
         summands, defined = _named(named, notation, letters, dotted)
         extra = [_SIGN.format("+") + one for one in summands] + extra
