@@ -1,5 +1,6 @@
 """Vectors choose their own steps while the rate is constant; answers by scipy on full tensors."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import Giesekus, JohnsonSegalman, PhanThienTanner, Structured, steps
@@ -8,6 +9,7 @@ from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.side_by_side.kernel import Kernel
+from discover.laws import AbstractConstitutiveLaw
 from discover.protocols import after_steady_flow, start_up
 
 BEFORE, AFTER = 5.0, 0.5
@@ -149,3 +151,35 @@ def test_a_vector_that_runs_away_before_the_record_is_told_so():
     assert not np.any(np.abs(found[0]) < 1e3)
     fading = AFTER + (BEFORE - AFTER) * np.exp(-TIMES)
     np.testing.assert_allclose(found[1, 0], fading, rtol=1e-9)
+
+
+def followed_by_chatter(monkeypatch):
+    """Return how many steps a law takes whose every step differs from its halves, however short."""
+
+    class Chatter(AbstractConstitutiveLaw):
+        linear_relaxation: bool = True
+
+        def extra_term(self, stress, rate):
+            del rate
+            x = jnp.tanh(stress)
+            for _ in range(30):  # cos(2³⁰ arccos x)
+                x = 2.0 * x * x - 1.0
+            return 1e12 * jnp.tanh(1e9 * stress) * (1.0 + 0.9 * x)
+
+    taken = counted(monkeypatch)
+    one = np.ones(2)
+    run = Run("start", np.array([3.0, 6.0]), start_up(1.0), one, one)
+    model = AugmentedModel(DeclaredModel(Chatter(), one[:1], one[:1]), [])
+    model.predict(model.zero(), make_batch([run]))
+    return sum(taken)
+
+
+@pytest.mark.slow
+def test_the_end_of_an_interval_is_reached_where_rounding_leaves_no_step_to_it(monkeypatch):
+    most = 20_000
+    monkeypatch.setattr("discover.forward.side_by_side.own_widths._ENOUGH", most)
+    monkeypatch.setattr("discover.forward.side_by_side.code.kept", lambda _, write: write()[0])
+    assert followed_by_chatter(monkeypatch) < most
+    # the control: without it the last tenth of what is left is tried for ever
+    monkeypatch.setattr("discover.forward.side_by_side.own_widths._ROUNDING", 0.0)
+    assert followed_by_chatter(monkeypatch) > 3 * most

@@ -60,10 +60,9 @@ def viscosity(
     if law == NEWTONIAN:
         return np.full(np.shape(rate), constants[0])
     size = np.maximum(np.abs(rate), _AT_REST)
-    if law == POWER_LAW:
-        return constants[0] * size ** (constants[1] - 1.0)
-    if law == HERSCHEL_BULKLEY:
-        yield_stress, consistency, index, *sharpness = constants
+    if law in (POWER_LAW, HERSCHEL_BULKLEY):
+        without_yield = (0.0,) if law == POWER_LAW else ()
+        yield_stress, consistency, index, *sharpness = (*without_yield, *constants)
         set_in = -np.expm1(-sharpness[0] * size) if sharpness else 1.0
         return (yield_stress * set_in + consistency * size**index) / size
     zero, infinite, time, index, sharpness = constants
