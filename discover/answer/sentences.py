@@ -96,7 +96,8 @@ def description(answer: Any) -> str:
     # of fitted runs it is no error that a prediction could have
     of = "Error on unseen runs" if found.unseen else "Residual of the fitted runs"
     if noise and found.size < answer.noise:
-        return f"{of} {percent_of(found.size)}{ends}, less than the noise ({noise})."
+        # what fitted runs leave stands for noise, and is more where a model lacks something
+        return f"{of} {percent_of(found.size)}{ends}; fitted runs leave {noise}."
     besides = f", plus {noise} noise" if noise else ""
     return f"{of} {percent_of(found.size)}{ends}{besides}."
 
@@ -127,6 +128,9 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
+    one = answer.expected("uniaxial")
+    if one.is_measured and one.inside is not None and one.inside > _USELESS:
+        place += f", not in {SYMBOLS['uniaxial']} ({_at_most(one.inside)} error)"
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
     if answer.adequate is False:

@@ -52,7 +52,10 @@ def test_the_first_line_has_law_constants_error_and_range():
     good = replace(MELT, tolerance=0.1).headline
     assert good.endswith("Use in shear, 0.003–3 1/s.")
     loud = replace(MELT, noise=0.08).headline
-    assert "Error on unseen runs 6 % (4–7 %), less than the noise (8 %)." in loud
+    assert "Error on unseen runs 6 % (4–7 %); fitted runs leave 8 %." in loud
+    stretched = {**MELT.expected_error, "uniaxial": ExpectedError(0.54, note="unseen runs")}
+    sheared = replace(MELT, expected_error=stretched).headline
+    assert "0.003–3 1/s, not in uniaxial extension (54 % error), if 6 % error" in sheared
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits within noise (1 %)." in exact.headline
 
