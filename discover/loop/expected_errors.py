@@ -38,12 +38,14 @@ class Spread:
 
     `inside`, `beyond`: over the rms of the quantity (N2: of N1), in flows inside and beyond the
     fitted rates; None where a law diverges. `over_n1`: N2 of the reported law itself over its N1
-    inside, by their rms, with the sign of N2/N1; None of other quantities.
+    inside, by their rms, with the sign of N2/N1; None of other quantities. `stress`: the quantity
+    itself by the reported law, rms in Pa of the fastest flow inside; None where it diverges.
     """
 
     inside: float | None
     beyond: float | None
     over_n1: float | None = None
+    stress: float | None = None
 
 
 @in_one_thread
@@ -86,11 +88,13 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     ends = zip(("inside", "beyond"), np.moveaxis(in_extension, 1, 0), strict=True)
     seen += [("uniaxial", place, found) for place, found in ends]
     own: dict[str, dict[str, list[float]]] = {}
-    ratios = []
+    ratios, stress = [], {}
     for i, (kind, place, found) in enumerate(seen):
         of_n1 = seen[i - 1][2] if kind == "N2" else found
         with np.errstate(all="ignore"):  # laws that diverge in this flow
             size = rms(of_n1[0])
+            if place == "inside":
+                stress[kind] = rms(found[0])
             if kind == "N2" and place == "inside":
                 ratios.append(float(np.copysign(rms(found[0]), found[0] @ of_n1[0])) / size)
             squares = np.mean((found[1:] - found[0]) ** 2, axis=1)
@@ -105,7 +109,10 @@ def spread_of_laws(posterior: Posterior, best: Fit) -> dict[str, Spread]:
     ratio = max(ratios, key=abs) if np.all(np.isfinite(ratios)) else None
     return {
         kind: Spread(
-            _largest(of["inside"]), _largest(of["beyond"]), ratio if kind == "N2" else None
+            _largest(of["inside"]),
+            _largest(of["beyond"]),
+            ratio if kind == "N2" else None,
+            _largest([stress[kind]]),
         )
         for kind, of in own.items()
     }

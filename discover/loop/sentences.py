@@ -124,7 +124,11 @@ def _of_another_stress(result: Any) -> str:
         if apart is None or not result.tolerance < apart <= MUCH or not shear:
             continue
         rate = max(record.fastest for record in shear)
-        in_reach = kind == "N1" or rate <= _FASTEST_EXTENSION
+        stress = result.spread_of_laws[kind].stress
+        if kind == "N1":
+            in_reach = stress is None or stress >= _LEAST_NORMAL_STRESS
+        else:
+            in_reach = rate <= _FASTEST_EXTENSION
         if in_reach and measured(result.records, kind, None) is None:
             fastest = significant(rate, 2)
             says = f"laws that fit as well differ by {percent_of(apart)}"
@@ -134,6 +138,10 @@ def _of_another_stress(result: Any) -> str:
 
 _FASTEST_EXTENSION = 30.0
 """Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657]."""
+
+_LEAST_NORMAL_STRESS = 1.0
+"""N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is
+2F/(πR²) on a cone of R = 25 mm   [Macosko 1994, Rheology, ch. 8]."""
 
 _OTHERS = {"N1": "Measure N1", "uniaxial": "Measure uniaxial extension"}
 """Stresses that tell laws apart which agree in σ12, the easier measurement first."""

@@ -114,6 +114,10 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     assert told == "Measure N1 at 1 1/s: laws that fit as well differ by 60 %."
     normal = record("slow", 0.1, 0.05, quantity="N1")
     assert "uniaxial extension" in what_to_measure_next(result([*FITTED, normal]))
+    # a normal stress that no transducer resolves is not asked for, one of twice the least is
+    for size, asked in ((0.05, "Measure uniaxial extension"), (2.0, "Measure N1")):
+        weak = {"N1": Spread(0.6, 0.8, stress=size), "uniaxial": Spread(1.2, 1.3)}
+        assert what_to_measure_next(result(FITTED, spread_of_laws=weak)).startswith(asked)
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast with another gap")
