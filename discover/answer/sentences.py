@@ -128,11 +128,12 @@ def where(answer: Any) -> str:
     if not found:
         return ""
     place = ", ".join([flows(answer), *found])
-    one = answer.expected("uniaxial")
-    if one.is_measured and one.inside is not None and one.inside > _USELESS:
-        place += f", not in {SYMBOLS['uniaxial']} ({_at_most(one.inside)} error)"
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
+    one = answer.expected("uniaxial")
+    missed = (one.inside if one.is_measured else None) or 0.0
+    if missed > _USELESS and "uniaxial" not in answer.range.flows:  # else it was fitted
+        place += f", not in {SYMBOLS['uniaxial']} ({_at_most(missed)} error)"
     if answer.adequate is False:
         return f"Use in {place}, if {percent_of(answer.size)} error is acceptable."
     return f"Use in {place}."

@@ -56,6 +56,11 @@ def test_the_first_line_has_law_constants_error_and_range():
     stretched = {**MELT.expected_error, "uniaxial": ExpectedError(0.54, note="unseen runs")}
     sheared = replace(MELT, expected_error=stretched).headline
     assert "0.003–3 1/s, not in uniaxial extension (54 % error), if 6 % error" in sheared
+    # neither where nothing is to be used, nor where extension was fitted
+    useless = replace(MELT, discrepancy=Discrepancy(0.4, (0.3, 0.5)), expected_error=stretched)
+    assert "Do not use to predict; fitted in shear, 0.003–3 1/s." in useless.headline
+    pulled = replace(MELT.range, flows=("shear", "uniaxial"))
+    assert "not in" not in replace(MELT, expected_error=stretched, range=pulled).headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits within noise (1 %)." in exact.headline
 
