@@ -61,9 +61,8 @@ def compare(
     first
         Fitted estimators, one of each learner at most, or a data set.
     second
-            The data set that tests estimators; for a data set the known `Fluid`, by default upper
-        convected
-        Maxwell with G = 1 Pa and λ = 1 s.
+        The data set that tests estimators; for a data set the known `Fluid`, by default upper
+        convected Maxwell with G = 1 Pa and λ = 1 s.
     train
         What estimators from a file were fitted to; the file holds no data.
     held_out
@@ -87,9 +86,8 @@ def compare(
     Raises
     ------
     InputError
-            If estimators are not fitted, or not to the same runs with the same known part, a run is
-        both
-        fitted and held out, or an option is unknown.
+        If estimators are not fitted, or not to the same runs with the same known part, a run is
+        both fitted and held out, or an option is unknown.
 
     Examples
     --------

@@ -49,16 +49,15 @@ class Fluid(eqx.Module):
     Attributes
     ----------
     law
-            Dimensionless law, by default upper convected Maxwell; `LawOfEachMode` where constants
+        Dimensionless law, by default upper convected Maxwell; `LawOfEachMode` where constants
         differ.
     modulus, relaxation_time
         G_k in Pa and λ_k in s, shape (k,).
     solvent_viscosity
         η_s, in Pa s.
     modulus_covariance
-            Of moduli from a noisy sweep in Pa², shape (k, k), or (k + 1, k + 1) with the solvent
-        last; None
-        where they are exact. Learners widen their intervals by it; no flow depends on it.
+        Of moduli from a noisy sweep in Pa², shape (k, k), or (k + 1, k + 1) with the solvent last;
+        None where they are exact. Learners widen their intervals by it; no flow depends on it.
 
     Examples
     --------
@@ -155,9 +154,8 @@ class Fluid(eqx.Module):
         law
             Of every mode; by default upper convected Maxwell.
         **options
-                `modes`, `most_modes`, `tolerance`, known `solvent_viscosity` and `elastic_modulus`,
-            as of
-            `discover.dataset.relaxation_spectrum`.
+            `modes`, `most_modes`, `tolerance`, known `solvent_viscosity` and `elastic_modulus`,
+            as of `discover.dataset.relaxation_spectrum`.
 
         Raises
         ------

@@ -160,16 +160,14 @@ def register_law(
         Returns h written out, for a law that is no sum of terms; see
         `tensor_library.isotropic_function`.
     extra_term
-            h as a function of stress and rate, dimensionless (3, 3), and of the parameters by name,
-        written
-        with `tensor_library.algebra`: λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h.
+        h as a function of stress and rate, dimensionless (3, 3), and of the parameters by name, by
+        `tensor_library.algebra`: λ dσ/dt = γ̇ + L·σ + σ·Lᵀ − σ − h.
 
     Raises
     ------
     InputError
-            If the name is taken or is none, a range is none, `build` makes no law, `extra_term`
-        does not
-        take these parameters or returns no tensor, or both or neither are given.
+        If the name is taken or is none, a range is none, `build` makes no law, `extra_term` does
+        not take these parameters or returns no tensor, or both or neither are given.
 
     Examples
     --------
