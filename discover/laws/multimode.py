@@ -17,7 +17,7 @@ from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
-from tensor_library.kinematics import VelocityGradient, rate_of_deformation
+from tensor_library.algebra import VelocityGradient, rate_of_deformation
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:

@@ -69,14 +69,9 @@ _RECORDED: dict[RecordedQuantity, tuple[float, ...]] = {
 
 
 _IN_WORDS = {
-    "sigma12": "σ12",
-    "N1": "N1",
-    "N2": "N2",
-    "tensile_stress": "tensile stress",
-    "strain": "strain",
-    "storage_modulus": "G′",
-    "loss_modulus": "G″",
-}
+    "sigma12": "σ12", "N1": "N1", "N2": "N2", "tensile_stress": "tensile stress",
+    "strain": "strain", "storage_modulus": "G′", "loss_modulus": "G″",
+}  # fmt: skip
 
 
 class Kinematics(eqx.Module):
@@ -219,16 +214,7 @@ def in_words(quantities: Iterable[str]) -> str:
 
 
 FlowClass = Literal[
-    "laos",
-    "start_up",
-    "cessation",
-    "steps",
-    "superposed",
-    "step_strain",
-    "flow_curve",
-    "creep",
-    "uniaxial",
-    "planar",
-    "biaxial",
-]
+    "laos", "start_up", "cessation", "steps", "superposed", "step_strain", "flow_curve", "creep",
+    "uniaxial", "planar", "biaxial",
+]  # fmt: skip
 FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)
