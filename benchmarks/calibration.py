@@ -112,14 +112,11 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     runs = world.make(np.random.default_rng([seed, int(name), 1]))
     answer = TASKS[question](dc.load_dataset(write_folder(folder / "data", runs)), world)
     return {
-        "index": int(name),
-        "law": world.law,
-        "flaw": world.flaw,
-        "protocol": world.protocol,
+        "index": int(name), "law": world.law, "flaw": world.flaw, "protocol": world.protocol,
         "noise": world.noise,
         "effects": None if world.effects is None else [sorted(one) for one in world.effects],
         **answer,
-    }
+    }  # fmt: skip
 
 
 def line(row: dict) -> str:

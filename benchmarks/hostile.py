@@ -193,12 +193,8 @@ def judge(case: Case, question: str, said: dict, rows, clean: Runs, noisy: Runs)
     sources = ["augmented"] if question == "close-loop" else list(said["learners"])
     misses = {source: miss(case, rows, source, clean, noisy) for source in sources}
     found = {
-        "verdict": said["verdict"],
-        "misses": misses,
-        "constants": [],
-        "false": [],
-        "notes": [],
-    }
+        "verdict": said["verdict"], "misses": misses, "constants": [], "false": [], "notes": [],
+    }  # fmt: skip
     if question == "close-loop":
         of_loop(case, said, found)
     else:

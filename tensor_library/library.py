@@ -153,13 +153,10 @@ def _parent(powers: tuple[int, ...]) -> tuple[tuple[int, ...], int]:
 
 
 def build_library(
-    tensors: Sequence[str] = TENSOR_NAMES,
-    degree: int = 0,
-    closed_forms: Sequence[str] = (),
-    invariants: Sequence[str] | None = None,
-    closed_form_tensors: Sequence[str] = ("sigma",),
+    tensors: Sequence[str] = TENSOR_NAMES, degree: int = 0, closed_forms: Sequence[str] = (),
+    invariants: Sequence[str] | None = None, closed_form_tensors: Sequence[str] = ("sigma",),
     extra: Sequence[str] = (),
-) -> TermLibrary:
+) -> TermLibrary:  # fmt: skip
     """Return the library of tensors × invariant monomials up to a degree, plus closed forms.
 
     Parameters

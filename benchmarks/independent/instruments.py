@@ -110,15 +110,10 @@ class Instrument:
             signal = self.adc_step * np.round(signal / self.adc_step)
         kept = Stresses(true.sigma12[keep], true.N1[keep], true.N2[keep])
         return Recording(
-            time=times * (1 + self.clock_slip),
-            rate=np.asarray(flow.rate(times), float),
-            stress=signal,
-            true=kept,
-            felt_rate=felt[keep],
-            tool_rate=tool[keep],
-            N1=kept.N1,
+            time=times * (1 + self.clock_slip), rate=np.asarray(flow.rate(times), float),
+            stress=signal, true=kept, felt_rate=felt[keep], tool_rate=tool[keep], N1=kept.N1,
             N2=kept.N2,
-        )
+        )  # fmt: skip
 
     def _told(self, flow: Flow) -> Flow:
         """Return the rate that the motor aims at; its strain where that is still in closed form."""

@@ -51,13 +51,9 @@ def modulus_of(law: RateLaw, strain: float, frequency: float, cycles: int) -> co
 
 
 def giesekus_modulus(
-    mobility: float,
-    modulus: float,
-    relaxation_time: float,
-    strain: float,
-    frequency: float,
+    mobility: float, modulus: float, relaxation_time: float, strain: float, frequency: float,
     slip: float = 0.0,
-) -> complex:
+) -> complex:  # fmt: skip
     """Return G′ + iG″ in Pa of a Giesekus fluid   [Giesekus 1982, JNNFM 11, 69].
 
     `mobility`, `modulus`, `relaxation_time`: α, G in Pa and λ in s. `strain`, `frequency`: of the

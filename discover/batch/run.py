@@ -65,15 +65,9 @@ class _Task:
         self.__doc__ = work.__doc__
 
     def __call__(
-        self,
-        path: Path,
-        out: Path,
-        seed: int | None,
-        overwrite: bool,
-        progress: Progress,
-        note: Note = lambda study: None,
-        tolerance: float | None = None,
-    ) -> TaskResult:
+        self, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
+        note: Note = lambda study: None, tolerance: float | None = None,
+    ) -> TaskResult:  # fmt: skip
         """Run the task.
 
         `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides
@@ -191,15 +185,10 @@ def run_demo(
 
 
 def run_batch(
-    paths: Sequence[Path],
-    out: Path,
-    workers: int = 1,
-    scheduler: str | None = None,
-    seed: int | None = None,
-    overwrite: bool = False,
-    progress: Progress = lambda label, fraction: None,
-    note: Note = lambda study: None,
-) -> BatchResult:
+    paths: Sequence[Path], out: Path, workers: int = 1, scheduler: str | None = None,
+    seed: int | None = None, overwrite: bool = False, progress: Progress = lambda label,
+    fraction: None, note: Note = lambda study: None,
+) -> BatchResult:  # fmt: skip
     """Run studies into folders of their own; one that fails does not stop the others.
 
     A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
@@ -267,14 +256,9 @@ def _require_different(names: Sequence[str]) -> None:
 
 
 def run_one(
-    path: str,
-    name: str,
-    task: str,
-    out: str,
-    seed: int | None,
-    overwrite: bool,
+    path: str, name: str, task: str, out: str, seed: int | None, overwrite: bool,
     progress: Progress = lambda label, fraction: None,
-) -> StudyStatus:
+) -> StudyStatus:  # fmt: skip
     """Run one study and say how it ended; never raises for a failure of the study."""
     started = perf_counter()
 

@@ -3,17 +3,14 @@
 import json
 import logging
 import subprocess
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from functools import partial
-from ipaddress import ip_address
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any
-from urllib.parse import urlsplit
 from uuid import uuid4
 
 from discover.batch.status import StudyStatus, now_and_then
@@ -33,12 +30,9 @@ Job = tuple[str, str, str, str, int | None, bool]
 
 
 def run_in_workers(
-    run: Callable[..., StudyStatus],
-    jobs: Sequence[Job],
-    workers: int,
-    say: Callable[[int, str, float], None],
-    end: Callable[[int, StudyStatus], None],
-) -> None:
+    run: Callable[..., StudyStatus], jobs: Sequence[Job], workers: int,
+    say: Callable[[int, str, float], None], end: Callable[[int, StudyStatus], None],
+) -> None:  # fmt: skip
     """Run jobs side by side.
 
     A study whose worker dies goes to another, where it continues from its last finished part. Where
@@ -158,12 +152,9 @@ class _Worker:
 
 
 def run_on_cluster(
-    run: Callable[..., StudyStatus],
-    jobs: Sequence[Job],
-    scheduler: str,
-    say: Callable[[int, str, float], None],
-    end: Callable[[int, StudyStatus], None],
-) -> None:
+    run: Callable[..., StudyStatus], jobs: Sequence[Job], scheduler: str,
+    say: Callable[[int, str, float], None], end: Callable[[int, StudyStatus], None],
+) -> None:  # fmt: skip
     """Run jobs side by side on a dask cluster, whose workers know files by the same paths.
 
     For ``tls://`` the certificates are those that dask's own settings name,
@@ -176,13 +167,6 @@ def run_on_cluster(
         raise InputError(
             "--scheduler needs dask: install discover-rheology[batch], or use --workers."
         ) from None
-    if not _is_protected(scheduler):
-        warnings.warn(
-            f"The connection to {scheduler[:100]} is not encrypted, and whoever can reach it can "
-            "run programs under your name. Start the scheduler with TLS and give its tls:// "
-            "address.",
-            stacklevel=2,
-        )
     try:
         client = Client(scheduler, timeout="20s")
     except Exception as error:  # each kind of address fails in its own way
@@ -204,22 +188,6 @@ def run_on_cluster(
         for future in as_completed(futures):
             i = futures[future]
             end(i, _status_of(future, jobs[i]))
-
-
-def _is_protected(scheduler: str) -> bool:
-    """Return whether others are kept from a connection: by TLS, or as it never leaves here.
-
-    On a loopback address other users of the machine are not; but whoever started a scheduler there
-    has let them in already, and no certificate here keeps them out.
-    """
-    address = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
-    if address.scheme in ("tls", "wss", "inproc"):
-        return True
-    host = address.hostname or ""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _run_on_worker(

@@ -28,14 +28,10 @@ from discover.study.atomic import make_folder, write_text
 
 
 def merge_mapping(
-    path: Path | None,
-    pairs: AnyMapping[str, Sequence[str] | None],
-    layout: AnyMapping[str, object],
-    names: Path | None = None,
-    geometry: str | None = None,
-    blocks: Sequence[int] | None = None,
-    start_time_s: float | None = None,
-) -> Mapping:
+    path: Path | None, pairs: AnyMapping[str, Sequence[str] | None],
+    layout: AnyMapping[str, object], names: Path | None = None, geometry: str | None = None,
+    blocks: Sequence[int] | None = None, start_time_s: float | None = None,
+) -> Mapping:  # fmt: skip
     """Return the mapping of a file with the options of the command line on top.
 
     `pairs`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
@@ -180,13 +176,9 @@ _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 
 
 def write_page(
-    dataset: "Dataset",
-    folder: str,
-    out: Path,
-    findings: Sequence["Finding"],
-    said: Sequence[str] = (),
-    names: tuple[str, str] = (PAGE, IMPORT_PAGE),
-) -> tuple[Path, list[str]]:
+    dataset: "Dataset", folder: str, out: Path, findings: Sequence["Finding"],
+    said: Sequence[str] = (), names: tuple[str, str] = (PAGE, IMPORT_PAGE),
+) -> tuple[Path, list[str]]:  # fmt: skip
     """Write a page on a data folder, and a first study unless there is one.
 
     `folder`: as the study names it. `names`: of the page, the second where a result has the first.

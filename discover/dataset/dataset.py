@@ -143,9 +143,7 @@ class Dataset(NotebookView):
     def thinned(self) -> str:
         """What was thinned, in sentences, one for each way; empty if nothing was."""
         said = {run.name: str(run.metadata.get("thinned", "")) for run in self.runs}
-        sweep = "" if self.linear_sweep is None else self.linear_sweep.thinned
-        named = _by_text({**said, "the linear sweep": sweep})
-        return " ".join(f"{', '.join(names)}: {text}." for text, names in named.items())
+        return " ".join(f"{', '.join(names)}: {text}." for text, names in _by_text(said).items())
 
     @property
     def left_out(self) -> str:

@@ -22,12 +22,9 @@ _LONGEST_NAME = 200  # bytes of a run's name; file systems take 255, and endings
 
 
 def from_dataframe(
-    samples: pd.DataFrame | None = None,
-    runs: pd.DataFrame | None = None,
-    tables: Mapping[str, pd.DataFrame] | None = None,
-    name: str = "data in memory",
-    **options: Any,
-) -> Dataset:
+    samples: pd.DataFrame | None = None, runs: pd.DataFrame | None = None,
+    tables: Mapping[str, pd.DataFrame] | None = None, name: str = "data in memory", **options: Any,
+) -> Dataset:  # fmt: skip
     """Return the data set that tables in memory hold, as `load_dataset` would read it from files.
 
     Messages count lines as in a CSV file: the headings are line 1.

@@ -40,8 +40,6 @@ class LinearSweep:
         In rad/s, shape (n,), increasing.
     storage_modulus, loss_modulus
         In Pa, shape (n,).
-    thinned
-        How it was thinned when it was read, in words; empty if it was not.
 
     Examples
     --------
@@ -56,7 +54,6 @@ class LinearSweep:
     angular_frequency: Float[np.ndarray, " n"]
     storage_modulus: Float[np.ndarray, " n"]
     loss_modulus: Float[np.ndarray, " n"]
-    thinned: str = ""
 
     def __post_init__(self):
         for label in ("angular_frequency", "storage_modulus", "loss_modulus"):
@@ -146,14 +143,9 @@ class RelaxationSpectrum:
 
 
 def relaxation_spectrum(
-    sweep: LinearSweep,
-    most_modes: int = MOST_MODES,
-    tolerance: float = 1.0,
-    *,
-    modes: int | None = None,
-    solvent_viscosity: Constant = None,
-    elastic_modulus: Constant = None,
-) -> RelaxationSpectrum:
+    sweep: LinearSweep, most_modes: int = MOST_MODES, tolerance: float = 1.0, *,
+    modes: int | None = None, solvent_viscosity: Constant = None, elastic_modulus: Constant = None,
+) -> RelaxationSpectrum:  # fmt: skip
     """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
     G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k, all constants

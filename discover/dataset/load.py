@@ -17,7 +17,6 @@ from discover.dataset.read_run import (
     table_of_run,
 )
 from discover.dataset.records.repeats import in_sequence
-from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table
@@ -89,15 +88,11 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
 
 
 def load_dataset(
-    folder: str | Path,
-    clock_factor: str | None = None,
-    base: str | Path | None = None,
-    rate_is_measured: bool = False,
-    rate_window: int = DEFAULT_WINDOW,
-    rate_before: str | None = None,
-    sequence: str | None = None,
+    folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None,
+    rate_is_measured: bool = False, rate_window: int = DEFAULT_WINDOW,
+    rate_before: str | None = None, sequence: str | None = None,
     amplitude_sweep_rad_s: float | None = None,
-) -> Dataset:
+) -> Dataset:  # fmt: skip
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
     A column may carry another unit in its name, such as ``stress_kPa``. A run without a shear rate
@@ -281,11 +276,10 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 
 def read_sweep(path: Path) -> LinearSweep:
-    """Return a linear frequency sweep, sorted, one of very many thinned; InputError if wrong."""
+    """Return a linear frequency sweep, sorted; InputError if it is wrong."""
     table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     columns = table.all_required(*quantities)
     table.require_positive(*quantities)
     order = np.argsort(columns[0], kind="stable")
-    keep, note = thin_sweep(columns[0][order])
-    return LinearSweep(*(values[order[keep]] for values in columns), thinned=note)
+    return LinearSweep(*(values[order] for values in columns))

@@ -127,14 +127,9 @@ def table_of_run(root: Path, name: str) -> Table:
 
 
 def read_run(
-    table: Table,
-    index: Table,
-    row: int,
-    clock_factor: float = 1.0,
-    rate_is_measured: bool = False,
-    rate_window: int = DEFAULT_WINDOW,
-    rate_before: float | None = None,
-) -> Run:
+    table: Table, index: Table, row: int, clock_factor: float = 1.0, rate_is_measured: bool = False,
+    rate_window: int = DEFAULT_WINDOW, rate_before: float | None = None,
+) -> Run:  # fmt: skip
     """Return the run on a line of ``runs.csv`` from its samples; InputError if they are wrong."""
     name = table.name
     # float() would also read 1_2, nan or inf, which are labels here
@@ -171,19 +166,11 @@ def read_run(
         source = f"read sample by sample, {between} between samples"
     metadata["shear_rate_source"] = source
     run = Run(
-        name=name,
-        time=time,
-        protocol=in_flow(protocol, test.flow),
-        rate=rate,
-        stress=stress,
-        first_normal_stress_difference=normal[0],
-        second_normal_stress_difference=normal[1],
-        strain=strain,
-        clock_factor=clock_factor,
-        rate_is_measured=measured,
-        rate_before=test.rate_before,
-        metadata=metadata,
-    )
+        name=name, time=time, protocol=in_flow(protocol, test.flow), rate=rate, stress=stress,
+        first_normal_stress_difference=normal[0], second_normal_stress_difference=normal[1],
+        strain=strain, clock_factor=clock_factor, rate_is_measured=measured,
+        rate_before=test.rate_before, metadata=metadata,
+    )  # fmt: skip
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
 
 

@@ -287,14 +287,11 @@ def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
         for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
     )
     return replace(
-        protocol,
-        table_times=on_device(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
-        table_rates=on_device(np.pad(rates, (0, rows), mode="edge")),
-        amplitudes=amplitudes,
-        frequencies=frequencies,
-        phases=phases,
+        protocol, table_times=on_device(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
+        table_rates=on_device(np.pad(rates, (0, rows), mode="edge")), amplitudes=amplitudes,
+        frequencies=frequencies, phases=phases,
         table_strains=None if strains is None else on_device(strains),
-    )
+    )  # fmt: skip
 
 
 def recorded_at(

@@ -16,7 +16,7 @@ from discover.dataset.importing.folder_files import (
     unread_columns,
 )
 from discover.dataset.importing.in_time import joined_intervals
-from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
+from discover.dataset.importing.mapping import Mapping, Source, TestName
 from discover.dataset.importing.names import alternatives, name_table
 from discover.dataset.importing.oscillations import waves_of, without_names
 from discover.dataset.importing.quantities import (
@@ -183,7 +183,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     there: dict[str, None] = {}
     tables: list[tuple[int, Readings]] = []
     for number, block in blocks:
-        key = f"{key_of(file)}:{number}"
+        key = f"{file}:{number}"
         where = f"{file}, block {number} {block.name}".strip()
         name = plain + (f"-{number}" if len(blocks) > 1 else "")
         readings = Readings.of(block, mapping.of_block(file, number), file)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing import quantities
-from discover.dataset.importing.mapping import Geometry, Mapping, key_of
+from discover.dataset.importing.mapping import Geometry, Mapping
 from discover.dataset.importing.names import NameTable, name_table
 from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_rank, to_celsius
 from discover.dataset.importing.text_export import Block
@@ -110,7 +110,7 @@ class Readings:
 
     def _temperature(self) -> Values | None:
         """Return temperatures as the user, a column, the header, a title or the name gives them."""
-        given = self.mapping.temperatures.get(key_of(self.name))
+        given = self.mapping.temperatures.get(self.name)
         if given is not None:
             self.used["temperature"] = f"{given:g} °C as given"
             return np.full(len(self), given)

@@ -14,8 +14,6 @@ from discover.words import percent_of
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000
-# a sweep with more is thinned: 40 a decade over ten decades, where instruments give 5 to 20
-MOST_FREQUENCIES = 400
 _FOLLOWED = 1e-3  # error of the strain, over its range, up to which samples kept follow the rate
 _FOLLOWED_RATE = 0.05  # error of the rate, over its largest, up to which straight lines follow it
 _CORNER = 0.01  # share of the largest rate, or stress, that was imposed
@@ -54,21 +52,6 @@ def thin(
             f"; the strain between them is then off by {percent_of(lost)} of its range, so the "
             "rate varies faster than the samples kept: give a shorter record"
         )
-    return keep, note
-
-
-def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndarray, " n"], str]:
-    """Return which frequencies to keep, evenly in log frequency, and a word on it if not all."""
-    n = len(angular_frequency)
-    if n <= MOST_FREQUENCIES:
-        return np.ones(n, dtype=bool), ""
-    position = np.log(angular_frequency)
-    keep = np.zeros(n, dtype=bool)
-    if position[-1] > position[0]:
-        even = np.linspace(position[0], position[-1], MOST_FREQUENCIES - 2)
-        keep[_nearest(position, even)] = True
-    keep[[0, -1]] = True
-    note = f"kept {int(keep.sum()):,} of {n:,} frequencies, evenly in log frequency"
     return keep, note
 
 
