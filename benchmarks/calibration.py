@@ -9,14 +9,8 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
   that claims one.
 
 Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
-run, and never used to change anything: 20261130; since each set is fitted from larger ones too
-20261208 for ``close-loop``, and 20261206 and 20261209 for ``compare``; since runs tell how far they
-differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves are weighed in all
-runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve,
-20261214 for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one,
-20261216 for ``close-loop``; since effects start from every multiple of their inner times, 20261217
-for ``close-loop`` and 20261218 for ``compare``; since one integrator predicts, 20261219 for
-``close-loop`` and 20261220 for ``compare``.
+run, and never used to change anything: 20261130, then 20261206 to 20261220, each since a change of
+the engine (`docs/evidence.md`); answers are in `judged/` by question and seed.
 """
 
 from collections.abc import Callable

@@ -311,21 +311,17 @@ def _middle(errors: list[float | None]) -> str:
 
 
 def table(rows: list[dict]) -> str:
-    """Return the table of all contestants, and one of N1 and extension by fluid."""
+    """Return the table of all contestants."""
     results = {tuple(row["case"].split(" ", 1)): row for row in rows}
     heads = [*QUANTITIES.values(), "right", "wrong", "seconds"]
     lines = [f"| | {' | '.join(heads)} |", "|---" * (len(heads) + 1) + "|"]
-    below = ["", f"| N1; extension | {' | '.join(FLUIDS)} |", "|---" * (len(FLUIDS) + 1) + "|"]
     for name, title in TITLES.items():
         of = {fluid: results.get((name, fluid), {"message": "not run"}) for fluid in FLUIDS}
         done = {fluid: row for fluid, row in of.items() if "errors" in row}
-        cells = [
-            "; ".join(percent(row["errors"][q]) for q in ("N1", "tensile"))
-            if fluid in done else row["message"] for fluid, row in of.items()
-        ]  # fmt: skip
-        below.append(f"| {title} | {' | '.join(cells)} |")
         if not done:
-            lines.append(f"| {title} | {cells[0]} |" + " |" * (len(heads) - 1))
+            lines.append(
+                f"| {title} | {next(iter(of.values()))['message']} |" + " |" * (len(heads) - 1)
+            )
             continue
         cells = [_middle([row["errors"][q] for row in done.values()]) for q in QUANTITIES]
         right = [row["law"] == FLUIDS[fluid][0] for fluid, row in done.items() if row["law"]]
@@ -333,4 +329,4 @@ def table(rows: list[dict]) -> str:
         cells.append(f"{np.median([row['learning'] for row in done.values()]):.0f}")
         missing = "" if len(done) == len(FLUIDS) else f" ({len(done)} of {len(FLUIDS)} fluids)"
         lines.append(f"| {title}{missing} | {' | '.join(cells)} |")
-    return "\n".join(lines + below)
+    return "\n".join(lines)

@@ -29,15 +29,9 @@ def write_folder(
     for name, run in runs.items():
         cells = [str(metadata.get(name, {}).get(key, "")) for key in extra]
         lines.append(",".join([name, *cells]))
-        columns: dict[str, np.ndarray | None] = {
-            "time_s": run.time,
-            "shear_rate_1_s": run.rate,
-            "stress_Pa": run.stress,
-        }
-        if normal_stresses:
-            columns |= {"N1_Pa": run.N1, "N2_Pa": run.N2}
-        columns["strain"] = run.strain
-        write_table(folder / name, columns, digits)
+        columns = {"time_s": run.time, "shear_rate_1_s": run.rate, "stress_Pa": run.stress}
+        columns |= {"N1_Pa": run.N1, "N2_Pa": run.N2} if normal_stresses else {}
+        write_table(folder / name, {**columns, "strain": run.strain}, digits)
     (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return folder
 

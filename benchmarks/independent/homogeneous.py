@@ -32,12 +32,9 @@ class GiesekusFluid:
     mobility: float
     solvent_viscosity: float = 0.0
 
-    def recorded(
-        self, kind: str, rate: Callable[[float], float], times: np.ndarray, begins: float = 0.0,
-        jumps: Sequence[float] = (),
-    ) -> np.ndarray:  # fmt: skip
+    def recorded(self, kind: str, *flow, **more) -> np.ndarray:
         """Return σ12 in shear, σ11 − σ22 in extension, in Pa; parameters as of `stress`."""
-        total = self.stress(kind, rate, times, begins, jumps)
+        total = self.stress(kind, *flow, **more)
         return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
 
     def stress(

@@ -38,40 +38,27 @@ Constants = Mapping[str, Mapping[str, float]]
 Named = tuple[tuple[frozenset[str], ...], Constants]
 """For each effect that is there, the names it has; and the constants that go with the first."""
 
-FLOWS: dict[str, dict[str, tuple[Flow, float]]] = {
-    "start-ups and oscillations": {
-        "a.csv": (start_up(1.0), 6.0),
-        "b.csv": (start_up(3.0), 5.0),
-        "c.csv": (oscillation(2.0, 1.0), 12.0),
-        "d.csv": (oscillation(3.0, 0.5), 14.0),
-        "held_e.csv": (start_up(5.0), 4.0),
-        "held_f.csv": (oscillation(5.0, 1.5), 8.0),
-    },
-    "start-ups": {
-        "a.csv": (start_up(0.5), 8.0),
-        "b.csv": (start_up(1.0), 6.0),
-        "c.csv": (start_up(2.0), 6.0),
-        "d.csv": (start_up(4.0), 5.0),
-        "held_e.csv": (start_up(6.0), 4.0),
-        "held_f.csv": (start_up(3.0), 5.0),
-    },
-    "oscillations": {
-        "a.csv": (oscillation(1.0, 0.5), 14.0),
-        "b.csv": (oscillation(2.0, 0.5), 14.0),
-        "c.csv": (oscillation(2.0, 1.0), 12.0),
-        "d.csv": (oscillation(4.0, 1.0), 12.0),
-        "held_e.csv": (oscillation(5.0, 1.5), 8.0),
-        "held_f.csv": (oscillation(6.0, 0.75), 10.0),
-    },
-    "steps": {
-        "a.csv": (steps([0.0, 4.0], [1.0, 3.0]), 8.0),
-        "b.csv": (steps([0.0, 4.0], [3.0, 0.5]), 8.0),
-        "c.csv": (steps([0.0, 4.0], [2.0, 0.0]), 7.0),
-        "d.csv": (steps([0.0, 3.0], [2.0, -2.0]), 7.0),
-        "held_e.csv": (steps([0.0, 3.0], [5.0, 1.0]), 6.0),
-        "held_f.csv": (steps([0.0, 3.0], [4.0, -4.0]), 6.0),
-    },
-}
+_NAMES = "a.csv", "b.csv", "c.csv", "d.csv", "held_e.csv", "held_f.csv"
+_FLOWS: dict[str, list[tuple[Flow, float]]] = {
+    "start-ups and oscillations": [
+        (start_up(1.0), 6.0), (start_up(3.0), 5.0), (oscillation(2.0, 1.0), 12.0),
+        (oscillation(3.0, 0.5), 14.0), (start_up(5.0), 4.0), (oscillation(5.0, 1.5), 8.0),
+    ],
+    "start-ups": [
+        (start_up(0.5), 8.0), (start_up(1.0), 6.0), (start_up(2.0), 6.0), (start_up(4.0), 5.0),
+        (start_up(6.0), 4.0), (start_up(3.0), 5.0),
+    ],
+    "oscillations": [
+        (oscillation(1.0, 0.5), 14.0), (oscillation(2.0, 0.5), 14.0), (oscillation(2.0, 1.0), 12.0),
+        (oscillation(4.0, 1.0), 12.0), (oscillation(5.0, 1.5), 8.0), (oscillation(6.0, 0.75), 10.0),
+    ],
+    "steps": [
+        (steps([0.0, 4.0], [1.0, 3.0]), 8.0), (steps([0.0, 4.0], [3.0, 0.5]), 8.0),
+        (steps([0.0, 4.0], [2.0, 0.0]), 7.0), (steps([0.0, 3.0], [2.0, -2.0]), 7.0),
+        (steps([0.0, 3.0], [5.0, 1.0]), 6.0), (steps([0.0, 3.0], [4.0, -4.0]), 6.0),
+    ],
+}  # fmt: skip
+FLOWS = {name: dict(zip(_NAMES, flows, strict=True)) for name, flows in _FLOWS.items()}
 """Six flows of each protocol, each with its duration in s; those named ``held_`` are to judge."""
 
 
@@ -86,36 +73,21 @@ def known_laws(draw: Draw) -> dict[str, tuple[Material, Named]]:
     length, breakdown, build_up = draw(20.0, 60.0), draw(0.1, 0.4), draw(1.0, 4.0)
     return {
         "Maxwell": (UpperConvectedMaxwell(**SCALE), ((), {})),
-        "Giesekus": (
-            Giesekus(mobility, **SCALE),
-            _alone("giesekus_mobility", mobility, "sigma.sigma", constant="alpha"),
-        ),
+        "Giesekus": (Giesekus(mobility, **SCALE), _alone(
+            "giesekus_mobility", mobility, "sigma.sigma", constant="alpha")),
         # σ12 in shear tells none of these from its twins (FACTS on twins; Johnson & Segalman 1977)
-        "Johnson-Segalman": (
-            JohnsonSegalman(slip, **SCALE),
-            _alone(
-                "non_affine_motion", slip, "tr(sigma)*gammadot",
-                "sigma.gammadot+gammadot.sigma", constant="xi",
-            ),
-        ),
-        "linear PTT": (
-            PhanThienTanner(linear, "linear", 0.0, **SCALE),
-            _alone("ptt_linear", linear, "tr(sigma)*sigma", constant="epsilon"),
-        ),
-        "exponential PTT": (
-            PhanThienTanner(exponential, "exponential", 0.0, **SCALE),
-            _alone("ptt_exponential", exponential, constant="epsilon"),
-        ),
-        "FENE-P": (
-            FenePeterlin(length, **SCALE),
-            ((frozenset({"finite_extensibility"}),), {}),
-        ),
+        "Johnson-Segalman": (JohnsonSegalman(slip, **SCALE), _alone(
+            "non_affine_motion", slip, "tr(sigma)*gammadot",
+            "sigma.gammadot+gammadot.sigma", constant="xi")),
+        "linear PTT": (PhanThienTanner(linear, "linear", 0.0, **SCALE), _alone(
+            "ptt_linear", linear, "tr(sigma)*sigma", constant="epsilon")),
+        "exponential PTT": (PhanThienTanner(exponential, "exponential", 0.0, **SCALE), _alone(
+            "ptt_exponential", exponential, constant="epsilon")),
+        "FENE-P": (FenePeterlin(length, **SCALE), ((frozenset({"finite_extensibility"}),), {})),
         "thixotropic Maxwell": (
             Thixotropic(UpperConvectedMaxwell(**SCALE), breakdown, build_up),
-            (
-                (frozenset({"thixotropy"}),),
-                {"thixotropy": {"breakdown": breakdown, "build_up_time": build_up}},
-            ),
+            ((frozenset({"thixotropy"}),),
+             {"thixotropy": {"breakdown": breakdown, "build_up_time": build_up}}),
         ),
     }  # fmt: skip
 

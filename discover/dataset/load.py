@@ -97,8 +97,8 @@ def load_dataset(
 
     A column may carry another unit in its name, such as ``stress_kPa``. A run without a shear rate
     must have the strain, from which its rate is derived (metadata ``shear_rate_source``); one of
-    more than `MOST_SAMPLES` samples is thinned (metadata ``thinned``). Flow, control and start of a
-    run are columns of ``runs.csv``.
+    more than `MOST_SAMPLES` samples is thinned (``thinned``). Raises InputError if something in the
+    folder is wrong: what, where and how to mend it.
 
     Parameters
     ----------
@@ -106,29 +106,22 @@ def load_dataset(
         As in `resolve_folder`.
     clock_factor
         Column of ``runs.csv`` with instrument time = time / factor, if any.
-    rate_is_measured
-        Whether the shear rate was measured and not commanded.
-    rate_window
-        Samples in the moving window when the rate is derived from strain.
+    rate_is_measured, rate_window
+        Whether the shear rate was measured and not commanded; samples in the moving window when it
+        is derived from strain.
     rate_before
         Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
         the unit at the end of its name; by default every run starts from rest.
     sequence
-        Column of ``runs.csv`` that orders runs made one after another on one sample, such as start
-        times; by default every run has a sample of its own.
+        Column that orders runs made one after another on one sample, such as start times; by
+        default every run has a sample of its own.
     amplitude_sweep_rad_s
         Frequency of ``amplitude_sweep.csv``, if it has no column ``omega_rad_s``.
-
-    Raises
-    ------
-    InputError
-        If something in the folder is wrong; the message says what, where and how to fix it.
 
     Examples
     --------
     >>> import discover as dc
     >>> data = dc.load_dataset("melt")  # doctest: +SKIP
-    >>> train, test = data.split(held_out=["fast.csv"])  # doctest: +SKIP
     """
     columns = {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence}
     for option, column in columns.items():

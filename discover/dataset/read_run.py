@@ -1,6 +1,5 @@
 """Read one run of a data folder: which test it is, its samples, its rate, and what came before."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -89,7 +88,7 @@ def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None
 
 def _word(index: Table, row: int, column: str) -> str:
     values, cell = _VALUES[column], _cell(index, row, column)
-    if column == "start" and _is_finite(cell):
+    if column == "start" and is_number(cell):
         return values[0]  # a time at which the run started, as `sequence` takes it
     if cell and cell not in values:
         raise InputError(
@@ -102,19 +101,12 @@ def _word(index: Table, row: int, column: str) -> str:
 
 def _number(index: Table, row: int, column: str) -> float:
     cell = _cell(index, row, column)
-    if cell and not _is_finite(cell):
+    if cell and not is_number(cell):
         raise InputError(
             f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}. Write a number, "
             "or leave the cell empty."
         )
     return float(cell or 0.0)
-
-
-def _is_finite(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
 
 
 def _cell(index: Table, row: int, column: str) -> str:

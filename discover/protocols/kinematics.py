@@ -152,20 +152,6 @@ def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:
     return next(name for name in names if np.array_equal(_RECORDED[name], recorded))
 
 
-def kinematics_recording(
-    kinematics: Kinematics | None, quantity: RecordedQuantity, count: int
-) -> Kinematics:
-    """Return the kinematics of so many runs as if N1 or N2 of theirs were recorded.
-
-    None stands for runs in simple shear.
-    """
-    every = kinematics or stack_kinematics([kinematics_of("shear")] * count)
-    assert every is not None
-    recorded = np.tile(_RECORDED[quantity], (count, 1))
-    viscous = np.sum(recorded * _rate(np.asarray(every.gradient)), axis=-1)
-    return replace(every, recorded=on_device(recorded), viscous=on_device(viscous))
-
-
 def normal_stress_differences(
     kinematics: Kinematics | None,
     recorded: Float[np.ndarray, "trials runs n"],

@@ -161,24 +161,15 @@ def register_importer(
 ) -> Importer:
     """Make an importer of one's own known to `discover data import`.
 
+    Raises InputError if the name is taken or is none, or another importer has a suffix.
+
     Parameters
     ----------
-    name
-        As ``--format`` is to spell it: lower-case letters, digits and underscores.
+    name, suffixes
+        As ``--format`` is to spell it: lower-case letters, digits and underscores; endings of names
+        by which such files are known.
     read
         Takes the path of a file and returns its blocks, made with `Block.of`.
-    suffixes
-        Endings of names by which such files are known.
-
-    Raises
-    ------
-    InputError
-        If the name is taken or is none, or another importer has one of the suffixes.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> dc.register_importer("house_rheometer", read, suffixes=[".npz"])  # doctest: +SKIP
     """
     require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
     endings = tuple(str(suffix).lower() for suffix in suffixes)

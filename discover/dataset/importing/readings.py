@@ -21,7 +21,6 @@ from discover.errors import InputError
 INSTRUMENT = {
     "stress": "torque", "shear_rate": "angular_velocity", "strain": "angle", "N1": "normal_force",
 }  # fmt: skip
-_COEFFICIENTS = {"N1": "psi1", "N2": "psi2"}  # N1 = Ψ1 γ̇² and N2 = Ψ2 γ̇²
 # a column of strain may be called the one or the other by who gives its unit
 SAME = {"strain": "strain_amplitude", "strain_amplitude": "strain"}
 
