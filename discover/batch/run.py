@@ -213,12 +213,12 @@ def run_batch(
         so_far.end(position, status)
 
     try:
-        with on_stop(summary.write_ended):
+        with on_stop(summary.write):
             if workers == 1 and scheduler is None:
                 for i, job in enumerate(jobs):
                     end(i, run_one(*job, progress=partial(so_far.say, i)))
             else:
-                summary.write_soon()  # once it was written, it takes no time on Ctrl-C
+                summary.write()  # once it was written, it takes no time on Ctrl-C
                 if scheduler is None:
                     run_in_workers(run_one, jobs, min(workers, len(jobs)), so_far.say, end)
                 else:

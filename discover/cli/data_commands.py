@@ -174,7 +174,7 @@ def shift(
     from discover.dataset.linear.linear_tests import read_linear_tests
     from discover.dataset.linear.superposition import move_tests, shift_table
     from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
-    from discover.report.data import agreement_words, superposition_page, superposition_words
+    from discover.report.data import superposition_page, superposition_words
     from discover.study.atomic import make_folder, remove_file, write_text
 
     out = _required(out)
@@ -185,24 +185,24 @@ def shift(
             f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
             f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
         )
-    moved = move_tests(read_linear_tests(root), reference, vertical, between)
+    found = move_tests(read_linear_tests(root), reference, vertical, between)
+    files = {f"{kind}.csv": found.master(kind) for kind in found.tests}
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    names = (*moved.files, "shift_factors.csv", "report.html")
+    names = (*files, "shift_factors.csv", "report.html")
     _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
-    write_text(out / "shift_factors.csv", shift_table(found := moved.found))
-    text = superposition_page(found, root.resolve().name, moved.agreements, moved.own)
-    page = write_text(out / "report.html", text)
+    write_text(out / "shift_factors.csv", shift_table(found))
+    page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
     written, without = [], []
-    for name, table in moved.files.items():
+    for name, table in files.items():
         if table is None:
             remove_file(out / name)
             without.append(name)
         else:
             write_text(out / name, table.to_dataframe().to_csv(index=False))
             written.append(name)
-    words = [*superposition_words(found, moved.own), *agreement_words(moved.agreements)]
+    words = superposition_words(found)
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
         typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))

@@ -171,8 +171,8 @@ def at_work(out):
     """Processes that hold the folder of a study."""
     pids = set()
     for lock in out.glob(f"*/{LOCK_FILE}"):
-        with contextlib.suppress(OSError, ValueError):
-            pids.add(json.loads(lock.read_text())["pid"])
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            pids.add(int(lock.read_text().split()[1]))
     return pids
 
 

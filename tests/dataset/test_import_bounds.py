@@ -184,7 +184,7 @@ def test_a_temperature_is_given_for_each_file_or_block_and_the_sweeps_can_be_shi
     )  # fmt: skip
     assert again.exit_code == 0, again.output
     moved = move_tests(read_linear_tests(tmp_path / "again"), None, False, None)
-    rows = [row.split(",") for row in shift_table(moved.found).splitlines()[1:]]
+    rows = [row.split(",") for row in shift_table(moved).splitlines()[1:]]
     ratio = float(rows[0][1]) / float(rows[1][1])
     # the second sweep is the first at a tenth of the frequency; found from 13 points of each
     np.testing.assert_allclose(ratio, 10.0, rtol=0.01)
