@@ -229,14 +229,6 @@ def import_data(
     unit: Annotated[
         list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
     ] = None,
-    names: Annotated[
-        Path | None,
-        typer.Option(
-            "--names",
-            envvar="DISCOVER_NAMES",
-            help='TOML file of further names of quantities: stress = ["Sigma corr."].',
-        ),
-    ] = None,
     geometry: Annotated[
         str | None,
         typer.Option(
@@ -302,7 +294,7 @@ def import_data(
         "encoding": encoding,
     }  # fmt: skip
     pairs = {"columns": column, "units": unit, "tests": test, "temperatures": temperature}
-    merged = options.merge_mapping(mapping, pairs, layout, names, geometry, block, start_time)
+    merged = options.merge_mapping(mapping, pairs, layout, geometry, block, start_time)
     paths, sweep, changed = options.sources_of(merged, mapping, files or [], lve)
     imported = import_files(paths, merged, sweep)
     options.write_folder(imported, out, overwrite, mapping)

@@ -17,7 +17,6 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
-from discover.dataset.importing.names import read_names
 from discover.dataset.importing.quantities import to_celsius
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, TESTS_FILE
@@ -29,7 +28,7 @@ from discover.study.atomic import make_folder, write_text
 
 def merge_mapping(
     path: Path | None, pairs: AnyMapping[str, Sequence[str] | None],
-    layout: AnyMapping[str, object], names: Path | None = None, geometry: str | None = None,
+    layout: AnyMapping[str, object], geometry: str | None = None,
     blocks: Sequence[int] | None = None, start_time_s: float | None = None,
 ) -> Mapping:  # fmt: skip
     """Return the mapping of a file with the options of the command line on top.
@@ -42,8 +41,6 @@ def merge_mapping(
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
         content[key] = {**content.get(key, {}), **_pairs(pairs[key] or (), example)}
-    if names is not None:
-        content["names"] = {**content.get("names", {}), **read_names(names)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
         numbers = {

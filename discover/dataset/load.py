@@ -10,7 +10,6 @@ from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import (
-    DEFAULT_WINDOW,
     INDEX_FILE,
     read_run,
     reason_to_set_aside,
@@ -89,7 +88,7 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
 
 def load_dataset(
     folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None,
-    rate_is_measured: bool = False, rate_window: int = DEFAULT_WINDOW,
+    rate_is_measured: bool = False,
     rate_before: str | None = None, sequence: str | None = None,
     amplitude_sweep_rad_s: float | None = None,
 ) -> Dataset:  # fmt: skip
@@ -106,9 +105,8 @@ def load_dataset(
         As in `resolve_folder`.
     clock_factor
         Column of ``runs.csv`` with instrument time = time / factor, if any.
-    rate_is_measured, rate_window
-        Whether the shear rate was measured and not commanded; samples in the moving window when it
-        is derived from strain.
+    rate_is_measured
+        Whether the shear rate was measured and not commanded.
     rate_before
         Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
         the unit at the end of its name; by default every run starts from rest.
@@ -129,11 +127,6 @@ def load_dataset(
             raise InputError(f"{option} is the name of a column; got {short(column)}.")
     if not isinstance(rate_is_measured, bool | np.bool_):
         raise InputError(f"rate_is_measured must be True or False; got {short(rate_is_measured)}.")
-    whole = isinstance(rate_window, int | np.integer) and not isinstance(rate_window, bool)
-    if not whole or rate_window < 1:
-        raise InputError(
-            f"rate_window must be a whole number of samples; got {short(rate_window)}."
-        )
     frequency = amplitude_sweep_rad_s
     if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
         raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
@@ -167,7 +160,7 @@ def load_dataset(
         steady = None if before is None else float(before[row])
         with problems.collected():
             table, factor = table_of_run(root, names[row]), float(factors[row])
-            runs.append(read_run(table, index, row, factor, rate_is_measured, rate_window, steady))
+            runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]

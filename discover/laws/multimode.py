@@ -155,7 +155,7 @@ class Fluid(eqx.Module):
         law
             Of every mode; by default upper convected Maxwell.
         **options
-                `modes`, `most_modes`, `tolerance`, known `solvent_viscosity` and `elastic_modulus`,
+                `modes`, known `solvent_viscosity` and `elastic_modulus`,
             as of
             `discover.dataset.relaxation_spectrum`.
 

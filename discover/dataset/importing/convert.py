@@ -17,7 +17,7 @@ from discover.dataset.importing.folder_files import (
 )
 from discover.dataset.importing.in_time import joined_intervals
 from discover.dataset.importing.mapping import Mapping, Source, TestName
-from discover.dataset.importing.names import alternatives, name_table
+from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.oscillations import waves_of, without_names
 from discover.dataset.importing.quantities import (
     UnsaidUnits,
@@ -42,8 +42,7 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        names = name_table(mapping.names)
-        if not any(guess_columns(block, mapping.columns, names) for block in found):
+        if not any(guess_columns(block, mapping.columns) for block in found):
             wave = without_names(rows)
             found = found if wave is None else [wave]
         require_blocks(found, path.name)

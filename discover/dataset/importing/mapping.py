@@ -4,9 +4,8 @@ import math
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from discover.dataset.importing.names import check_names
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.tables.table import read_toml, toml_string
 from discover.validation import Section, validated
@@ -87,13 +86,12 @@ class Source(Section):
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `names` are the tables of ``names.toml``, of `tests` ``FILE:BLOCK``, ``FILE`` or
-    `EVERY_BLOCK`, of `temperatures`, in °C, ``FILE:BLOCK`` or ``FILE``.
+    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`, of `temperatures`, in °C,
+    ``FILE:BLOCK`` or ``FILE``.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
-    names: dict[str, Annotated[tuple[str, ...], Strict(False)]] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
@@ -102,11 +100,6 @@ class Mapping(Section):
     blocks: Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(min_length=1)] | None = None
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
-
-    @model_validator(mode="after")
-    def _known(self):
-        check_names(self.names, "names")
-        return self
 
     def test_of(self, file: str, block: int) -> TestName | None:
         """Return what the user says that a block of a file, from 1, is; None if nothing."""
@@ -140,7 +133,7 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "names", "layout", "geometry", "tests", "temperatures"):
+    for name in ("columns", "units", "layout", "geometry", "tests", "temperatures"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
@@ -158,6 +151,4 @@ def _key(name: str) -> str:
 
 
 def _toml(value: object) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
     return toml_string(value) if isinstance(value, str) else repr(value)

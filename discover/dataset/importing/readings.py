@@ -10,7 +10,7 @@ from jaxtyping import Float
 
 from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Geometry, Mapping
-from discover.dataset.importing.names import NameTable, name_table
+from discover.dataset.importing.names import name_table
 from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_rank, to_celsius
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
@@ -45,7 +45,7 @@ class Readings:
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return readings of a block; InputError if a given name stands above two columns."""
-        columns = quantities.guess_columns(block, mapping.columns, name_table(mapping.names))
+        columns = quantities.guess_columns(block, mapping.columns)
         found = cls(block, columns, mapping, name, mapping.geometry)
         if found.geometry is None:
             found.geometry = found._geometry()
@@ -85,11 +85,6 @@ class Readings:
         values = (self.get(key) for key in keys)
         kept = [np.zeros(len(self), bool) if v is None else np.isfinite(v) for v in values]
         return np.all([np.ones(len(self), bool), *kept], axis=0)
-
-    @property
-    def names(self) -> NameTable:
-        """What quantities are called."""
-        return name_table(self.mapping.names)
 
     def named(self) -> set[str]:
         """Return the quantities of which the block has a column or its header a number."""
@@ -156,7 +151,7 @@ class Readings:
             return seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
         raw = self.block.numbers[at]
         if not (unit := self._unit_given(key) or unit):
-            split = quantities.split_name(key, column, self.names)
+            split = quantities.split_name(key, column)
             unit = "" if split is None else split[1]
         if key == "temperature":
             kelvin = to_celsius(0.0, unit or "°C")
@@ -170,7 +165,7 @@ class Readings:
             return np.where(wrong, math.nan, degrees)
         if not unit:
             lines = (c for c in self.block.constants if not c.value)
-            said = (c.unit for c in lines if self.names.rank(key, c.name) is not None)
+            said = (c.unit for c in lines if name_table().rank(key, c.name) is not None)
             unit = next(said, "") or self._unsaid(key, column, raw)
         factor = quantities.factor_to_si(key, unit, column, self.name)
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
@@ -189,7 +184,7 @@ class Readings:
             used, unsaid = dict(self.used), dict(self.unsaid)
             others = self.columns.keys() - {key}
             found = quantities.unsaid_unit(
-                key, column, raw, lambda k: self._column(k) if k in others else None, self.names
+                key, column, raw, lambda k: self._column(k) if k in others else None
             )
             # what tells a unit is not thereby part of the test
             self.used, self.unsaid = used, {**unsaid, key: found}
@@ -254,7 +249,7 @@ class Readings:
         if key in ("time", "wave_time", "point"):  # the time of the day, the number of points
             return None
         ranks = {
-            constant: name_rank(key, constant.name, constant.unit, self.names)
+            constant: name_rank(key, constant.name, constant.unit)
             for constant in self.block.constants
             if constant.value and (constant.unit or len(constant.name) > 1)
         }
