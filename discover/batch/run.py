@@ -36,9 +36,6 @@ _DRAWING = {"compare": 8.0, "close-loop": 4.5}
 _DEMO_LOOP = 7.5
 """Seconds that the loop of the demonstration takes after its comparison, likewise."""
 
-Note = Callable[[Study], None]
-"""Called with a study that was read, before anything is done with it."""
-
 _PAGE = "report.html"
 _JSON_FILES = {"compare": "comparison.json", "close-loop": "loop.json"}
 
@@ -66,15 +63,13 @@ class _Task:
 
     def __call__(
         self, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
-        note: Note = lambda study: None, tolerance: float | None = None,
+        tolerance: float | None = None,
     ) -> TaskResult:  # fmt: skip
-        """Run the task.
+        """Run the task; InputError if the study, its data or the folder is wrong.
 
-        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides
-        the study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and
-        the fraction done. `note`: called with the study once it was read. `tolerance`: overrides
-        the relative discrepancy that the study accepts. Raises InputError if the study, its data or
-        the folder is wrong.
+        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`,
+        `tolerance`: in place of the study's. `overwrite`: start afresh. `progress`: called with
+        what is going on and the fraction done.
         """
         enable_x64()
         enable_compilation_cache()
@@ -82,7 +77,6 @@ class _Task:
         if tolerance is not None:
             verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
             study = study.model_copy(update={"verdict": verdict})
-        note(study)
         folder = RunFolder(out, fingerprint(study, self.name, seed), overwrite)
         there = folder.complete and folder.holds(_PAGE, _JSON_FILES[self.name])
         if there:
@@ -186,8 +180,8 @@ def run_demo(
 
 def run_batch(
     paths: Sequence[Path], out: Path, workers: int = 1, scheduler: str | None = None,
-    seed: int | None = None, overwrite: bool = False, progress: Progress = lambda label,
-    fraction: None, note: Note = lambda study: None,
+    seed: int | None = None, overwrite: bool = False,
+    progress: Progress = lambda label, fraction: None,
 ) -> BatchResult:  # fmt: skip
     """Run studies into folders of their own; one that fails does not stop the others.
 
@@ -202,7 +196,7 @@ def run_batch(
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
-        for name, task in _tasks_of(path, name, note)
+        for name, task in _tasks_of(path, name)
     ]
     _require_different([job[1] for job in jobs])
     summary = Summary(out, [(job[1], job[2]) for job in jobs])
@@ -277,12 +271,11 @@ def run_one(
     return ended("complete" if result.was_complete else "done", result.text)
 
 
-def _tasks_of(path: Path, name: str, note: Note) -> list[tuple[str, str]]:
+def _tasks_of(path: Path, name: str) -> list[tuple[str, str]]:
     try:
         study = read_study(path)
     except InputError:
         return [(name, "compare")]  # fails again when it runs, and is listed with the reason
-    note(study)
     sections = study.model_fields_set
     if "loop" not in sections:
         return [(name, "compare")]

@@ -109,6 +109,7 @@ except ImportError:  # Windows
     fcntl = None
 
 LOCK_FILE = ".discover-lock"
+_LOCKING = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 # Locks of this process by folder; several RunFolder objects of one process share one
 _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDictionary()
@@ -140,7 +141,7 @@ def lock_folder(folder: str | Path) -> FolderLock:
     if held is not None and held._finalizer.alive:
         return held
     for _ in range(20):
-        descriptor = _open(path)
+        descriptor = os.open(path, _LOCKING, 0o644)
         if not _take(descriptor):
             who = os.read(descriptor, 100).decode("ascii", "replace") or "another process"
             os.close(descriptor)
@@ -159,27 +160,6 @@ def lock_folder(folder: str | Path) -> FolderLock:
     lock = FolderLock(path, descriptor)
     _held[str(path)] = lock
     return lock
-
-
-def _open(path: Path) -> int:
-    """Open the lock file; whatever else somebody put in its place is refused, and not written."""
-    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
-    refused = InputError(
-        f"{path} is not a plain file with one name, so the folder cannot be locked. Remove it, or "
-        "use another --out."
-    )
-    try:
-        descriptor = os.open(path, flags, 0o644)
-    except OSError as error:
-        if not os.path.lexists(path) or (path.is_file() and not path.is_symlink()):
-            raise
-        raise refused from error
-    found = os.fstat(descriptor)
-    # a file of two names is somebody's other file too
-    if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
-        return descriptor
-    os.close(descriptor)
-    raise refused
 
 
 def _take(descriptor: int) -> bool:

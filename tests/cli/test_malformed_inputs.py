@@ -137,20 +137,6 @@ def test_a_batch_says_its_failures_on_standard_error_however_quiet(tmp_path):
     assert outcome.stderr.startswith("discover: s (compare): ")
 
 
-def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
-    mine, other = tmp_path / "mine", tmp_path / "other"
-    for folder in (mine, other):
-        folder.mkdir()
-        harm.write_files(folder, harm.SANE["FOLDER"])
-    for path, told in ((".", False), ("../other", True), (str(other), True)):
-        (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
-        outcome = malformed.run_call(
-            ["close-loop", str(mine / "s.toml"), "--out", str(tmp_path / "out"), "--overwrite"]
-        )
-        assert outcome.code is None
-        assert (str(other) in outcome.stderr) is told, outcome
-
-
 def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():
     assert folder_names([Path("...toml"), Path("a.toml")]) == ["study", "a"]
 

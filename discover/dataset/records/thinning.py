@@ -10,7 +10,6 @@ from scipy.interpolate import make_lsq_spline
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
 from discover.statistics.noise.outliers import isolated
-from discover.words import percent_of
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000
@@ -42,17 +41,10 @@ def thin(
     keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
     for values in (shear_stress, shear_rate):
         keep[[int(np.argmin(values)), int(np.argmax(values))]] = True
-    lost = _strain_error(time, shear_rate, keep)
-    note = (
-        f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half "
-        "evenly in time, and the extremes of stress and rate"
+    return keep, (
+        f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half evenly in time, "
+        "and the extremes of stress and rate"
     )
-    if lost > _FOLLOWED:
-        note += (
-            f"; the strain between them is then off by {percent_of(lost)} of its range, so the "
-            "rate varies faster than the samples kept: give a shorter record"
-        )
-    return keep, note
 
 
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
@@ -123,13 +115,6 @@ def followed_rate(
 def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     return after - (wanted - time[after - 1] < time[after] - wanted)
-
-
-def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float:
-    """Return the largest error of the integrated rate at the samples kept, over its range."""
-    whole = cumulative_trapezoid(rate, time, initial=0.0)
-    part = cumulative_trapezoid(rate[keep], time[keep], initial=0.0)
-    return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
 
 
 # The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4
