@@ -57,8 +57,8 @@ HARMED: dict[str, tuple[dict[str, Any], list[str], list[str]]] = {
     "batch": ({**FOLDER, "s0.toml": STUDY, "s1.toml": COMPARISON}, ["s0.toml", "s1.toml"],
               ["batch R/s0.toml R/s1.toml --out R/out"]),
     "imported": (_DATA, [*EXPORTS, "sweep.txt"],
-                 [f"data import R/{name} --out R/data{sweep}" for name in EXPORTS
-                  for sweep in ("", " --lve R/sweep.txt")]),
+                 [f"data import R/{name}{sweep} --out R/data" for name in EXPORTS
+                  for sweep in ("", " R/sweep.txt")]),
     "mapped": ({**EXPORTS, "map.toml": SANE["MAPPING"]}, ["map.toml"],
                ["data import --mapping R/map.toml --out R/data"]),
 }  # fmt: skip

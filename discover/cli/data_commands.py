@@ -237,9 +237,6 @@ def import_data(
             "plate_plate:radius_mm=25,gap_mm=1.",
         ),
     ] = None,
-    lve: Annotated[
-        Path | None, typer.Option("--lve", help="File with the linear frequency sweep.")
-    ] = None,
     block: Annotated[
         list[int] | None, typer.Option("--block", min=1, help="Import only these blocks of a file.")
     ] = None,
@@ -295,8 +292,8 @@ def import_data(
     }  # fmt: skip
     pairs = {"columns": column, "units": unit, "tests": test, "temperatures": temperature}
     merged = options.merge_mapping(mapping, pairs, layout, geometry, block, start_time)
-    paths, sweep, changed = options.sources_of(merged, mapping, files or [], lve)
-    imported = import_files(paths, merged, sweep)
+    paths, changed = options.sources_of(merged, mapping, files or [])
+    imported = import_files(paths, merged)
     options.write_folder(imported, out, overwrite, mapping)
     # a folder of several temperatures is for one to be chosen from
     whole = any(name in imported.files for name in DATA_FILES)

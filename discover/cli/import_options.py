@@ -99,24 +99,20 @@ def _number(text: str, where: str) -> float:
 
 
 def sources_of(
-    mapping: Mapping, path: Path | None, files: Sequence[Path], sweep: Path | None
-) -> tuple[list[Path], Path | None, list[str]]:
+    mapping: Mapping, path: Path | None, files: Sequence[Path]
+) -> tuple[list[Path], list[str]]:
     """Return the files to import, or else those of the mapping file, and which have changed."""
     if files or path is None:
-        return list(files), sweep, []
-    runs: list[Path] = []
+        return list(files), []
+    found: list[Path] = []
     changed = []
     remedy = f"Correct [[source]] in {path.name}, or put the file there."
     for source in mapping.source:
-        file = path.parent / source.file
-        digest = hashlib.sha256(read_bytes(file, source.file, remedy)).hexdigest()
+        found.append(path.parent / source.file)
+        digest = hashlib.sha256(read_bytes(found[-1], source.file, remedy)).hexdigest()
         if source.sha256 is not None and digest != source.sha256:
             changed.append(f"{source.file} has changed since it was imported before.")
-        if source.sweep:
-            sweep = sweep or file
-        else:
-            runs.append(file)
-    return runs, sweep, changed
+    return found, changed
 
 
 def write_folder(

@@ -174,7 +174,7 @@ def test_a_sweep_is_imported_beside_the_runs(tmp_path):
     rows += lines(OMEGA, storage * 1e-6, loss * 1e-3)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
     out = tmp_path / "data"
-    arguments = (tmp_path / "melt.txt", "--lve", tmp_path / "sweep.txt", "--out", out)
+    arguments = (tmp_path / "melt.txt", tmp_path / "sweep.txt", "--out", out)
     assert invoke(*arguments).exit_code == 0
     sweep = load_dataset(out).linear_sweep
     assert sweep is not None
@@ -306,7 +306,7 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
     rows += lines(sweep.angular_frequency / (2 * np.pi), *moduli)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
     out = tmp_path / "data"
-    result = invoke(*files, "--lve", tmp_path / "sweep.txt", "--out", out)
+    result = invoke(*files, tmp_path / "sweep.txt", "--out", out)
     assert result.exit_code == 0, result.output
     again = load_dataset(out)
     for run in original.runs[:4]:

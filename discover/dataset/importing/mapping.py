@@ -80,7 +80,6 @@ class Source(Section):
 
     file: str
     sha256: str | None = None
-    sweep: bool = False
 
 
 class Mapping(Section):
@@ -142,7 +141,6 @@ def write_mapping(mapping: Mapping) -> str:
     for source in mapping.source:
         lines += ["", "[[source]]", f"file = {_toml(source.file)}"]
         lines += [f"sha256 = {_toml(source.sha256)}"] if source.sha256 else []
-        lines += ["sweep = true"] if source.sweep else []
     return "\n".join(lines) + "\n"
 
 

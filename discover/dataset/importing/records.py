@@ -34,7 +34,6 @@ class Record:
     name: str = ""  # of its file, if it is a run, without ending
     source: str = ""  # file that it is from
     block: str = ""  # what that calls the block
-    chosen: bool = False  # by the user, as the table of its kind
 
     @property
     def is_run(self) -> bool:
