@@ -214,7 +214,7 @@ def run_batch(
             else:
                 summary.write()  # once it was written, it takes no time on Ctrl-C
                 if scheduler is None:
-                    run_in_workers(run_one, jobs, min(workers, len(jobs)), so_far.say, end)
+                    run_in_workers(jobs, min(workers, len(jobs)), so_far.say, end)
                 else:
                     run_on_cluster(run_one, jobs, scheduler, so_far.say, end)
     finally:
