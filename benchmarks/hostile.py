@@ -35,7 +35,7 @@ import product
 from hostile_records import FILE, SAMPLED, SCALE, Runs
 from independent import authors, noise
 from independent import named as by_name
-from independent.folders import write_table
+from independent.folders import write_runs, write_table
 from independent.noise import rms
 from scipy.ndimage import median_filter
 
@@ -144,13 +144,8 @@ def make(case: Case, seed: int) -> tuple[Runs, Runs]:
 
 def write(case: Case, noisy: Runs, folder: Path, seed: int) -> dict[str, Any]:
     """Write the data folder; return the section of a study on it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    keys = list(dict.fromkeys(key for run in noisy.values() for key in run.cells))
-    lines = [",".join(["file", *keys])]
-    for name, run in noisy.items():
-        write_table(folder / name, run.columns)
-        lines.append(",".join([name, *(str(run.cells.get(key, "")) for key in keys)]))
-    (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    columns = {name: run.columns for name, run in noisy.items()}
+    write_runs(folder, columns, {name: run.cells for name, run in noisy.items()})
     source = {"folder": str(folder.resolve()), **case.told}
     if case.held_out:
         source["held_out"] = list(case.held_out)
@@ -163,11 +158,6 @@ def write(case: Case, noisy: Runs, folder: Path, seed: int) -> dict[str, Any]:
         if name != "lve.csv":  # the modes come from it
             source[name.removesuffix(".csv")] = "fit"
     return source
-
-
-def names(seed: int) -> list[str]:
-    del seed
-    return [name for group in GROUPS.values() for name in group]
 
 
 def is_asked(name: str, question: str) -> bool:
@@ -350,16 +340,11 @@ def table(rows: list[dict]) -> str:
     for group, members in GROUPS.items():
         some = [row for row in rows if row["case"] in members]
         if some:
-            held = [
-                low <= true <= high
-                for r in some
-                for _, true, _, low, high in r.get("constants", ())
-            ]
-            counts = [
-                sum(bool(r.get("false")) for r in some),
-                sum("not explained, though it could be" in r.get("notes", ()) for r in some),
-                sum("message" in r for r in some),
-            ]
-            cells = [group, str(len(some)), *map(str, counts), f"{sum(held)} of {len(held)}"]
+            told = [one for r in some for one in r.get("constants", ())]
+            open_ = [r for r in some if "not explained, though it could be" in r.get("notes", ())]
+            counts = [len(some), sum(bool(r.get("false")) for r in some), len(open_)]
+            counts += [sum("message" in r for r in some)]
+            held = sum(low <= true <= high for _, true, _, low, high in told)
+            cells = [group, *map(str, counts), f"{held} of {len(told)}"]
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

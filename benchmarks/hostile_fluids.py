@@ -9,6 +9,7 @@ from independent import (
     Flow,
     Material,
     Modes,
+    Newtonian,
     RateLaw,
     Stresses,
     StressLaw,
@@ -178,18 +179,12 @@ class CarreauWhiteMetzner(WhiteMetzner):
 
 
 @dataclass(frozen=True)
-class Thickening(RateLaw):
+class Thickening(Newtonian):
     """A viscous stress η γ̇ (1 + |γ̇|/γ̇_c), to stand among `Modes`."""
 
     viscosity: float = 2.0  # η, Pa s
     rate: float = 1.0  # γ̇_c, 1/s
     modulus: float = 0.0
-
-    def rest(self) -> np.ndarray:
-        return np.zeros(0)
-
-    def change(self, state: np.ndarray, rate: Rate) -> np.ndarray:
-        return state
 
     def stress(self, state: np.ndarray, rate: Rate) -> np.ndarray:
         tensor = rate_tensor(rate)

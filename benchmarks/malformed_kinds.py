@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import harm
-from harm import SANE, to_toml, write_files
+from harm import SANE, write_files
+from independent.folders import to_toml
 
-FOLDER, STUDY, COMPARISON, RESULTS, EXPORTS = (
-    SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON", "RESULTS", "EXPORTS")
-)
+FOLDER, STUDY, COMPARISON = (SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON"))
+RESULTS, EXPORTS = SANE["RESULTS"], SANE["EXPORTS"]
 _OVERLAY = to_toml(STUDY) + '[[report.overlay]]\nlabel = "x"\nfile = "o.csv"\n'
 _TOLD = {"declared": {"law": RESULTS["loop.json"]["law"], "effects": []}, "stages": []}
 _DATA = {**EXPORTS, "sweep.txt": SANE["SWEEP"]}
@@ -124,11 +124,8 @@ def nonsense_in_a_study(root: Path, source: random.Random) -> Case:
     tree[section][key] = source.choice((float("nan"), -1, 10**40, "3", [[1]], {"a": 1}))
     (root / "study.toml").write_text(to_toml(tree), "utf-8")
     call = ["close-loop", str(root / "study.toml"), "--out", str(root / "out")]
-    return Case(
-        call,
-        ("study.toml", *(str(key) for _, key in harm.holders(STUDY))),
-        f"{section}.{key} = {tree[section][key]!r}",
-    )
+    places = ("study.toml", *(str(key) for _, key in harm.holders(STUDY)))
+    return Case(call, places, f"{section}.{key} = {tree[section][key]!r}")
 
 
 def complete_results(root: Path) -> None:
@@ -196,10 +193,8 @@ def estimator(root: Path, source: random.Random) -> Case:
     kind = source.choice(("<f8", "|O", "<U9999", "V0", "|b1"))
     head = repr({"descr": kind, "fortran_order": False, "shape": shape}).encode() + b"\n"
     array = b"\x93NUMPY\1\0" + struct.pack("<H", len(head)) + head + b"\0" * 16
-    header = json.dumps(harm.mutate_values(SANE["ESTIMATOR"], source)).encode(
-        "utf-8", "surrogatepass"
-    )
-    raw = _packed({"estimator.json": header, "array0.npy": array})
+    header = json.dumps(harm.mutate_values(SANE["ESTIMATOR"], source))
+    raw = _packed({"estimator.json": header.encode("utf-8", "surrogatepass"), "array0.npy": array})
     if source.random() < 0.2:  # encrypted, says the directory; or the sizes declared are others
         at = raw.index(b"PK\1\2") + source.choice((8, 20, 24))
         raw = raw[:at] + b"\x01\xff\xff" + raw[at + 3 :]
@@ -246,11 +241,7 @@ def options(root: Path, source: random.Random) -> Case:
     """Give wrong words on the command line."""
     write_files(root, {**FOLDER, **EXPORTS, "study.toml": to_toml(STUDY)})
     write_files(root, {"loop.json": json.dumps(RESULTS["loop.json"])})
-    out, study, trios = (
-        ["--out", str(root / "out")],
-        str(root / "study.toml"),
-        str(root / "trios.txt"),
-    )
+    out, study, trios = ["--out", f"{root}/out"], f"{root}/study.toml", f"{root}/trios.txt"
     word = source.choice([t for t in harm.TOKENS if "\0" not in t])
     right = list(source.choice((
         ["close-loop", study, *out, "--seed", "1"], ["batch", study, *out, "--workers", "1"],

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-import product
+import pandas as pd
 
 QUESTIONS, SEED, LIMIT = ("first start", "second start"), 0, 7200.0
 ROOT = Path(__file__).resolve().parent.parent
@@ -23,11 +23,6 @@ LOOPS = ("polyisoprene-small-strain", "polyisoprene-startup", "ldpe-shear",
 COMPARISONS = [path.stem for path in sorted((ROOT / "studies").glob("*-comparison*.toml"))]
 GROUPS = {"loops": [f"loop of {name}" for name in LOOPS],
           "comparisons": [f"comparison of {name}" for name in COMPARISONS]}  # fmt: skip
-
-
-def names(seed: int) -> list[str]:
-    del seed
-    return [*GROUPS["loops"], *GROUPS["comparisons"]]
 
 
 def run(name: str, question: str, seed: int, folder: Path) -> dict:
@@ -59,15 +54,15 @@ def of_loop(folder: Path) -> dict:
     """Return verdict and errors, and what the band holds of each run held out."""
     said = json.loads((folder / "out" / "loop.json").read_text("utf-8"))
     bands = {}
-    for (run, _, source), found in product.predictions(folder, "held_out").items():
-        kept = np.isfinite(found["low"]) & np.isfinite(found["measured"])
-        if source == "augmented" and kept.any():
-            low, high, measured = (found[key][kept] for key in ("low", "high", "measured"))
-            bands[run] = {
-                "held": float(np.mean((low <= measured) & (measured <= high))),
-                "samples": len(measured),
-                "half": float(np.median(high - low) / 2 / np.sqrt(np.mean(measured**2))),
-            }
+    rows = pd.read_csv(folder / "out" / "predictions.csv").dropna(subset=["low95", "measured"])
+    rows = rows[(rows["role"] == "held_out") & (rows["source"] == "augmented")]
+    for run, found in rows.groupby("run"):
+        low, high, measured = (found[key] for key in ("low95", "high95", "measured"))
+        bands[run] = {
+            "held": float(measured.between(low, high).mean()),
+            "samples": len(found),
+            "half": float((high - low).median() / 2 / np.sqrt(np.mean(measured**2))),
+        }
     errors = [said[key]["held_out"] for key in ("error_before", "error_after")]
     return {"verdict": said["verdict"], "errors": errors, "bands": bands}
 
