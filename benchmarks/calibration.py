@@ -9,35 +9,35 @@ software is told a Maxwell fluid and given four of them; the two faster ones jud
   that claims one.
 
 Seeds of 1 to 9 are for development. Seeds that judge are written down before their first case is
-run, and never used to change anything: 20261130; since each set is fitted from larger ones too
-20261208 for ``close-loop``, and 20261206 and 20261209 for ``compare``; since runs tell how far they
-differ, 20261210 for ``close-loop`` and 20261211 for ``compare``; since curves are weighed in all
-runs, 20261212 for ``close-loop`` and 20261213 for ``compare``; since slip may be a curve,
-20261214 for ``close-loop`` and 20261215 for ``compare``; since a transducer's response may be one,
-20261216 for ``close-loop``; since effects start from every multiple of their inner times, 20261217
-for ``close-loop`` and 20261218 for ``compare``; since one integrator predicts, 20261219 for
-``close-loop`` and 20261220 for ``compare``.
+run, and never used to change anything: 20261130, then 20261206 to 20261220, each since a change of
+the engine (`docs/evidence.md`); answers are in `judged/` by question and seed.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
-from calibration_tables import comparison_table, loop_table
 from independent.folders import write_folder
 from independent.worlds import MODULUS, TIME, World, draw_world
+from scipy.stats import beta
 
 import discover as dc
 
 SEED, LIMIT = 20261130, 3600.0
 HELD = "held_"
 _ARITHMETIC = 1e-5
+Cases = Sequence[dict]
+WHOLE = 0.9
+"""A run counts as held with so many of its samples in the band."""
+
+TENTH = 0.1
+"""A quantity that is said to be determined may be off by so much of N1."""
 
 
-def close_loop(data: dc.Dataset, world: World) -> dict:
+def close_loop(data: dc.Dataset, held_out: list[str], world: World) -> dict:
     """Return what a closed loop says, beside what is there."""
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    loop = dc.close_loop(data, base, held_out=_held_out(data), max_effects=3)
+    loop = dc.close_loop(data, base, held_out=held_out, max_effects=3)
     said = loop.explanations
     constants = [
         {"effect": effect, "parameter": name, "truth": truth, "ci95": list(interval)}
@@ -61,12 +61,17 @@ def close_loop(data: dc.Dataset, world: World) -> dict:
     }
 
 
-def compare(data: dc.Dataset, world: World) -> dict:
+def compare(data: dc.Dataset, held_out: list[str], world: World) -> dict:
     """Return what a comparison claims of stresses in the held-out runs, beside what they were."""
     from discover.report.predictions import comparison_predictions
 
     base = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
-    found = dc.compare(data, base, held_out=_held_out(data), learners=["tensor_sindy"])
+    found = dc.compare(
+        data,
+        base,
+        held_out=held_out,
+        learners=["tensor_sindy"],
+    )
     exact, lines = world.make(None), comparison_predictions(found)
     lines = lines[(lines["role"] == "held_out") & (lines["source"] != "declared")]
     bands = []
@@ -94,10 +99,7 @@ def compare(data: dc.Dataset, world: World) -> dict:
     }
 
 
-TASKS: dict[str, Callable[[dc.Dataset, World], dict]] = {
-    "close-loop": close_loop,
-    "compare": compare,
-}
+TASKS = {"close-loop": close_loop, "compare": compare}
 QUESTIONS = tuple(TASKS)
 
 
@@ -110,16 +112,14 @@ def run(name: str, question: str, seed: int, folder: Path) -> dict:
     """Draw one world, record it, ask, and return the answer beside the truth."""
     world = draw_world(seed, int(name))
     runs = world.make(np.random.default_rng([seed, int(name), 1]))
-    answer = TASKS[question](dc.load_dataset(write_folder(folder / "data", runs)), world)
+    data = dc.load_dataset(write_folder(folder / "data", runs))
+    answer = TASKS[question](data, [n for n in data.names if n.startswith(HELD)], world)
     return {
-        "index": int(name),
-        "law": world.law,
-        "flaw": world.flaw,
-        "protocol": world.protocol,
+        "index": int(name), "law": world.law, "flaw": world.flaw, "protocol": world.protocol,
         "noise": world.noise,
         "effects": None if world.effects is None else [sorted(one) for one in world.effects],
         **answer,
-    }
+    }  # fmt: skip
 
 
 def line(row: dict) -> str:
@@ -133,10 +133,6 @@ def table(rows: list[dict]) -> str:
     return "\n\n".join(
         make(some) for make, some in ((loop_table, loops), (comparison_table, others)) if some
     )
-
-
-def _held_out(data: dc.Dataset) -> list[str]:
-    return [name for name in data.names if name.startswith(HELD)]
 
 
 def _interval(loop, effect: str, parameter: str) -> tuple[float, float] | None:
@@ -161,3 +157,163 @@ def _band(run: str, quantity: str, low, high, truth, size: float | None = None) 
         "inside": float(np.mean((low <= truth) & (truth <= high))),
         "half_width": float(half / size),
     }
+
+
+# what cases add up to: how often what was said was so
+
+
+def share(hits: int, of: int) -> str:
+    """Return a count with its 95 % interval   [Clopper & Pearson 1934, Biometrika 26, 404]."""
+    if not of:
+        return "0 of 0"
+    low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
+    high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
+    return f"{hits} of {of} ({100 * low:.0f} to {100 * high:.0f} %)"
+
+
+def is_right(members: Sequence[Sequence[str]], effects: Sequence[Sequence[str]] | None) -> bool:
+    """Whether one set of a class of twins names each effect that is there once, and no other."""
+    if effects is None:
+        return False
+    for names in members:
+        found = [next((i for i, right in enumerate(effects) if n in right), None) for n in names]
+        if None not in found and sorted(found) == list(range(len(effects))):
+            return True
+    return False
+
+
+def calibration_error(said: np.ndarray, so: np.ndarray, bins: int = 10) -> tuple[float, list[str]]:
+    """Return the expected calibration error, and the lines of a reliability diagram.
+
+    `said`: probabilities, shape (n,). `so`: whether each was so, shape (n,). `bins`: of equal
+    width.
+    """
+    place, error, lines = np.minimum((said * bins).astype(int), bins - 1), 0.0, []
+    for among in (place == bin_ for bin_ in np.unique(place)):
+        stated, true = float(np.mean(said[among])), float(np.mean(so[among]))
+        error += np.mean(among) * abs(stated - true)
+        told = share(int(np.sum(so[among])), int(np.sum(among)))
+        lines.append(f"  said {stated:.2f}: so in {told}")
+    return float(error), lines
+
+
+def loop_table(cases: Cases) -> str:
+    """Return the table of what closed loops said and what was so."""
+    inside = [c for c in cases if c["effects"] is not None]
+    outside = [c for c in cases if c["effects"] is None]
+    clean = [c for c in inside if not c["effects"]]
+    planted = [c for c in inside if c["effects"]]
+    open_ = ("unexplained", "no_signal")
+    lines = [f"{len(cases)} closed loops, {len(inside)} of what has a name"]
+
+    def count(what: str, so: Callable[[dict], bool], among: Cases) -> None:
+        lines.append(f"{what}: {share(sum(map(so, among)), len(among))}")
+
+    def right(c: dict) -> bool:
+        return bool(c["explanations"]) and is_right(c["explanations"][0]["members"], c["effects"])
+
+    count("what is there in the likeliest class", right, planted)
+    for number in (1, 2):
+        count(f"  {number} at a time", right, [c for c in planted if len(c["effects"]) == number])
+    for what in ("protocol", "noise"):
+        for kind in sorted({c[what] for c in planted}):
+            count(f"  {what} {kind}", right, [c for c in planted if c[what] == kind])
+    count("a name beside it, 50 % or more", lambda c: bool(_beside(c)), planted)
+    named = "an effect named where there is none"
+    count(named, lambda c: c["verdict"] == "effects_added", clean)
+    count("unexplained where all has a name", lambda c: c["verdict"] == "unexplained", inside)
+    count("unexplained where something has none", lambda c: c["verdict"] in open_, outside)
+    missed = [c for c in outside if c["verdict"] not in open_]
+    for c in missed:
+        first = c["explanations"][0]
+        name = f"{' + '.join(first['members'][0]) or 'nothing'} {first['probability']:.2f}"
+        lines.append(f"  but: {c['index']}, {line(c)}: {c['verdict']}, {name}")
+    found = [f for c in planted for f in c["constants"]]
+    holds = "95 % intervals that hold the constant"
+    count(holds, lambda f: f["ci95"][0] <= f["truth"] <= f["ci95"][1], found)
+    for name, some in (("all has a name", inside), ("something has none", outside)):
+        lines.append(_coverage(f"band of held-out runs, {name}", _bands(some)))
+    said = [
+        [(c["unexplained_probability"], c["effects"] is None)]
+        + [(e["probability"], is_right(e["members"], c["effects"])) for e in c["explanations"]]
+        for c in cases
+    ]
+    for what, told in (
+        ("expected calibration error of all probabilities", [one for some in said for one in some]),
+        ("of the likeliest answer alone", [max(one) for one in said]),
+    ):
+        error, diagram = calibration_error(*map(np.array, zip(*told, strict=True)))
+        lines += [f"{what}: {error:.3f}", *diagram]
+    return "\n".join([*lines, _seconds(cases)])
+
+
+def comparison_table(cases: Cases) -> str:
+    """Return the table of what comparisons claimed and what was so."""
+    lines = [f"{len(cases)} comparisons"]
+    in_library = [c for c in cases if c.get("library_laws")]
+    found = [c for c in in_library if _law_found(c) is not None]
+    lines.append(f"a law of the library, found alone: {share(len(found), len(in_library))}")
+    explained = sum(c["verdict"] == "explained" for c in in_library)
+    lines.append(f"  and explained: {share(explained, len(in_library))}")
+    told = [(t["ci95"], (_law_found(c) or {})[t["term"]]) for c in found for t in c["terms"]]
+    held = sum(ci95 is not None and ci95[0] <= truth <= ci95[1] for ci95, truth in told)
+    lines.append(f"  95 % intervals that hold the coefficient: {share(held, len(told))}")
+    others = [c for c in cases if not c.get("library_laws")]
+    for name, some in (
+        ("a law of the library, sound instrument", in_library),
+        ("another law or a flaw, all with a name", [c for c in others if c["effects"] is not None]),
+        ("something has none", [c for c in others if c["effects"] is None]),
+    ):
+        explained = sum(c["verdict"] == "explained" for c in some)
+        lines.append(f"{name}: explained in {share(explained, len(some))}")
+        said = [(c, q) for c in some for q in ("N1", "N2") if q not in c.get("undetermined", ())]
+        wrong = [(c, q) for c, q in said if _worst(c, q) > TENTH]
+        off = share(len(wrong), len(said))
+        lines.append(f"  N1 or N2 said to be determined, and off by a tenth: {off}")
+        lines += [
+            f"    {c['index']}, {line(c)}: {q} by {100 * _worst(c, q):.0f} %" for c, q in wrong
+        ]
+        for source in sorted({b["source"] for c in some for b in c["bands"]}):
+            for quantity in ("sigma12", "N1", "N2"):
+                bands = [b for b in _bands(some) if b["quantity"] == quantity and "inside" in b]
+                bands = [b for b in bands if b["source"] == source]
+                lines.append(_coverage(f"  {source}, {quantity}", bands))
+    return "\n".join([*lines, _seconds(cases)])
+
+
+def _beside(case: dict) -> list[str]:
+    """Return names of a half or more in the answer that are no name of what is there."""
+    right = {name for names in case["effects"] for name in names}
+    return [name for name, p in case["inclusion"].items() if p >= 0.5 and name not in right]
+
+
+def _bands(cases: Cases) -> list[dict]:
+    return [band for case in cases for band in case["bands"]]
+
+
+def _law_found(case: dict) -> dict[str, float] | None:
+    """Return the right law of just the terms that were found; None if there is none."""
+    names = {term["term"] for term in case["terms"]}
+    return next((law for law in case["library_laws"] if {*law} == names), None)
+
+
+def _worst(case: dict, quantity: str) -> float:
+    """Return how far the answer's curve is off in a run held out, N2's over N1."""
+    answer = [b for b in case["bands"] if b["source"] == "posterior"]
+    return max((b.get("off", 0.0) for b in answer if b["quantity"] == quantity), default=0.0)
+
+
+def _coverage(what: str, bands: list[dict]) -> str:
+    if not bands:
+        return f"{what}: no band"
+    inside = np.array([b["inside"] for b in bands])
+    width = np.median([b["half_width"] for b in bands])
+    return (
+        f"{what}: {100 * np.mean(inside):.1f} % of the samples, runs held to 90 % "
+        f"{share(int(np.sum(inside >= WHOLE)), len(bands))}, median half-width {100 * width:.2g} %"
+    )
+
+
+def _seconds(cases: Cases) -> str:
+    used = [c["processor_seconds"] for c in cases]
+    return f"seconds of processor a case: median {np.median(used):.0f}, mean {np.mean(used):.0f}"

@@ -109,27 +109,6 @@ def holders(content: Any) -> Iterator[tuple[Any, Any]]:
             yield from holders(content[key])
 
 
-def to_toml(content: dict[str, Any]) -> str:
-    """Return nested values as TOML, tables at the top as sections; what TOML lacks becomes text."""
-    tables = {key: value for key, value in content.items() if isinstance(value, dict)}
-    top = {key: value for key, value in content.items() if key not in tables}
-    lines = [f"{_toml(key)} = {_toml(value)}" for key, value in top.items()]
-    for name, table in tables.items():
-        lines += [f"[{_toml(name)}]", *(f"{_toml(k)} = {_toml(v)}" for k, v in table.items())]
-    return "\n".join(lines) + "\n"
-
-
-def _toml(value: Any) -> str:
-    match value:
-        case bool() | int() | float():
-            return repr(value).lower()
-        case dict():
-            return "{" + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in value.items()) + "}"
-        case list():
-            return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "")
-
-
 def spoil_file(path: Path, source: random.Random) -> None:
     """Put something in a file's place that is no such file."""
     kind = source.choice(("absent", "folder", "pipe", "loop", "link", "empty", "other"))

@@ -19,15 +19,12 @@ a data folder and a study file and no more. The rules, written before the first 
 To say `unexplained` of what could be explained is no falsehood; it is noted.
 """
 
-import ast
-import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-import hostile_benches
 import hostile_fluids
 import hostile_noises
 import hostile_records
@@ -38,7 +35,7 @@ import product
 from hostile_records import FILE, SAMPLED, SCALE, Runs
 from independent import authors, noise
 from independent import named as by_name
-from independent.folders import write_table
+from independent.folders import write_runs, write_table
 from independent.noise import rms
 from scipy.ndimage import median_filter
 
@@ -54,14 +51,6 @@ QUANTITY = {"stress_Pa": "sigma12", "tensile_stress_Pa": "tensile_stress"}
 GROUPS = {name: [n for n in cases if n != "all"] for name, cases in FILE["sets"].items()}
 
 
-OPERATIONS: dict[type, Callable] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.FloorDiv: operator.floordiv, ast.MatMult: operator.matmul, ast.Mod: operator.mod,
-    ast.Pow: operator.pow, ast.BitOr: operator.or_, ast.Lt: operator.lt, ast.Gt: operator.gt,
-    ast.NotEq: operator.ne, ast.Eq: operator.eq, ast.In: lambda one, many: one in many,
-}  # fmt: skip
-
-
 def _named(law: str):
     return by_name.material(law, by_name.CONSTANTS[law], **SCALE)
 
@@ -70,78 +59,21 @@ def _named(law: str):
 def words() -> dict[str, Any]:
     """Return what the expressions of the file may name."""
     known: dict[str, Any] = {name: getattr(np, name) for name in np.__all__}
-    own = (hostile_fluids, hostile_benches, hostile_records, hostile_tests, hostile_noises)
+    own = (hostile_fluids, hostile_records, hostile_tests, hostile_noises)
     for module in (authors, independent, noise, *own):
         known |= vars(module)
     known |= SAMPLED | {"material": by_name.material, "named": _named, "len": len}
     known |= {"median_filter": median_filter}
     for name, text in FILE["names"].items():
-        known[name] = evaluated(ast.parse(text, mode="eval").body, known)
+        known[name] = eval(text, known)
     return known
-
-
-def evaluated(node: ast.AST, known: Mapping[str, Any]) -> Any:
-    """Return the value of an expression of numbers, names, calls and functions."""
-
-    def value(one: ast.AST) -> Any:
-        return evaluated(one, known)
-
-    match node:
-        case ast.Constant(constant):
-            return constant
-        case ast.Name(name):
-            return known[name]
-        case ast.List(items) | ast.Tuple(items):
-            return [value(one) for one in items]
-        case ast.Dict(keys, values):
-            return {value(k): value(v) for k, v in zip(keys, values, strict=True) if k}
-        case ast.UnaryOp(ast.USub(), one):
-            return -value(one)
-        case ast.BinOp(left, how, right) | ast.Compare(left, [how], [right]):
-            if type(how) in OPERATIONS:
-                return OPERATIONS[type(how)](value(left), value(right))
-        case ast.IfExp(test, this, that):
-            return value(this if value(test) else that)
-        case ast.Subscript(whole, at):
-            return value(whole)[value(at)]
-        case ast.Attribute(whole, name) if not name.startswith("_"):
-            return getattr(value(whole), name)
-        case ast.Lambda(arguments, body):
-            names, defaults = [one.arg for one in arguments.args], map(value, arguments.defaults)
-            own = dict(zip(reversed(names), reversed(list(defaults)), strict=False))
-            return lambda *given, **more: evaluated(
-                body, {**known, **own, **dict(zip(names, given, strict=False)), **more}
-            )
-        case ast.Call():
-            function, given, named = called(node, known)
-            return function(*given, **named)
-    raise ValueError(f"{ast.unparse(node)} is no expression of hostile.toml.")
-
-
-def called(node: ast.Call, known: Mapping[str, Any]) -> tuple[Callable, list, dict[str, Any]]:
-    """Return a function with what it is called with."""
-    given, named = [], {}
-    for one in node.args:
-        starred = isinstance(one, ast.Starred)
-        value = evaluated(one.value if starred else one, known)
-        given += value if starred else [value]
-    for one in node.keywords:
-        value = evaluated(one.value, known)
-        named |= {one.arg: value} if one.arg else value
-    return evaluated(node.func, known), given, named
 
 
 def bound(text: str) -> Callable:
     """Return the call of an expression, for which what comes first is still to be given."""
-    node = ast.parse(text, mode="eval").body
-
-    def call(*first):
-        if not isinstance(node, ast.Call):
-            return evaluated(node, words())(*first)
-        function, given, named = called(node, words())
-        return function(*first, *given, **named)
-
-    return call
+    name, called, rest = text.partition("(")
+    text = f"{name}(*_first, {rest}" if called else f"{text}(*_first)"
+    return lambda *first: eval(text, words() | {"_first": first})
 
 
 @dataclass(frozen=True)
@@ -212,13 +144,8 @@ def make(case: Case, seed: int) -> tuple[Runs, Runs]:
 
 def write(case: Case, noisy: Runs, folder: Path, seed: int) -> dict[str, Any]:
     """Write the data folder; return the section of a study on it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    keys = list(dict.fromkeys(key for run in noisy.values() for key in run.cells))
-    lines = [",".join(["file", *keys])]
-    for name, run in noisy.items():
-        write_table(folder / name, run.columns)
-        lines.append(",".join([name, *(str(run.cells.get(key, "")) for key in keys)]))
-    (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    columns = {name: run.columns for name, run in noisy.items()}
+    write_runs(folder, columns, {name: run.cells for name, run in noisy.items()})
     source = {"folder": str(folder.resolve()), **case.told}
     if case.held_out:
         source["held_out"] = list(case.held_out)
@@ -231,11 +158,6 @@ def write(case: Case, noisy: Runs, folder: Path, seed: int) -> dict[str, Any]:
         if name != "lve.csv":  # the modes come from it
             source[name.removesuffix(".csv")] = "fit"
     return source
-
-
-def names(seed: int) -> list[str]:
-    del seed
-    return [name for group in GROUPS.values() for name in group]
 
 
 def is_asked(name: str, question: str) -> bool:
@@ -261,12 +183,8 @@ def judge(case: Case, question: str, said: dict, rows, clean: Runs, noisy: Runs)
     sources = ["augmented"] if question == "close-loop" else list(said["learners"])
     misses = {source: miss(case, rows, source, clean, noisy) for source in sources}
     found = {
-        "verdict": said["verdict"],
-        "misses": misses,
-        "constants": [],
-        "false": [],
-        "notes": [],
-    }
+        "verdict": said["verdict"], "misses": misses, "constants": [], "false": [], "notes": [],
+    }  # fmt: skip
     if question == "close-loop":
         of_loop(case, said, found)
     else:
@@ -422,16 +340,11 @@ def table(rows: list[dict]) -> str:
     for group, members in GROUPS.items():
         some = [row for row in rows if row["case"] in members]
         if some:
-            held = [
-                low <= true <= high
-                for r in some
-                for _, true, _, low, high in r.get("constants", ())
-            ]
-            counts = [
-                sum(bool(r.get("false")) for r in some),
-                sum("not explained, though it could be" in r.get("notes", ()) for r in some),
-                sum("message" in r for r in some),
-            ]
-            cells = [group, str(len(some)), *map(str, counts), f"{sum(held)} of {len(held)}"]
+            told = [one for r in some for one in r.get("constants", ())]
+            open_ = [r for r in some if "not explained, though it could be" in r.get("notes", ())]
+            counts = [len(some), sum(bool(r.get("false")) for r in some), len(open_)]
+            counts += [sum("message" in r for r in some)]
+            held = sum(low <= true <= high for _, true, _, low, high in told)
+            cells = [group, *map(str, counts), f"{held} of {len(told)}"]
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

@@ -12,11 +12,10 @@ import os
 import random
 import re
 import resource
-import signal
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from unittest.mock import patch
@@ -42,14 +41,6 @@ class Started(BaseException):
     """The input was accepted: the command began to compute."""
 
 
-class TooLong(BaseException):
-    """The time is up."""
-
-
-def _start(*_, **__):
-    raise Started
-
-
 @contextmanager
 def stopped_at_the_first_computation() -> Iterator[None]:
     """Let commands go on until they begin to compute, and no further."""
@@ -58,13 +49,14 @@ def stopped_at_the_first_computation() -> Iterator[None]:
         if "declared model on" in label or "starting" in label:
             raise Started
 
-    seams = {
-        "discover.cli.study_commands.progress_bar": lambda quiet: contextlib.nullcontext(report),
-        "discover.inference.engine.rows.make_batch": _start,
-    }
-    with ExitStack() as stack:
-        for name, instead in seams.items():
-            stack.enter_context(patch(name, instead))
+    def start(*_, **__):
+        raise Started
+
+    bar = "discover.cli.study_commands.progress_bar"
+    with (
+        patch(bar, lambda quiet: contextlib.nullcontext(report)),
+        patch("discover.inference.engine.rows.make_batch", start),
+    ):
         yield
 
 
@@ -78,12 +70,7 @@ def run_call(call: list[str] | Callable[[], object]) -> Outcome:
         for errors in ("strict", "backslashreplace")
     )
 
-    def time_is_up(*_) -> None:
-        raise TooLong
-
     argv, sys.argv = sys.argv, ["discover", *(call if isinstance(call, list) else ())]
-    handler = signal.signal(signal.SIGALRM, time_is_up)
-    signal.setitimer(signal.ITIMER_REAL, LIMIT)
     code: int | None = 0
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
@@ -92,23 +79,17 @@ def run_call(call: list[str] | Callable[[], object]) -> Outcome:
         code = end.code if isinstance(end.code, int) else 0 if end.code is None else 1
     except Started:
         code = None
-    except TooLong:
-        code = 124
     except InputError as error:
         code = 2
         print(f"discover: {error}", file=err)
-    except BaseException as error:
+    except Exception as error:
         code = 1
         print(f"Traceback: {type(error).__name__}: {error}", file=err)
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, handler)
         sys.argv = argv
-    texts = []
-    for stream in (out, err):
-        stream.flush()
-        texts.append(stream.buffer.getvalue().decode("utf-8"))  # type: ignore[attr-defined]
-    return Outcome(code, *texts)
+        out.flush()
+        err.flush()
+    return Outcome(code, *(one.buffer.getvalue().decode() for one in (out, err)))
 
 
 _REMEDY = re.compile(
@@ -123,8 +104,6 @@ _REMEDY = re.compile(
 def complaint(case: Case, outcome: Outcome) -> str | None:
     """Return what is wrong with how a call ended, or None."""
     everything = outcome.stdout + outcome.stderr
-    if outcome.code == 124:
-        return "takes too long"
     if "Traceback" in everything or "not your input's fault" in everything:
         return "fails in the software"
     if outcome.code in (0, None):
@@ -166,11 +145,6 @@ def attempt(kind: str, seed: int, root: Path) -> tuple[Case, Outcome, str | None
     case = KINDS[kind](root, random.Random(f"{kind} {seed}"))
     outcome = run_call(case.call)
     return case, outcome, complaint(case, outcome)
-
-
-def names(seed: int) -> list[str]:
-    del seed
-    return [name for group in GROUPS.values() for name in group]
 
 
 def run(name: str, question: str, seed: int, folder: Path) -> dict:

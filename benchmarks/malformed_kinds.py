@@ -1,4 +1,4 @@
-"""Malformed inputs by kind: each writes a sane one into an empty folder, and harms it."""
+"""Malformed inputs by kind: each writes sane ones into an empty folder, and harms one."""
 
 import io
 import json
@@ -7,14 +7,20 @@ import struct
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import harm
-from harm import SANE, to_toml, write_files
+from harm import SANE, write_files
+from independent.folders import to_toml
 
-FOLDER, STUDY, COMPARISON, RESULTS, EXPORTS = (
-    SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON", "RESULTS", "EXPORTS")
-)
+FOLDER, STUDY, COMPARISON = (SANE[name] for name in ("FOLDER", "STUDY", "COMPARISON"))
+RESULTS, EXPORTS = SANE["RESULTS"], SANE["EXPORTS"]
+_OVERLAY = to_toml(STUDY) + '[[report.overlay]]\nlabel = "x"\nfile = "o.csv"\n'
+_TOLD = {"declared": {"law": RESULTS["loop.json"]["law"], "effects": []}, "stages": []}
+_DATA = {**EXPORTS, "sweep.txt": SANE["SWEEP"]}
+_FORMS = ("python", "sympy", "latex", "json", "rheotool", "ufl")
 
 
 @dataclass(frozen=True)
@@ -31,24 +37,62 @@ class Case:
     nonsense: str = ""
 
 
-def _keys(content: object) -> list[str]:
-    return [str(key) for _, key in harm.holders(content)]
+HARMED: dict[str, tuple[dict[str, Any], list[str], list[str]]] = {
+    "data folder": (FOLDER, [*FOLDER],
+                    ["data check R --clock-factor factor", "data show R", "data show R --json"]),
+    "loop study": ({**FOLDER, "study.toml": STUDY}, [*["study.toml"] * 6, *FOLDER],
+                   ["close-loop R/study.toml --out R/out"]),
+    "compare study": ({"study.toml": COMPARISON}, ["study.toml"],
+                      ["compare R/study.toml --out R/out"]),
+    **{f"told by {name}": ({**FOLDER, f"old/{name}": tree | _TOLD,
+                            "study.toml": STUDY | {"model": {"from": "old"}}}, [f"old/{name}"],
+                           [f"{do} R/study.toml --out R/out" for do in ("compare", "close-loop")])
+       for name, tree in RESULTS.items()},
+    "overlaid": ({**FOLDER, "o.csv": SANE["OVERLAY"], "study.toml": _OVERLAY}, ["o.csv"],
+                 ["close-loop R/study.toml --out R/out"]),
+    **{f"exported {name}": ({name: tree}, [name],
+                            [f"export R --format {form}{out}" for form in _FORMS
+                             for out in ("", " --out R/law.txt")])
+       for name, tree in RESULTS.items()},
+    "batch": ({**FOLDER, "s0.toml": STUDY, "s1.toml": COMPARISON}, ["s0.toml", "s1.toml"],
+              ["batch R/s0.toml R/s1.toml --out R/out"]),
+    "imported": (_DATA, [*EXPORTS, "sweep.txt"],
+                 [f"data import R/{name}{sweep} --out R/data" for name in EXPORTS
+                  for sweep in ("", " R/sweep.txt")]),
+    "mapped": ({**EXPORTS, "map.toml": SANE["MAPPING"]}, ["map.toml"],
+               ["data import --mapping R/map.toml --out R/data"]),
+}  # fmt: skip
+"""Files by kind, those of which one is harmed, and calls of which one is made; R is the folder."""
 
 
-def _study(root: Path, content: dict, source: random.Random, name: str = "study.toml") -> None:
-    if source.random() < 0.5:
-        text = to_toml(harm.mutate_values(content, source)).encode("utf-8", "surrogatepass")
-    else:
-        text = harm.mutate_text(to_toml(content), source)
-    (root / name).write_bytes(text)
+def _spelled(name: str, content: Any) -> str:
+    if isinstance(content, str):
+        return content
+    return json.dumps(content) if name.endswith(".json") else to_toml(content)
 
 
-def data_folder(root: Path, source: random.Random) -> Case:
-    write_files(root, FOLDER)
-    harm.spoil(root, source.choice(list(FOLDER)), source)
-    command = source.choice(("check", "check", "show"))
-    more = ["--clock-factor", "factor"] if command == "check" else source.choice(([], ["--json"]))
-    return Case(["data", command, str(root), *more], tuple(FOLDER))
+def _wrong(content: Any, source: random.Random) -> Any:
+    """Return half of the trees with values wronged, everything else as it is."""
+    wrong = isinstance(content, dict) and source.random() < 0.5
+    return harm.mutate_values(content, source) if wrong else content
+
+
+def harmed(kind: str, root: Path, source: random.Random) -> Case:
+    """Write the files of a kind, text as it is and trees by their ending, and harm one."""
+    files, wronged, calls = HARMED[kind]
+    name = source.choice(wronged)
+    files = files | {name: _wrong(files[name], source)}
+    for path, content in files.items():
+        (root / path).parent.mkdir(exist_ok=True)
+        write_files(root, {path: _spelled(path, content)})
+    if files[name] is HARMED[kind][0][name]:
+        harm.spoil(root, name, source)
+    keys = {str(key) for tree in HARMED[kind][0].values() if isinstance(tree, dict)
+            for _, key in harm.holders(tree)}  # fmt: skip
+    stems = {word for name in files for word in (Path(name).name, Path(name).stem)}
+    call = [word.replace("R", str(root), 1) if word[0] == "R" else word
+            for word in source.choice(calls).split()]  # fmt: skip
+    return Case(call, (*stems, *keys, str(root), "--", "rheoTool", "[[source]]", "overlay"))
 
 
 def nonsense_in_a_folder(root: Path, source: random.Random) -> Case:
@@ -80,47 +124,8 @@ def nonsense_in_a_study(root: Path, source: random.Random) -> Case:
     tree[section][key] = source.choice((float("nan"), -1, 10**40, "3", [[1]], {"a": 1}))
     (root / "study.toml").write_text(to_toml(tree), "utf-8")
     call = ["close-loop", str(root / "study.toml"), "--out", str(root / "out")]
-    return Case(call, ("study.toml", *_keys(STUDY)), f"{section}.{key} = {tree[section][key]!r}")
-
-
-def loop_study(root: Path, source: random.Random) -> Case:
-    write_files(root, FOLDER)
-    _study(root, STUDY, source)
-    if source.random() < 0.3:
-        write_files(root, {"study.toml": to_toml(STUDY)})
-        harm.spoil(root, source.choice(["study.toml", *FOLDER]), source)
-    out = str(root / "out")
-    names = (*FOLDER, "study.toml", out, *_keys(STUDY))
-    return Case(["close-loop", str(root / "study.toml"), "--out", out], names)
-
-
-def compare_study(root: Path, source: random.Random) -> Case:
-    _study(root, COMPARISON, source)
-    out = str(root / "out")
-    names = ("study.toml", out, *_keys(COMPARISON))
-    return Case(["compare", str(root / "study.toml"), "--out", out], names)
-
-
-def told_by_a_result(root: Path, source: random.Random) -> Case:
-    write_files(root, FOLDER)
-    (root / "old").mkdir()
-    name = source.choice(list(RESULTS))
-    told = {"law": RESULTS["loop.json"]["law"], "effects": []}
-    tree = RESULTS[name] | {"declared": told, "stages": []}
-    write_files(root / "old", {name: json.dumps(harm.mutate_values(tree, source))})
-    study = STUDY | {"model": {"from": "old"}}
-    write_files(root, {"study.toml": to_toml(study)})
-    call = [source.choice(("compare", "close-loop")), str(root / "study.toml")]
-    return Case([*call, "--out", str(root / "out")], (name, "old", *FOLDER, *_keys(study)))
-
-
-def overlaid(root: Path, source: random.Random) -> Case:
-    write_files(root, {**FOLDER, "o.csv": SANE["OVERLAY"]})
-    harm.spoil(root, "o.csv", source)
-    table = '[[report.overlay]]\nlabel = "x"\nfile = "o.csv"\n'
-    write_files(root, {"study.toml": to_toml(STUDY) + table})
-    call = ["close-loop", str(root / "study.toml"), "--out", str(root / "out")]
-    return Case(call, ("o.csv", "overlay"))
+    places = ("study.toml", *(str(key) for _, key in harm.holders(STUDY)))
+    return Case(call, places, f"{section}.{key} = {tree[section][key]!r}")
 
 
 def complete_results(root: Path) -> None:
@@ -148,36 +153,6 @@ def resumed(root: Path, source: random.Random) -> Case:
         (root / "out").rename(root / "batch" / "study")
         return Case(["batch", study, "--out", str(root / "batch"), *options], (out, "study"))
     return Case(["close-loop", study, "--out", out, *options], (out, *files))
-
-
-def exported(root: Path, source: random.Random) -> Case:
-    name = source.choice(list(RESULTS))
-    write_files(root, {name: json.dumps(harm.mutate_values(RESULTS[name], source))})
-    if source.random() < 0.4:
-        write_files(root, {name: json.dumps(RESULTS[name])})
-        harm.spoil(root, name, source)
-    form = source.choice(("python", "sympy", "latex", "json", "rheotool", "ufl"))
-    out = source.choice(([], ["--out", str(root / "law.txt")]))
-    return Case(["export", str(root), "--format", form, *out], (name, str(root), "rheoTool"))
-
-
-def batch(root: Path, source: random.Random) -> Case:
-    write_files(root, FOLDER)
-    names = [f"s{i}.toml" for i in range(source.randint(1, 3))]
-    for name in names:
-        _study(root, source.choice((STUDY, COMPARISON)), source, name)
-    call = ["batch", *(str(root / name) for name in names), "--out", str(root / "out")]
-    return Case(call, (*names, *(name.removesuffix(".toml") for name in names)))
-
-
-def imported(root: Path, source: random.Random) -> Case:
-    name = source.choice(list(EXPORTS))
-    write_files(root, {**EXPORTS, "sweep.txt": SANE["SWEEP"]})
-    with_sweep = source.random() < 0.3
-    harm.spoil(root, "sweep.txt" if with_sweep else name, source)
-    call = ["data", "import", str(root / name), "--out", str(root / "data")]
-    call += ["--lve", str(root / "sweep.txt")] if with_sweep else []
-    return Case(call, (Path(name).stem, "runs.csv", "sweep.txt", "lve.csv", "--"))
 
 
 def workbook(root: Path, source: random.Random) -> Case:
@@ -218,10 +193,8 @@ def estimator(root: Path, source: random.Random) -> Case:
     kind = source.choice(("<f8", "|O", "<U9999", "V0", "|b1"))
     head = repr({"descr": kind, "fortran_order": False, "shape": shape}).encode() + b"\n"
     array = b"\x93NUMPY\1\0" + struct.pack("<H", len(head)) + head + b"\0" * 16
-    header = json.dumps(harm.mutate_values(SANE["ESTIMATOR"], source)).encode(
-        "utf-8", "surrogatepass"
-    )
-    raw = _packed({"estimator.json": header, "array0.npy": array})
+    header = json.dumps(harm.mutate_values(SANE["ESTIMATOR"], source))
+    raw = _packed({"estimator.json": header.encode("utf-8", "surrogatepass"), "array0.npy": array})
     if source.random() < 0.2:  # encrypted, says the directory; or the sizes declared are others
         at = raw.index(b"PK\1\2") + source.choice((8, 20, 24))
         raw = raw[:at] + b"\x01\xff\xff" + raw[at + 3 :]
@@ -252,13 +225,6 @@ def frame(root: Path, source: random.Random) -> Case:
     return Case(lambda: dc.from_dataframe(table, None, **options))
 
 
-def mapped(root: Path, source: random.Random) -> Case:
-    write_files(root, EXPORTS)
-    _study(root, SANE["MAPPING"], source, "map.toml")
-    call = ["data", "import", "--mapping", str(root / "map.toml"), "--out", str(root / "data")]
-    return Case(call, ("map.toml", "trios", "runs.csv", "--", "[[source]]"))
-
-
 def package(root: Path, source: random.Random) -> Case:
     """Give a package that is not the known one."""
     names = ("reptate/data/PI_LINEAR/PI_94.9k_T-35.tts", "LICENSE", "../../up")
@@ -275,11 +241,7 @@ def options(root: Path, source: random.Random) -> Case:
     """Give wrong words on the command line."""
     write_files(root, {**FOLDER, **EXPORTS, "study.toml": to_toml(STUDY)})
     write_files(root, {"loop.json": json.dumps(RESULTS["loop.json"])})
-    out, study, trios = (
-        ["--out", str(root / "out")],
-        str(root / "study.toml"),
-        str(root / "trios.txt"),
-    )
+    out, study, trios = ["--out", f"{root}/out"], f"{root}/study.toml", f"{root}/trios.txt"
     word = source.choice([t for t in harm.TOKENS if "\0" not in t])
     right = list(source.choice((
         ["close-loop", study, *out, "--seed", "1"], ["batch", study, *out, "--workers", "1"],
@@ -300,10 +262,9 @@ def options(root: Path, source: random.Random) -> Case:
 
 
 KINDS: dict[str, Callable[[Path, random.Random], Case]] = {
+    kind: partial(harmed, kind) for kind in HARMED
+} | {
     one.__name__.replace("_", " "): one
-    for one in (
-        data_folder, nonsense_in_a_folder, nonsense_in_a_study, loop_study, compare_study,
-        told_by_a_result, overlaid, resumed, exported, batch, imported, workbook, estimator, frame,
-        mapped, package, options,
-    )
+    for one in (nonsense_in_a_folder, nonsense_in_a_study, resumed, workbook, estimator, frame,
+                package, options)
 }  # fmt: skip

@@ -2,13 +2,11 @@
 
 Each study of `studies/` is run by the command itself, in a process of its own with an empty cache
 of programs, and again. DISCOVER_DATA is the folder of the data, which are no part of this project.
-A loop on blood holds each run out in turn from a search among four effects; a
-comparison counts as whole with a verdict, a test of what each learner leaves, and its pictures.
+The loop on blood holds each run out in turn.
 """
 
 import json
 import os
-import re
 import resource
 import subprocess
 import sys
@@ -16,56 +14,21 @@ import time
 from pathlib import Path
 
 import numpy as np
-import product
+import pandas as pd
 
 QUESTIONS, SEED, LIMIT = ("first start", "second start"), 0, 7200.0
 ROOT = Path(__file__).resolve().parent.parent
-LOOPS = {
-    "polyisoprene, small strains": "polyisoprene-small-strain",
-    "polyisoprene": "polyisoprene-startup",
-    "polyethylene, shear": "ldpe-shear",
-    "polyethylene, two extensions": "ldpe-shear-and-extension",
-    "hydrogel": "gel-laos",
-    "micelles": "micelles",
-}
-BLOOD = [f"{way}_{rates}" for way in ("up_0p1", "down") for rates in ("5p0", "10p0", "20p0")]
-_FOUR = '["stress_offset", "thixotropy", "thixotropic_relaxation_two_times", "solvent_viscosity"]'
-COMPARISONS = {
-    path.stem.replace("-comparison", ""): path.stem
-    for path in sorted((ROOT / "studies").glob("*-comparison*.toml"))
-}
-GROUPS = {
-    "loops": [f"loop on {name}" for name in (*LOOPS, *(f"blood without {run}" for run in BLOOD))],
-    "comparisons": [f"comparison of {name}" for name in COMPARISONS],
-}
-
-
-def names(seed: int) -> list[str]:
-    del seed
-    return [*GROUPS["loops"], *GROUPS["comparisons"]]
-
-
-def study_of(name: str) -> str:
-    """Return the text of the study of a case."""
-
-    def text(file: str) -> str:
-        return (ROOT / "studies" / f"{file}.toml").read_text("utf-8")
-
-    title = name.removeprefix("loop on ").removeprefix("comparison of ")
-    if name.startswith("comparison"):
-        return text(COMPARISONS[title])
-    if title in LOOPS:
-        return text(LOOPS[title])
-    run = title.removeprefix("blood without ")
-    file = f"blood_{run}_0p1.csv" if run.startswith("down") else f"blood_{run}.csv"
-    one = re.sub(r'held_out = "each"', f'held_out = ["{file}"]', text("blood-steps"))
-    return re.sub(r"effects = \[[^\]]*\]", f"effects = {_FOUR}", one)
+LOOPS = ("polyisoprene-small-strain", "polyisoprene-startup", "ldpe-shear",
+         "ldpe-shear-and-extension", "gel-laos", "micelles", "blood-steps")  # fmt: skip
+COMPARISONS = [path.stem for path in sorted((ROOT / "studies").glob("*-comparison*.toml"))]
+GROUPS = {"loops": [f"loop of {name}" for name in LOOPS],
+          "comparisons": [f"comparison of {name}" for name in COMPARISONS]}  # fmt: skip
 
 
 def run(name: str, question: str, seed: int, folder: Path) -> dict:
     """Return what a command says of a study, with the seconds of its own process."""
-    study, is_loop = folder / "study.toml", name.startswith("loop")
-    study.write_text(study_of(name), encoding="utf-8")
+    kind, file = name.split(" of ")
+    study, is_loop = ROOT / "studies" / f"{file}.toml", kind == "loop"
     command = [sys.executable, "-m", "discover", "close-loop" if is_loop else "compare"]
     own = {**os.environ, "XDG_CACHE_HOME": str(folder / "cache")}
     wall, used = time.perf_counter(), processor()
@@ -91,15 +54,15 @@ def of_loop(folder: Path) -> dict:
     """Return verdict and errors, and what the band holds of each run held out."""
     said = json.loads((folder / "out" / "loop.json").read_text("utf-8"))
     bands = {}
-    for (run, _, source), found in product.predictions(folder, "held_out").items():
-        kept = np.isfinite(found["low"]) & np.isfinite(found["measured"])
-        if source == "augmented" and kept.any():
-            low, high, measured = (found[key][kept] for key in ("low", "high", "measured"))
-            bands[run] = {
-                "held": float(np.mean((low <= measured) & (measured <= high))),
-                "samples": len(measured),
-                "half": float(np.median(high - low) / 2 / np.sqrt(np.mean(measured**2))),
-            }
+    rows = pd.read_csv(folder / "out" / "predictions.csv").dropna(subset=["low95", "measured"])
+    rows = rows[(rows["role"] == "held_out") & (rows["source"] == "augmented")]
+    for run, found in rows.groupby("run"):
+        low, high, measured = (found[key] for key in ("low95", "high95", "measured"))
+        bands[run] = {
+            "held": float(measured.between(low, high).mean()),
+            "samples": len(found),
+            "half": float((high - low).median() / 2 / np.sqrt(np.mean(measured**2))),
+        }
     errors = [said[key]["held_out"] for key in ("error_before", "error_after")]
     return {"verdict": said["verdict"], "errors": errors, "bands": bands}
 
@@ -112,23 +75,10 @@ def of_comparison(folder: Path) -> dict:
         learner: [said["lack_of_fit"].get(learner, {}).get("misfit"), found["errors"]]
         for learner, found in said["learners"].items()
     }
-    missing = what_is_missing(folder / "out")
-    return {"verdict": said["verdict"], "laws": laws, "notes": [f"missing: {m}" for m in missing]}
-
-
-def what_is_missing(out: Path) -> list[str]:
-    """Return what a finished comparison should hold and does not; nothing where it is whole."""
-    said = json.loads((out / "comparison.json").read_text("utf-8"))
-    missing = [] if said["lack_of_fit"] else ["a test of what any learner leaves"]
-    if said["verdict"] not in ("explained", "unexplained", "no_signal"):
-        missing.append(f"a verdict: {said['verdict']}")
-    wanted = {"misfit", "noise", "lag_one_correlation", "probability"}
-    for learner in said["learners"]:
-        told = said["lack_of_fit"].get(learner, {})
-        missing += [f"{key} of {learner}" for key in sorted(wanted - set(told))]
-    if "could not be drawn" in (out / "report.html").read_text("utf-8"):
-        missing.append("a picture")
-    return missing
+    page = (folder / "out" / "report.html").read_text("utf-8")
+    missing = [] if said["lack_of_fit"] else ["missing: a test of what any learner leaves"]
+    missing += ["missing: a picture"] if "could not be drawn" in page else []
+    return {"verdict": said["verdict"], "laws": laws, "notes": missing}
 
 
 def line(row: dict) -> str:

@@ -1,8 +1,6 @@
 """The product under test, asked by a study file as a user asks it, without the pages it draws."""
 
-import csv
 import json
-from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,11 +8,11 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
+import pandas as pd
 from independent.folders import write_study
 
 CONFIDENT = ("explained", "effects_added", "no_effect_needed")
-COLUMNS = {"time": "time_s", "value": "value", "low": "low95", "high": "high95",
-           "measured": "measured"}  # fmt: skip
+COLUMNS = {"time_s": "time", "value": "value", "low95": "low", "high95": "high"}
 Predictions = dict[tuple[str, str, str], dict[str, np.ndarray]]
 
 
@@ -52,14 +50,10 @@ def answer(folder: Path, question: str, sections: Mapping[str, Mapping[str, Any]
     return json.loads((folder / "out" / name).read_text(encoding="utf-8"))
 
 
-def predictions(folder: Path, *roles: str) -> Predictions:
+def predictions(folder: Path) -> Predictions:
     """Return what is predicted of fitted and held-out runs, by run, quantity and source."""
-    roles = roles or ("fit", "held_out")
-    lists: dict[tuple[str, str, str], list[tuple[float, ...]]] = defaultdict(list)
-    with (folder / "out" / "predictions.csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            if row["role"] in roles:
-                values = (row.get(k) for k in COLUMNS.values())
-                key = row["run"], row["quantity"], row["source"]
-                lists[key].append(tuple(float(v) if v else np.nan for v in values))
-    return {key: dict(zip(COLUMNS, np.array(rows).T, strict=True)) for key, rows in lists.items()}
+    rows = pd.read_csv(folder / "out" / "predictions.csv", float_precision="round_trip")
+    rows = rows[rows["role"].isin(["fit", "held_out"])].rename(columns=COLUMNS)
+    groups = rows.groupby(["run", "quantity", "source"], sort=False)
+    return {key: {name: some[name].to_numpy(float) for name in COLUMNS.values()}
+            for key, some in groups}  # fmt: skip

@@ -3,8 +3,9 @@
     python benchmarks/run.py TASK [--cases NAMES] [--ask QUESTIONS] [--seed N] [--out FILE]
 
 A case, a question and a seed that stand in the file are not asked again. ``README.md`` lists the
-tasks. A task is a module with `QUESTIONS`, `SEED`, `names(seed)`, `run(name, question, seed,
-folder)`, `line(row)` and `table(rows)`; it may have `GROUPS` of names and a `LIMIT` in seconds.
+tasks. A task is a module with `QUESTIONS`, `SEED`, `GROUPS` of names or
+`names(seed)`, `run(name, question, seed, folder)`, `line(row)` and `table(rows)`; it may have a
+`LIMIT` in seconds.
 """
 
 import argparse
@@ -22,11 +23,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
 
-TASKS = {
-    "calibration": "calibration", "field": "field.task", "five-hundred": "five_hundred",
-    "hostile": "hostile", "malformed": "malformed", "measured": "measured",
-    "readings": "readings", "several-tests": "several_tests",
-}  # fmt: skip
+TASKS = "calibration", "field", "hostile", "malformed", "measured"
 TIMERS = (signal.ITIMER_PROF, signal.SIGPROF, 1), (signal.ITIMER_REAL, signal.SIGALRM, 10)
 FAILED = ("refused", "fault", "late")
 
@@ -37,7 +34,7 @@ class Late(BaseException):
 
 def task_named(name: str) -> ModuleType:
     """Return the module of a task."""
-    return importlib.import_module(TASKS[name])
+    return importlib.import_module(name)
 
 
 def ask(task: str, name: str, question: str, seed: int, folder: str | None, limit: float) -> dict:
@@ -123,7 +120,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     out = given.out or Path(f"{given.task}.jsonl")
     rows = read(out)
     done = {(str(r.get("case", r.get("index"))), r.get("question"), r["seed"]) for r in rows}
-    names = chosen(given.cases, task.names(seed), getattr(task, "GROUPS", {}))
+    groups = getattr(task, "GROUPS", {})
+    names = task.names(seed) if not groups else [name for some in groups.values() for name in some]
+    names = chosen(given.cases, names, groups)
     questions = given.ask.split(",") if given.ask else task.QUESTIONS
     limit = given.limit or getattr(task, "LIMIT", 3600.0)
     left = [

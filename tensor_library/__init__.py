@@ -9,19 +9,17 @@ from tensor_library.algebra import (
     identity_like,
     inner,
     integrity_basis,
+    planar_extension,
+    rate_of_deformation,
     scalar_invariants,
+    simple_shear,
     square,
     to_shear,
     trace,
-)
-from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm, register_closed_form
-from tensor_library.kinematics import (
-    planar_extension,
-    rate_of_deformation,
-    simple_shear,
     uniaxial_extension,
     upper_convected_production,
 )
+from tensor_library.closed_forms import CLOSED_FORMS, ClosedForm, register_closed_form
 from tensor_library.law_terms import LawTerm, LawTerms
 from tensor_library.library import TermLibrary, build_library
 from tensor_library.terms import CandidateTerm, parse_term

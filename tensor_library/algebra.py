@@ -1,4 +1,4 @@
-"""Algebra of symmetric tensors, (3, 3) for any flow or the four components of simple shear.
+"""Algebra and kinematics of symmetric tensors, (3, 3) or the four components of simple shear.
 
 Traces, squares and anticommutators keep tensors symmetric; laws written with them work on both, and
 on four components they compile to far less than matrix products.
@@ -22,39 +22,21 @@ def _is_shear(tensor: Symmetric) -> bool:
 
 
 def identity_like(tensor: Symmetric) -> Symmetric:
-    """Return the unit tensor in the storage of `tensor`.
-
-    Examples
-    --------
-    >>> identity_like(jnp.zeros(4)).tolist()  # 11, 22, 33, 12
-    [1.0, 1.0, 1.0, 0.0]
-    """
+    """Return the unit tensor in the storage of `tensor`."""
     if _is_shear(tensor):
         return jnp.array([1.0, 1.0, 1.0, 0.0], dtype=tensor.dtype)
     return jnp.eye(3, dtype=tensor.dtype)
 
 
 def trace(tensor: Symmetric) -> Float[Array, ""]:
-    """Return tr a.
-
-    Examples
-    --------
-    >>> float(trace(jnp.array([2.0, 1.0, 0.0, 5.0])))
-    3.0
-    """
+    """Return tr a."""
     if _is_shear(tensor):
         return tensor[0] + tensor[1] + tensor[2]
     return jnp.trace(tensor)
 
 
 def square(tensor: Symmetric) -> Symmetric:
-    """Return a·a.
-
-    Examples
-    --------
-    >>> square(jnp.diag(jnp.array([2.0, 0.0, 0.0])))[0].tolist()
-    [4.0, 0.0, 0.0]
-    """
+    """Return a·a."""
     if _is_shear(tensor):
         a11, a22, a33, a12 = tensor
         return jnp.stack([a11**2 + a12**2, a22**2 + a12**2, a33**2, a12 * (a11 + a22)])
@@ -62,36 +44,18 @@ def square(tensor: Symmetric) -> Symmetric:
 
 
 def anticommutator(first: Symmetric, second: Symmetric) -> Symmetric:
-    """Return a·b + b·a, which is symmetric although a·b is not.
-
-    Examples
-    --------
-    >>> anticommutator(jnp.array([2.0, 0.0, 0.0, 0.0]), jnp.array([0.0, 0.0, 0.0, 3.0])).tolist()
-    [0.0, 0.0, 0.0, 6.0]
-    """
+    """Return a·b + b·a, which is symmetric although a·b is not."""
     if _is_shear(first):
         a11, a22, a33, a12 = first
         b11, b22, b33, b12 = second
-        return jnp.stack(
-            [
-                2.0 * (a11 * b11 + a12 * b12),
-                2.0 * (a22 * b22 + a12 * b12),
-                2.0 * a33 * b33,
-                a12 * (b11 + b22) + b12 * (a11 + a22),
-            ]
-        )
+        twice = 2.0 * (a11 * b11 + a12 * b12), 2.0 * (a22 * b22 + a12 * b12), 2.0 * a33 * b33
+        return jnp.stack([*twice, a12 * (b11 + b22) + b12 * (a11 + a22)])
     product = first @ second
     return product + product.T
 
 
 def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
-    """Return tr(a·b).
-
-    Examples
-    --------
-    >>> float(inner(jnp.array([2.0, 0.0, 0.0, 1.0]), jnp.array([2.0, 0.0, 0.0, 1.0])))
-    6.0
-    """
+    """Return tr(a·b)."""
     if _is_shear(first):
         # the 12 component stands for 12 and 21
         a11, a22, a33, a12 = first
@@ -101,29 +65,15 @@ def inner(first: Symmetric, second: Symmetric) -> Float[Array, ""]:
 
 
 def to_shear(tensor: Float[Array, "3 3"]) -> Float[Array, "4"]:
-    """Return the four components (11, 22, 33, 12) of a tensor in simple shear.
-
-    Examples
-    --------
-    >>> to_shear(jnp.diag(jnp.array([2.0, 0.0, 0.0]))).tolist()
-    [2.0, 0.0, 0.0, 0.0]
-    """
+    """Return the four components (11, 22, 33, 12) of a tensor in simple shear."""
     return jnp.stack([tensor[0, 0], tensor[1, 1], tensor[2, 2], tensor[0, 1]])
 
 
 def from_shear(components: Float[Array, "4"]) -> Float[Array, "3 3"]:
-    """Return the full tensor of four simple-shear components (11, 22, 33, 12).
-
-    Examples
-    --------
-    >>> from_shear(jnp.array([1.0, 2.0, 3.0, 4.0])).tolist()
-    [[1.0, 4.0, 0.0], [4.0, 2.0, 0.0], [0.0, 0.0, 3.0]]
-    """
+    """Return the full tensor of four simple-shear components (11, 22, 33, 12)."""
     a11, a22, a33, a12 = components
     zero = jnp.zeros_like(a11)
-    return jnp.stack(
-        [jnp.stack([a11, a12, zero]), jnp.stack([a12, a22, zero]), jnp.stack([zero, zero, a33])]
-    )
+    return jnp.stack([a11, a12, zero, a12, a22, zero, zero, zero, a33]).reshape(3, 3)
 
 
 def contracted(first: Float[Array, "..."], second: Float[Array, "..."]) -> Float[Array, "..."]:
@@ -140,15 +90,10 @@ SHEAR_COMPONENTS = ("11", "22", "33", "12")
 
 
 INVARIANT_NAMES = (
-    "tr(sigma)",
-    "tr(sigma.sigma)",
-    "tr(gammadot.gammadot)",
-    "tr(sigma.sigma.sigma)",
-    "tr(gammadot.gammadot.gammadot)",
-    "tr(sigma.sigma.gammadot)",
-    "tr(sigma.gammadot.gammadot)",
+    "tr(sigma)", "tr(sigma.sigma)", "tr(gammadot.gammadot)", "tr(sigma.sigma.sigma)",
+    "tr(gammadot.gammadot.gammadot)", "tr(sigma.sigma.gammadot)", "tr(sigma.gammadot.gammadot)",
     "tr(sigma.gammadot)",
-)
+)  # fmt: skip
 """Canonical spellings, in the order of `scalar_invariants`."""
 
 INVARIANT_ORDERS = (1, 2, 2, 3, 3, 3, 3, 2)
@@ -169,32 +114,18 @@ def scalar_invariants(stress: Symmetric, rate: Symmetric) -> Float[Array, "8"]:
     >>> scalar_invariants(jnp.array([2.0, 0.0, 0.0, 0.0]), jnp.zeros(4))[:2].tolist()  # tr σ, tr σ²
     [2.0, 4.0]
     """
-    stress_squared = square(stress)
-    rate_squared = square(rate)
-    return jnp.stack(
-        [
-            trace(stress),
-            trace(stress_squared),
-            trace(rate_squared),
-            inner(stress_squared, stress),
-            inner(rate_squared, rate),
-            inner(stress_squared, rate),
-            inner(stress, rate_squared),
-            inner(stress, rate),
-        ]
-    )
+    stress_squared, rate_squared = square(stress), square(rate)
+    return jnp.stack([
+        trace(stress), trace(stress_squared), trace(rate_squared),
+        inner(stress_squared, stress), inner(rate_squared, rate),
+        inner(stress_squared, rate), inner(stress, rate_squared), inner(stress, rate),
+    ])  # fmt: skip
 
 
 TENSOR_NAMES = (
-    "I",
-    "sigma",
-    "gammadot",
-    "sigma.sigma",
-    "gammadot.gammadot",
-    "sigma.gammadot+gammadot.sigma",
-    "sigma.sigma.gammadot+gammadot.sigma.sigma",
-    "sigma.gammadot.gammadot+gammadot.gammadot.sigma",
-)
+    "I", "sigma", "gammadot", "sigma.sigma", "gammadot.gammadot", "sigma.gammadot+gammadot.sigma",
+    "sigma.sigma.gammadot+gammadot.sigma.sigma", "sigma.gammadot.gammadot+gammadot.gammadot.sigma",
+)  # fmt: skip
 """Canonical spellings, in the order of `integrity_basis`."""
 
 TENSOR_ORDERS = (0, 1, 1, 2, 2, 2, 3, 3)
@@ -214,17 +145,64 @@ def integrity_basis(
     >>> integrity_basis(jnp.zeros(4), jnp.zeros(4)).shape
     (8, 4)
     """
-    stress_squared = square(stress)
-    rate_squared = square(rate)
-    return jnp.stack(
-        [
-            identity_like(stress),
-            stress,
-            rate,
-            stress_squared,
-            rate_squared,
-            anticommutator(stress, rate),
-            anticommutator(stress_squared, rate),
-            anticommutator(stress, rate_squared),
-        ]
-    )
+    stress_squared, rate_squared = square(stress), square(rate)
+    return jnp.stack([
+        identity_like(stress), stress, rate, stress_squared, rate_squared,
+        anticommutator(stress, rate), anticommutator(stress_squared, rate),
+        anticommutator(stress, rate_squared),
+    ])  # fmt: skip
+
+
+VelocityGradient = Float[Array, "3 3"] | Float[Array, "4"] | Float[Array, ""]
+"""L in 1/s: full; (L11, L22, L33, L12) where the third axis is principal; or a shear rate."""
+
+
+def simple_shear(shear_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of v₁ = γ̇ x₂."""
+    return jnp.zeros((3, 3), dtype=jnp.result_type(shear_rate, float)).at[0, 1].set(shear_rate)
+
+
+def uniaxial_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of uniaxial extension along x₁ at constant volume."""
+    return extension_rate * jnp.diag(jnp.array([1.0, -0.5, -0.5]))
+
+
+def planar_extension(extension_rate: Float[Array, ""]) -> Float[Array, "3 3"]:
+    """Return the velocity gradient of planar extension in the x₁ x₂ plane."""
+    return extension_rate * jnp.diag(jnp.array([1.0, -1.0, 0.0]))
+
+
+def rate_of_deformation(velocity_gradient: VelocityGradient) -> Symmetric:
+    """Return γ̇ = L + Lᵀ, of L in any of its three forms, in 1/s or dimensionless."""
+    velocity_gradient = jnp.asarray(velocity_gradient)
+    if velocity_gradient.shape == ():
+        zero = jnp.zeros_like(velocity_gradient)
+        return jnp.stack([zero, zero, zero, velocity_gradient])
+    if velocity_gradient.shape == (4,):
+        return velocity_gradient * jnp.array([2.0, 2.0, 2.0, 1.0])
+    return velocity_gradient + velocity_gradient.T
+
+
+def upper_convected_production(stress: Symmetric, velocity_gradient: VelocityGradient) -> Symmetric:
+    """Return L·σ + σ·Lᵀ, what the upper convected derivative subtracts from dσ/dt [Oldroyd 1950].
+
+    `stress`: (3, 3) with a full L, else four components with (4,) or () of L.
+
+    Examples
+    --------
+    >>> stress, rate = jnp.array([0.0, 0.0, 0.0, 3.0]), jnp.asarray(2.0)
+    >>> upper_convected_production(stress, rate).tolist()  # σ11 grows with 2 γ̇ σ12
+    [12.0, 0.0, 0.0, 0.0]
+    """
+    velocity_gradient = jnp.asarray(velocity_gradient)
+    if velocity_gradient.shape == ():
+        zero = jnp.zeros_like(stress[0])
+        grown = 2.0 * velocity_gradient * stress[3], velocity_gradient * stress[1]
+        return jnp.stack([grown[0], zero, zero, grown[1]])
+    if velocity_gradient.shape == (4,):
+        l11, l22, l33, l12 = velocity_gradient
+        s11, s22, s33, s12 = stress
+        twice = 2.0 * (l11 * s11 + l12 * s12), 2.0 * l22 * s22, 2.0 * l33 * s33
+        return jnp.stack([*twice, (l11 + l22) * s12 + l12 * s22])
+    product = velocity_gradient @ stress
+    return product + product.T

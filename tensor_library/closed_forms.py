@@ -123,17 +123,10 @@ class ClosedForm:
         Inner parameter, where a fit starts, and its admissible range.
     function
         ``f(trace_of_stress, inner)``, dimensionless, both of shape (), in jax.numpy.
-    complexity
-        Number of operations, for model selection.
-    source
-        Literature.
+    complexity, source
+        Number of operations, for model selection; literature.
     expression
         `function` of SymPy symbols; None for a built-in form.
-
-    Examples
-    --------
-    >>> CLOSED_FORMS["exp"].spelling
-    '(exp(epsilon*tr(sigma))-1)'
     """
 
     name: str
@@ -158,27 +151,11 @@ def _saturating(trace_of_stress: Float[Array, ""], inner: Float[Array, ""]) -> F
 
 
 _BUILT_IN = (
-    ClosedForm(
-        "exp",
-        "(exp(epsilon*tr(sigma))-1)",
-        "epsilon",
-        0.25,
-        (1e-4, 2.0),
-        _exponential,
-        3,
-        "Phan-Thien 1978, J. Rheol. 22, 259",
-    ),
-    ClosedForm(
-        "saturating",
-        "(tr(sigma)/(1+kappa*abs(tr(sigma))))",
-        "kappa",
-        0.1,
-        (1e-4, 10.0),
-        _saturating,
-        4,
-        "first Padé form of a coefficient that levels off",
-    ),
-)
+    ClosedForm("exp", "(exp(epsilon*tr(sigma))-1)", "epsilon", 0.25, (1e-4, 2.0), _exponential, 3,
+               "Phan-Thien 1978, J. Rheol. 22, 259"),
+    ClosedForm("saturating", "(tr(sigma)/(1+kappa*abs(tr(sigma))))", "kappa", 0.1, (1e-4, 10.0),
+               _saturating, 4, "first Padé form of a coefficient that levels off"),
+)  # fmt: skip
 
 CLOSED_FORMS: Registry[ClosedForm] = Registry(
     "closed form", "discover.terms", lambda: {form.name: form for form in _BUILT_IN}
@@ -192,18 +169,9 @@ _SPELLING = re.compile(r"\([a-z0-9_+\-*/^().]*tr\(sigma\)[a-z0-9_+\-*/^().]*\)")
 def register_closed_form(form: ClosedForm) -> ClosedForm:
     """Make a closed form of one's own, with its `expression`, known in this process.
 
-    An installed package does so in every process: see docs/adding-a-term.md.
-
-    Raises
-    ------
-    ValueError
-            If its name, spelling or inner parameter is taken or cannot be written, its default is
-        out of
-        bounds, it does not vanish at zero stress, or `function` and `expression` differ.
-
-    Examples
-    --------
-    >>> register_closed_form(form)  # doctest: +SKIP
+    An installed package does so in every process: see docs/adding-a-term.md. Raises ValueError if
+    a name or spelling is taken or none, the default is out of bounds, the form does not vanish at
+    zero stress, or `function` and `expression` differ.
     """
     known = CLOSED_FORMS.present
     for what, text in (("name", form.name), ("inner_name", form.inner_name)):

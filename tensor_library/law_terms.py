@@ -17,23 +17,16 @@ _Term = TypeVar("_Term", bound="LawTerm")
 
 @dataclass(frozen=True)
 class LawTerm:
-    """One term c·term of the extra term h of a law.
+    """One term c·term of the extra term h of a law; ValueError where none can be read so.
 
     Attributes
     ----------
     term
         Canonical spelling.
-    coefficient
-        c, dimensionless.
+    coefficient, ci95
+        c, dimensionless, and its 95 % interval; None where declared or not computed.
     inner
         Inner parameters of a closed form by name; the form's default where one is missing.
-    ci95
-        95 % interval of c; None where declared or not computed.
-
-    Raises
-    ------
-    ValueError
-        If `parse_term` cannot read the spelling, or the term has no such inner parameter.
 
     Examples
     --------
@@ -63,12 +56,8 @@ class LawTerm:
     def to_json(self) -> dict[str, Any]:
         """Return the term as JSON-able values; an interval only where there is one."""
         told = {} if self.ci95 is None else {"ci95": list(self.ci95)}
-        return {
-            "term": self.term,
-            "coefficient": self.coefficient,
-            "inner": dict(self.inner),
-            **told,
-        }
+        own = {"term": self.term, "coefficient": self.coefficient, "inner": dict(self.inner)}
+        return own | told
 
     @classmethod
     def from_json(cls: type[_Term], content: Mapping[str, Any]) -> _Term:

@@ -98,30 +98,17 @@ class TermLibrary:
         The monomials of degree d are products of one of degree d − 1 and one invariant, so one
         gather and one product per degree serve any number of terms.
         """
-        monomials: list[tuple[int, ...]] = [(0,) * N_INVARIANTS]
-        position = {monomials[0]: 0}
-
-        def place(powers: tuple[int, ...]) -> int:
-            if powers not in position:
-                last = max(i for i, p in enumerate(powers) if p)
-                place(tuple(p - (i == last) for i, p in enumerate(powers)))
-                position[powers] = len(monomials)
-                monomials.append(powers)
-            return position[powers]
-
-        for term in self.terms:
-            place(term.powers)
-        order = sorted(range(len(monomials)), key=lambda i: sum(monomials[i]))
-        ranked = [monomials[i] for i in order]
+        needed = {(0,) * N_INVARIANTS}
+        for powers in (term.powers for term in self.terms):
+            while powers not in needed:
+                needed.add(powers)
+                powers = _parent(powers)[0]
+        ranked = sorted(needed, key=sum)
         rank = {powers: i for i, powers in enumerate(ranked)}
         levels = []
-        for degree in range(1, max(sum(p) for p in ranked) + 1):
-            parents, factors = [], []
-            for powers in (p for p in ranked if sum(p) == degree):
-                last = max(i for i, p in enumerate(powers) if p)
-                parents.append(rank[tuple(p - (i == last) for i, p in enumerate(powers))])
-                factors.append(last)
-            levels.append((np.array(parents), np.array(factors)))
+        for degree in range(1, sum(ranked[-1]) + 1):
+            pairs = [_parent(powers) for powers in ranked if sum(powers) == degree]
+            levels.append(tuple(np.array([(rank[p], last) for p, last in pairs]).T))
         form_position = {form.name: 1 + i for i, form in enumerate(self.forms)}
         return (
             levels,
@@ -140,8 +127,7 @@ class TermLibrary:
         stress, rate
             Dimensionless, both of shape (3, 3) or (4,).
         inner
-                In the order of `inner_names`, dimensionless, shape (n_inner,); by default the
-            forms' own.
+            Dimensionless, of `inner_names`, shape (m,); by default the forms' own.
         """
         levels, monomial_of_term, form_of_term, tensor_of_term = self._layout
         invariants = scalar_invariants(stress, rate)
@@ -160,33 +146,29 @@ class TermLibrary:
         return scalar.reshape((-1,) + (1,) * stress.ndim) * basis
 
 
+def _parent(powers: tuple[int, ...]) -> tuple[tuple[int, ...], int]:
+    """Return a monomial without its last invariant, and which that is."""
+    last = max(i for i, p in enumerate(powers) if p)
+    return tuple(p - (i == last) for i, p in enumerate(powers)), last
+
+
 def build_library(
-    tensors: Sequence[str] = TENSOR_NAMES,
-    degree: int = 0,
-    closed_forms: Sequence[str] = (),
-    invariants: Sequence[str] | None = None,
-    closed_form_tensors: Sequence[str] = ("sigma",),
+    tensors: Sequence[str] = TENSOR_NAMES, degree: int = 0, closed_forms: Sequence[str] = (),
+    invariants: Sequence[str] | None = None, closed_form_tensors: Sequence[str] = ("sigma",),
     extra: Sequence[str] = (),
-) -> TermLibrary:
+) -> TermLibrary:  # fmt: skip
     """Return the library of tensors × invariant monomials up to a degree, plus closed forms.
 
     Parameters
     ----------
     tensors, invariants
-            From `TENSOR_NAMES` and `INVARIANT_NAMES`; by default all invariants that can differ
-        from zero
-        in simple shear (tr γ̇³ vanishes there).
+        From `TENSOR_NAMES` and `INVARIANT_NAMES`; by default all that can differ from 0 in shear.
     degree
         Highest total degree of the invariant multipliers, 0 to 4.
     closed_forms, closed_form_tensors
         Keys of `CLOSED_FORMS`, each multiplied with every one of these tensors.
     extra
-        Further terms in canonical spelling, such as ``tr(sigma)*sigma``.
-
-    Raises
-    ------
-    ValueError
-        If a name is unknown or the degree is outside 0 to 4.
+        Further terms in canonical spelling. ValueError if a name is unknown, or the degree.
 
     Examples
     --------
@@ -196,9 +178,8 @@ def build_library(
     if isinstance(degree, bool) or not isinstance(degree, int) or not 0 <= degree <= 4:
         raise ValueError(f"degree must be 0 to 4; got {degree!r}. Higher ones are not separable.")
     if invariants is None:
-        invariants = [
-            name for i, name in enumerate(INVARIANT_NAMES) if i not in IDENTICALLY_ZERO_IN_SHEAR
-        ]
+        zero = {INVARIANT_NAMES[i] for i in IDENTICALLY_ZERO_IN_SHEAR}
+        invariants = [name for name in INVARIANT_NAMES if name not in zero]
     for given, known, what in (
         (tensors, TENSOR_NAMES, "tensor"),
         (closed_form_tensors, TENSOR_NAMES, "tensor"),
@@ -211,19 +192,11 @@ def build_library(
         if unknown:
             raise ValueError(f"Unknown {what} {unknown[0]!r}; known are {', '.join(known)}.")
     positions = [INVARIANT_NAMES.index(name) for name in invariants]
-    monomials = []
-    for d in range(degree + 1):
-        for chosen in combinations_with_replacement(positions, d):
-            monomials.append(tuple(chosen.count(i) for i in range(N_INVARIANTS)))
-    terms = [
-        CandidateTerm(TENSOR_NAMES.index(tensor), powers)
-        for powers in monomials
-        for tensor in tensors
-    ]
-    terms += [
-        CandidateTerm(TENSOR_NAMES.index(tensor), closed_form=form)
-        for form in closed_forms
-        for tensor in closed_form_tensors
-    ]
+    chosen = (c for d in range(degree + 1) for c in combinations_with_replacement(positions, d))
+    monomials = [tuple(one.count(i) for i in range(N_INVARIANTS)) for one in chosen]
+    place = TENSOR_NAMES.index
+    terms = [CandidateTerm(place(name), powers) for powers in monomials for name in tensors]
+    terms += [CandidateTerm(place(name), closed_form=form)
+              for form in closed_forms for name in closed_form_tensors]  # fmt: skip
     terms += map(parse_term, extra)
     return TermLibrary(tuple(dict.fromkeys(terms)))

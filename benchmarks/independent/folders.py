@@ -1,5 +1,6 @@
 """Data folders and study files, written by hand: text alone, none of the software under test."""
 
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -22,22 +23,25 @@ def write_folder(
     run; an empty cell where a run has none. `normal_stresses`: whether N1 and N2 are written, where
     a record has them. `digits`: significant digits.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    metadata = metadata or {}
-    extra = list(dict.fromkeys(key for line in metadata.values() for key in line))
-    lines = [",".join(["file", *extra])]
+    columns = {}
     for name, run in runs.items():
-        cells = [str(metadata.get(name, {}).get(key, "")) for key in extra]
-        lines.append(",".join([name, *cells]))
-        columns: dict[str, np.ndarray | None] = {
-            "time_s": run.time,
-            "shear_rate_1_s": run.rate,
-            "stress_Pa": run.stress,
-        }
-        if normal_stresses:
-            columns |= {"N1_Pa": run.N1, "N2_Pa": run.N2}
-        columns["strain"] = run.strain
-        write_table(folder / name, columns, digits)
+        told = {"time_s": run.time, "shear_rate_1_s": run.rate, "stress_Pa": run.stress}
+        told |= {"N1_Pa": run.N1, "N2_Pa": run.N2} if normal_stresses else {}
+        columns[name] = {**told, "strain": run.strain}
+    return write_runs(folder, columns, metadata or {}, digits)
+
+
+def write_runs(
+    folder: Path, columns: Mapping[str, Mapping[str, np.ndarray | None]],
+    cells: Mapping[str, Mapping[str, Any]], digits: int = 9,
+) -> Path:  # fmt: skip
+    """Write ``runs.csv`` with its cells by run, and the columns of each run; return the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    keys = list(dict.fromkeys(key for told in cells.values() for key in told))
+    lines = [",".join(["file", *keys])]
+    for name, told in columns.items():
+        write_table(folder / name, told, digits)
+        lines.append(",".join([name, *(str(cells.get(name, {}).get(key, "")) for key in keys)]))
     (folder / "runs.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
     return folder
 
@@ -64,30 +68,28 @@ def maxwell_sweep(
     }
 
 
-def write_study(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> Path:
+def write_study(path: Path, sections: Mapping[str, Any]) -> Path:
     """Write a study file from its sections; return its path."""
-    lines = []
-    for section, entries in sections.items():
-        lines.append(f"[{section}]")
-        lines += [f"{key} = {toml(value)}" for key, value in entries.items()]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    path.write_text(to_toml(sections), encoding="utf-8")
     return path
 
 
-def toml(value: Any) -> str:
-    """Return a value as TOML spells it.
+def to_toml(content: Mapping[str, Any]) -> str:
+    """Return nested values as TOML, tables at the top as sections; what TOML lacks becomes text."""
+    tables = {key: value for key, value in content.items() if isinstance(value, Mapping)}
+    top = {key: value for key, value in content.items() if key not in tables}
+    lines = [f"{_toml(key)} = {_toml(value)}" for key, value in top.items()]
+    for name, table in tables.items():
+        lines += [f"[{_toml(name)}]", *(f"{_toml(k)} = {_toml(v)}" for k, v in table.items())]
+    return "\n".join(lines) + "\n"
 
-    Raises TypeError if TOML has no such value here.
-    """
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
-    if isinstance(value, int | float):
-        return repr(float(value)) if isinstance(value, float) else str(value)
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml(item) for item in value) + "]"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {toml(item)}" for key, item in value.items()) + " }"
-    raise TypeError(f"No TOML for {type(value).__name__}.")
+
+def _toml(value: Any) -> str:
+    match value:
+        case bool() | int() | float():
+            return repr(value).lower()
+        case Mapping():
+            return "{" + ", ".join(f"{_toml(k)} = {_toml(v)}" for k, v in value.items()) + "}"
+        case list() | tuple():
+            return "[" + ", ".join(map(_toml, value)) + "]"
+    return json.dumps(str(value), ensure_ascii=False).replace("\x7f", "")

@@ -32,26 +32,15 @@ class GiesekusFluid:
     mobility: float
     solvent_viscosity: float = 0.0
 
-    def recorded(
-        self,
-        kind: str,
-        rate: Callable[[float], float],
-        times: np.ndarray,
-        begins: float = 0.0,
-        jumps: Sequence[float] = (),
-    ) -> np.ndarray:
+    def recorded(self, kind: str, *flow, **more) -> np.ndarray:
         """Return σ12 in shear, σ11 − σ22 in extension, in Pa; parameters as of `stress`."""
-        total = self.stress(kind, rate, times, begins, jumps)
+        total = self.stress(kind, *flow, **more)
         return total[:, 0, 1] if kind == "shear" else total[:, 0, 0] - total[:, 1, 1]
 
     def stress(
-        self,
-        kind: str,
-        rate: Callable[[float], float],
-        times: np.ndarray,
-        begins: float = 0.0,
+        self, kind: str, rate: Callable[[float], float], times: np.ndarray, begins: float = 0.0,
         jumps: Sequence[float] = (),
-    ) -> np.ndarray:
+    ) -> np.ndarray:  # fmt: skip
         """Return the extra stress in Pa, shape (n, 3, 3).
 
         `kind`: one of `UNIT`. `rate` in 1/s, of time in s. `times`: increasing, after `begins`,

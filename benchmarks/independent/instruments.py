@@ -110,29 +110,20 @@ class Instrument:
             signal = self.adc_step * np.round(signal / self.adc_step)
         kept = Stresses(true.sigma12[keep], true.N1[keep], true.N2[keep])
         return Recording(
-            time=times * (1 + self.clock_slip),
-            rate=np.asarray(flow.rate(times), float),
-            stress=signal,
-            true=kept,
-            felt_rate=felt[keep],
-            tool_rate=tool[keep],
-            N1=kept.N1,
+            time=times * (1 + self.clock_slip), rate=np.asarray(flow.rate(times), float),
+            stress=signal, true=kept, felt_rate=felt[keep], tool_rate=tool[keep], N1=kept.N1,
             N2=kept.N2,
-        )
+        )  # fmt: skip
 
     def _told(self, flow: Flow) -> Flow:
         """Return the rate that the motor aims at; its strain where that is still in closed form."""
         gain = 1 + self.rate_gain
         if np.isfinite(self.fastest):
             # no strain: integral materials cannot be clipped here
-            def strain(t):
-                raise ValueError("A clipped motor needs a material that is a rate law.")
-
             return Flow(
-                lambda t: np.clip(gain * flow.rate(t), -self.fastest, self.fastest),
-                strain,
+                lambda t: np.clip(gain * flow.rate(t), -self.fastest, self.fastest), None,
                 flow.jumps,
-            )
+            )  # fmt: skip
         return Flow(lambda t: gain * flow.rate(t), lambda t: gain * flow.strain(t), flow.jumps)
 
     def _drifted(self, times: np.ndarray) -> np.ndarray:
@@ -229,19 +220,13 @@ def _ringing(times: np.ndarray, signal: np.ndarray, frequency: float, damping: f
     """Return y of y''/ω² + 2 ζ y'/ω + y = signal from rest; the signal is linear between times."""
     from scipy.integrate import solve_ivp
 
-    solution = solve_ivp(
-        lambda t, y: [
-            y[1],
-            frequency**2 * (np.interp(t, times, signal) - y[0]) - 2 * damping * frequency * y[1],
-        ],
-        (times[0], times[-1]),
-        [0.0, 0.0],
-        t_eval=times,
-        rtol=1e-8,
-        atol=1e-8 * max(float(np.max(np.abs(signal))), 1e-300),
-        max_step=float(np.max(np.diff(times))),
-    )
-    return solution.y[0]
+    def change(t, y):
+        pull = frequency**2 * (np.interp(t, times, signal) - y[0])
+        return [y[1], pull - 2 * damping * frequency * y[1]]
+
+    size, step = max(float(np.max(np.abs(signal))), 1e-300), float(np.max(np.diff(times)))
+    span, exact = (times[0], times[-1]), {"rtol": 1e-8, "atol": 1e-8 * size}
+    return solve_ivp(change, span, [0.0, 0.0], t_eval=times, max_step=step, **exact).y[0]
 
 
 _PERFECT = Instrument()
@@ -271,11 +256,6 @@ def alternation_as_from_rest(
     late = times + cycles * 2 * np.pi / frequency
     whole = _PERFECT.record(material, oscillation(amplitude, frequency), late)
     return replace(whole, time=times)
-
-
-def scaled(recording: Recording, stress: float = 1.0, time: float = 1.0) -> Recording:
-    """Return a record whose stress or time is written in another unit than its column says."""
-    return replace(recording, stress=stress * recording.stress, time=time * recording.time)
 
 
 def nothing(recording: Recording, level: float) -> Recording:

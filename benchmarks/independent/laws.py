@@ -13,6 +13,7 @@ from independent.material import (
     RateLaw,
     Stresses,
     StressLaw,
+    differences,
     rate_tensor,
     stretched,
     velocity_gradient,
@@ -59,9 +60,10 @@ class Newtonian(RateLaw):
         return self.viscosity * rate_tensor(rate)
 
     def respond(self, flow: Flow, times: np.ndarray) -> Stresses:
-        """Return η γ̇ and no normal stresses."""
-        shear = self.viscosity * np.asarray(flow.rate(np.asarray(times)), float)
-        return Stresses(shear, np.zeros_like(shear), np.zeros_like(shear))
+        """Return what the rate alone tells."""
+        return differences(
+            [self.stress(self.rest(), rate) for rate in flow.rate(np.asarray(times))]
+        )
 
 
 @dataclass(frozen=True)

@@ -103,14 +103,10 @@ def integrate(
         inside = (times > low) & (times <= high)
         short = np.nextafter(high, low) if high in jumps else high
         solution = solve_ivp(
-            lambda t, y, short=short: change(min(t, short), y),
-            (low, high),
-            state,
-            method="DOP853",
-            t_eval=np.unique(np.append(times[inside], high)),
-            rtol=TOLERANCE,
+            lambda t, y, short=short: change(min(t, short), y), (low, high), state, method="DOP853",
+            t_eval=np.unique(np.append(times[inside], high)), rtol=TOLERANCE,
             atol=TOLERANCE * scale,
-        )
+        )  # fmt: skip
         if not solution.success:
             raise ValueError(
                 f"The integration stopped at {low:g} to {high:g} s: {solution.message}"

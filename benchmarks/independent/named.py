@@ -2,18 +2,8 @@
 
 from collections.abc import Mapping
 
-from independent import (
-    ExtendedPomPom,
-    FenePeterlin,
-    Giesekus,
-    JohnsonSegalman,
-    PhanThienTanner,
-    PomPom,
-    RoliePoly,
-    RoliePolyBlend,
-    UpperConvectedMaxwell,
-    authors,
-)
+import independent as made
+from independent import authors
 from independent.authors import ByAuthors
 from independent.material import RateLaw
 
@@ -32,16 +22,11 @@ CONSTANTS: dict[str, dict[str, float]] = {
     "pom_pom_drag_strain": {"q": 4.0, "stretch_time_ratio": 0.3},
     "rolie_poly": {"stretch_time_ratio": 0.2, "beta": 0.7},
     "rolie_poly_fene": {"stretch_time_ratio": 0.3, "beta": 0.5, "maximum_stretch": 2.0},
-    "rolie_poly_blend": {
-        "long_fraction": 0.3,
-        "short_time_ratio": 0.1,
-        "stretch_time_ratio": 0.2,
-        "short_stretch_time_ratio": 0.2,
-        "beta": 1.0,
-    },
+    "rolie_poly_blend": {"long_fraction": 0.3, "short_time_ratio": 0.1, "stretch_time_ratio": 0.2,
+                         "short_stretch_time_ratio": 0.2, "beta": 1.0},
     "saramito": {"yield_strain": 0.4},
     "white_metzner": {"k": 0.8, "n": 0.4},
-}
+}  # fmt: skip
 """By the names of study files; chosen so that every constant shows at Weissenberg numbers of 1."""
 
 
@@ -55,28 +40,28 @@ def material(
     """
     scale = {"modulus": modulus, "relaxation_time": relaxation_time}
     c, time = constants, relaxation_time
-    kind = law.removeprefix("ptt_").partition("_")[0]
     match law:
         case "ucm":
-            return UpperConvectedMaxwell(**scale)
+            return made.UpperConvectedMaxwell(**scale)
         case "johnson_segalman":
-            return JohnsonSegalman(c["xi"], **scale)
+            return made.JohnsonSegalman(c["xi"], **scale)
         case "giesekus":
-            return Giesekus(c["alpha"], **scale)
+            return made.Giesekus(c["alpha"], **scale)
         case "fene_p":
-            return FenePeterlin(c["L2"], **scale)
+            return made.FenePeterlin(c["L2"], **scale)
         case "xpp":
-            return ExtendedPomPom(c["q"], c["alpha"], c["stretch_time_ratio"] * time, **scale)
+            return made.ExtendedPomPom(c["q"], c["alpha"], c["stretch_time_ratio"] * time, **scale)
         case "pom_pom" | "pom_pom_drag_strain":
             # growth of the stretch fades over the share of q that the software documents
             stretch, drag = c["stretch_time_ratio"] * time, law == "pom_pom_drag_strain"
-            return PomPom(c["q"], stretch, modulus, time, drag, fade=0.05)
+            return made.PomPom(c["q"], stretch, modulus, time, drag, fade=0.05)
         case "rolie_poly":
-            return RoliePoly(c["beta"], c["stretch_time_ratio"] * time, **scale)
+            return made.RoliePoly(c["beta"], c["stretch_time_ratio"] * time, **scale)
         case "rolie_poly_blend":
             phi, short = c["long_fraction"], c["short_time_ratio"] * time
             stretch = c["stretch_time_ratio"] * time, c["short_stretch_time_ratio"] * short
-            return RoliePolyBlend((phi, 1 - phi), (time, short), stretch, c["beta"], modulus)
+            return made.RoliePolyBlend((phi, 1 - phi), (time, short), stretch, c["beta"], modulus)
     if law.startswith("ptt_"):
-        return PhanThienTanner(c["epsilon"], kind, c.get("xi", 0.0), **scale)
+        kind = law.removeprefix("ptt_").partition("_")[0]
+        return made.PhanThienTanner(c["epsilon"], kind, c.get("xi", 0.0), **scale)
     return ByAuthors(getattr(authors, law), dict(c), **scale)

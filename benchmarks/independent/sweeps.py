@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from independent.laws import Giesekus
 from independent.material import RateLaw
 
 SAMPLES = 128
@@ -29,55 +30,39 @@ def first_harmonic(times: np.ndarray, stress: np.ndarray, frequency: float) -> c
     return complex(2j * np.mean(stress * turn))
 
 
-def modulus_of(law: RateLaw, strain: float, frequency: float, cycles: int) -> complex:
-    """Return G′ + iG″ in Pa of a law after so many cycles of a strain γ₀ sin ωt.
+def modulus_of(
+    law: RateLaw, strain: float, frequency: float, cycles: int, slip: float = 0.0
+) -> complex:
+    """Return G′ + iG″ in Pa of a law after so many cycles of a strain γ₀ sin ωt of the tool.
 
     `law`: of the modes. `strain`, `frequency`, `cycles`: γ₀, ω in rad/s, and how many cycles are
-    waited for.
+    waited for. `slip` in 1/(Pa s): the fluid feels the rate less this times its stress.
     """
     scale = law.scale()
 
-    def rate(t):
-        return strain * frequency * np.cos(frequency * t)
+    def rate(t, state):
+        imposed = strain * frequency * np.cos(frequency * t)
+        return imposed - slip * law.stress(state, 0.0)[0, 1] if slip else imposed
 
     def change(t, scaled):
-        return law.change(scale * scaled, rate(t)) / scale
+        state = scale * scaled
+        return law.change(state, rate(t, state)) / scale
 
     times, values = oscillating(change, law.rest() / scale, frequency, cycles)
     pairs = zip(times, (scale[:, None] * values).T, strict=True)
-    stress = np.array([law.stress(state, rate(t))[0, 1] for t, state in pairs])
+    stress = np.array([law.stress(state, rate(t, state))[0, 1] for t, state in pairs])
     # least squares by sine and cosine, evenly sampled over whole cycles
     return first_harmonic(times, stress, frequency) / strain
 
 
 def giesekus_modulus(
-    mobility: float,
-    modulus: float,
-    relaxation_time: float,
-    strain: float,
-    frequency: float,
+    mobility: float, modulus: float, relaxation_time: float, strain: float, frequency: float,
     slip: float = 0.0,
-) -> complex:
-    """Return G′ + iG″ in Pa of a Giesekus fluid   [Giesekus 1982, JNNFM 11, 69].
-
-    `mobility`, `modulus`, `relaxation_time`: α, G in Pa and λ in s. `strain`, `frequency`: of the
-    tool: γ₀ sin ωt. `slip` in 1/(Pa s): the fluid feels the rate less this times its stress.
-    """
-
-    def change(t, y):
-        first, second, third, shear = y
-        rate = strain * frequency * np.cos(frequency * t) - slip * modulus * shear
-        quadratic = [first**2 + shear**2, second**2 + shear**2, third**2]
-        quadratic.append(shear * (first + second))
-        convected = [2.0 * rate * shear, 0.0, 0.0, rate * (1.0 + second)]
-        return [
-            c - (s + mobility * q) / relaxation_time
-            for c, s, q in zip(convected, y, quadratic, strict=True)
-        ]
-
+) -> complex:  # fmt: skip
+    """Return that of a Giesekus fluid of α, G in Pa and λ in s, once it is periodic."""
     cycles = int(np.ceil(25.0 * relaxation_time * frequency / (2.0 * np.pi))) + 2
-    times, values = oscillating(change, [0.0] * 4, frequency, cycles)
-    return modulus * first_harmonic(times, values[3], frequency) / strain
+    law = Giesekus(mobility, modulus, relaxation_time)
+    return modulus_of(law, strain, frequency, cycles, slip)
 
 
 def strain_at(

@@ -9,21 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from independent import (
-    KBKZ,
-    ExtendedPomPom,
-    FenePeterlin,
-    Giesekus,
-    JohnsonSegalman,
-    PhanThienTanner,
-    PomPom,
-    RoliePoly,
-    SoftGlass,
-    Thixotropic,
-    UpperConvectedMaxwell,
-    WhiteMetzner,
-    multimode_giesekus,
-)
+import independent as made
 from independent.flow import Flow, oscillation, start_up, steps
 from independent.instruments import Instrument, Recording
 from independent.material import Material, RateLaw
@@ -38,40 +24,27 @@ Constants = Mapping[str, Mapping[str, float]]
 Named = tuple[tuple[frozenset[str], ...], Constants]
 """For each effect that is there, the names it has; and the constants that go with the first."""
 
-FLOWS: dict[str, dict[str, tuple[Flow, float]]] = {
-    "start-ups and oscillations": {
-        "a.csv": (start_up(1.0), 6.0),
-        "b.csv": (start_up(3.0), 5.0),
-        "c.csv": (oscillation(2.0, 1.0), 12.0),
-        "d.csv": (oscillation(3.0, 0.5), 14.0),
-        "held_e.csv": (start_up(5.0), 4.0),
-        "held_f.csv": (oscillation(5.0, 1.5), 8.0),
-    },
-    "start-ups": {
-        "a.csv": (start_up(0.5), 8.0),
-        "b.csv": (start_up(1.0), 6.0),
-        "c.csv": (start_up(2.0), 6.0),
-        "d.csv": (start_up(4.0), 5.0),
-        "held_e.csv": (start_up(6.0), 4.0),
-        "held_f.csv": (start_up(3.0), 5.0),
-    },
-    "oscillations": {
-        "a.csv": (oscillation(1.0, 0.5), 14.0),
-        "b.csv": (oscillation(2.0, 0.5), 14.0),
-        "c.csv": (oscillation(2.0, 1.0), 12.0),
-        "d.csv": (oscillation(4.0, 1.0), 12.0),
-        "held_e.csv": (oscillation(5.0, 1.5), 8.0),
-        "held_f.csv": (oscillation(6.0, 0.75), 10.0),
-    },
-    "steps": {
-        "a.csv": (steps([0.0, 4.0], [1.0, 3.0]), 8.0),
-        "b.csv": (steps([0.0, 4.0], [3.0, 0.5]), 8.0),
-        "c.csv": (steps([0.0, 4.0], [2.0, 0.0]), 7.0),
-        "d.csv": (steps([0.0, 3.0], [2.0, -2.0]), 7.0),
-        "held_e.csv": (steps([0.0, 3.0], [5.0, 1.0]), 6.0),
-        "held_f.csv": (steps([0.0, 3.0], [4.0, -4.0]), 6.0),
-    },
-}
+_NAMES = "a.csv", "b.csv", "c.csv", "d.csv", "held_e.csv", "held_f.csv"
+_FLOWS: dict[str, list[tuple[Flow, float]]] = {
+    "start-ups and oscillations": [
+        (start_up(1.0), 6.0), (start_up(3.0), 5.0), (oscillation(2.0, 1.0), 12.0),
+        (oscillation(3.0, 0.5), 14.0), (start_up(5.0), 4.0), (oscillation(5.0, 1.5), 8.0),
+    ],
+    "start-ups": [
+        (start_up(0.5), 8.0), (start_up(1.0), 6.0), (start_up(2.0), 6.0), (start_up(4.0), 5.0),
+        (start_up(6.0), 4.0), (start_up(3.0), 5.0),
+    ],
+    "oscillations": [
+        (oscillation(1.0, 0.5), 14.0), (oscillation(2.0, 0.5), 14.0), (oscillation(2.0, 1.0), 12.0),
+        (oscillation(4.0, 1.0), 12.0), (oscillation(5.0, 1.5), 8.0), (oscillation(6.0, 0.75), 10.0),
+    ],
+    "steps": [
+        (steps([0.0, 4.0], [1.0, 3.0]), 8.0), (steps([0.0, 4.0], [3.0, 0.5]), 8.0),
+        (steps([0.0, 4.0], [2.0, 0.0]), 7.0), (steps([0.0, 3.0], [2.0, -2.0]), 7.0),
+        (steps([0.0, 3.0], [5.0, 1.0]), 6.0), (steps([0.0, 3.0], [4.0, -4.0]), 6.0),
+    ],
+}  # fmt: skip
+FLOWS = {name: dict(zip(_NAMES, flows, strict=True)) for name, flows in _FLOWS.items()}
 """Six flows of each protocol, each with its duration in s; those named ``held_`` are to judge."""
 
 
@@ -85,37 +58,23 @@ def known_laws(draw: Draw) -> dict[str, tuple[Material, Named]]:
                                            draw(0.1, 0.4))  # fmt: skip
     length, breakdown, build_up = draw(20.0, 60.0), draw(0.1, 0.4), draw(1.0, 4.0)
     return {
-        "Maxwell": (UpperConvectedMaxwell(**SCALE), ((), {})),
-        "Giesekus": (
-            Giesekus(mobility, **SCALE),
-            _alone("giesekus_mobility", mobility, "sigma.sigma", constant="alpha"),
-        ),
+        "Maxwell": (made.UpperConvectedMaxwell(**SCALE), ((), {})),
+        "Giesekus": (made.Giesekus(mobility, **SCALE), _alone(
+            "giesekus_mobility", mobility, "sigma.sigma", constant="alpha")),
         # σ12 in shear tells none of these from its twins (FACTS on twins; Johnson & Segalman 1977)
-        "Johnson-Segalman": (
-            JohnsonSegalman(slip, **SCALE),
-            _alone(
-                "non_affine_motion", slip, "tr(sigma)*gammadot",
-                "sigma.gammadot+gammadot.sigma", constant="xi",
-            ),
-        ),
-        "linear PTT": (
-            PhanThienTanner(linear, "linear", 0.0, **SCALE),
-            _alone("ptt_linear", linear, "tr(sigma)*sigma", constant="epsilon"),
-        ),
-        "exponential PTT": (
-            PhanThienTanner(exponential, "exponential", 0.0, **SCALE),
-            _alone("ptt_exponential", exponential, constant="epsilon"),
-        ),
-        "FENE-P": (
-            FenePeterlin(length, **SCALE),
-            ((frozenset({"finite_extensibility"}),), {}),
-        ),
+        "Johnson-Segalman": (made.JohnsonSegalman(slip, **SCALE), _alone(
+            "non_affine_motion", slip, "tr(sigma)*gammadot",
+            "sigma.gammadot+gammadot.sigma", constant="xi")),
+        "linear PTT": (made.PhanThienTanner(linear, "linear", 0.0, **SCALE), _alone(
+            "ptt_linear", linear, "tr(sigma)*sigma", constant="epsilon")),
+        "exponential PTT": (made.PhanThienTanner(exponential, "exponential", 0.0, **SCALE), _alone(
+            "ptt_exponential", exponential, constant="epsilon")),
+        "FENE-P": (made.FenePeterlin(length, **SCALE), (
+            (frozenset({"finite_extensibility"}),), {})),
         "thixotropic Maxwell": (
-            Thixotropic(UpperConvectedMaxwell(**SCALE), breakdown, build_up),
-            (
-                (frozenset({"thixotropy"}),),
-                {"thixotropy": {"breakdown": breakdown, "build_up_time": build_up}},
-            ),
+            made.Thixotropic(made.UpperConvectedMaxwell(**SCALE), breakdown, build_up),
+            ((frozenset({"thixotropy"}),),
+             {"thixotropy": {"breakdown": breakdown, "build_up_time": build_up}}),
         ),
     }  # fmt: skip
 
@@ -145,20 +104,18 @@ def library_laws(law: str, constants: Constants) -> tuple[Mapping[str, float], .
 def unknown_laws(draw: Draw) -> dict[str, Material]:
     """Return laws that it has no name for among its effects and terms, in flows that turn."""
     return {
-        "Rolie-Poly": RoliePoly(draw(0.5, 1.0), draw(0.05, 0.2), -0.5, **SCALE),
-        "pom-pom": PomPom(draw(3.0, 6.0), draw(0.2, 0.6), **SCALE),
-        "extended pom-pom": ExtendedPomPom(draw(3.0, 8.0), draw(0.05, 0.3), draw(0.2, 0.6),
+        "Rolie-Poly": made.RoliePoly(draw(0.5, 1.0), draw(0.05, 0.2), -0.5, **SCALE),
+        "pom-pom": made.PomPom(draw(3.0, 6.0), draw(0.2, 0.6), **SCALE),
+        "extended pom-pom": made.ExtendedPomPom(draw(3.0, 8.0), draw(0.05, 0.3), draw(0.2, 0.6),
                                            **SCALE),
-        "White-Metzner": WhiteMetzner(draw(0.4, 0.7), draw(0.5, 1.5), **SCALE),
-        "K-BKZ": KBKZ(draw(0.1, 0.3), -0.15, **SCALE),
-        "two modes": multimode_giesekus(
-            (draw(0.05, 0.2), draw(0.5, 0.9)),
-            (0.5 * MODULUS, 0.5 * MODULUS),
-            (draw(1.1, 1.6) * TIME, draw(0.3, 0.6) * TIME),
-        ),
-        "soft glass": SoftGlass(draw(0.1, 0.3), draw(0.1, 0.3), **SCALE),
-        "square-root thixotropy": Thixotropic(
-            UpperConvectedMaxwell(**SCALE), draw(0.2, 0.5), draw(2.0, 6.0), 0.5, 2.0
+        "White-Metzner": made.WhiteMetzner(draw(0.4, 0.7), draw(0.5, 1.5), **SCALE),
+        "K-BKZ": made.KBKZ(draw(0.1, 0.3), -0.15, **SCALE),
+        "two modes": made.multimode_giesekus(
+            (draw(0.05, 0.2), draw(0.5, 0.9)), (0.5 * MODULUS, 0.5 * MODULUS),
+            (draw(1.1, 1.6) * TIME, draw(0.3, 0.6) * TIME)),
+        "soft glass": made.SoftGlass(draw(0.1, 0.3), draw(0.1, 0.3), **SCALE),
+        "square-root thixotropy": made.Thixotropic(
+            made.UpperConvectedMaxwell(**SCALE), draw(0.2, 0.5), draw(2.0, 6.0), 0.5, 2.0
         ),
     }  # fmt: skip
 
@@ -172,11 +129,9 @@ def known_flaws(draw: Draw) -> dict[str, tuple[Instrument, Named]]:
         "lag": (Instrument(lag=lag), _alone("transducer_lag", lag, constant="tau")),
         "rise": (Instrument(rise_time=rise), _alone("rate_rise_time", rise, constant="tau")),
         "slip": (Instrument(slip=slip), _alone("wall_slip", slip, constant="slip")),
-        "friction": (
-            Instrument(friction=friction),
-            _alone("bearing_friction", friction, constant="friction"),
-        ),
-    }
+        "friction": (Instrument(friction=friction), _alone(
+            "bearing_friction", friction, constant="friction")),
+    }  # fmt: skip
 
 
 def unknown_flaws(draw: Draw) -> dict[str, Instrument]:
@@ -268,7 +223,7 @@ def draw_world(seed: int, index: int) -> World:
     if index % 2:
         law = list(unknown)[(index // 2) % len(unknown)]
         material, effects, constants = unknown[law], None, {}
-        if isinstance(material, KBKZ) and protocol == "start-ups":
+        if isinstance(material, made.KBKZ) and protocol == "start-ups":
             # where no flow turns, strain added up is the strain of the damping function
             effects, constants = _alone("strain_damping", material.damping, constant="n")
     else:

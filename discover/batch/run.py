@@ -36,9 +36,6 @@ _DRAWING = {"compare": 8.0, "close-loop": 4.5}
 _DEMO_LOOP = 7.5
 """Seconds that the loop of the demonstration takes after its comparison, likewise."""
 
-Note = Callable[[Study], None]
-"""Called with a study that was read, before anything is done with it."""
-
 _PAGE = "report.html"
 _JSON_FILES = {"compare": "comparison.json", "close-loop": "loop.json"}
 
@@ -65,22 +62,14 @@ class _Task:
         self.__doc__ = work.__doc__
 
     def __call__(
-        self,
-        path: Path,
-        out: Path,
-        seed: int | None,
-        overwrite: bool,
-        progress: Progress,
-        note: Note = lambda study: None,
+        self, path: Path, out: Path, seed: int | None, overwrite: bool, progress: Progress,
         tolerance: float | None = None,
-    ) -> TaskResult:
-        """Run the task.
+    ) -> TaskResult:  # fmt: skip
+        """Run the task; InputError if the study, its data or the folder is wrong.
 
-        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`: overrides
-        the study's seeds. `overwrite`: start afresh. `progress`: called with what is going on and
-        the fraction done. `note`: called with the study once it was read. `tolerance`: overrides
-        the relative discrepancy that the study accepts. Raises InputError if the study, its data or
-        the folder is wrong.
+        `out`: folder for the results; goes on there if it holds unfinished ones. `seed`,
+        `tolerance`: in place of the study's. `overwrite`: start afresh. `progress`: called with
+        what is going on and the fraction done.
         """
         enable_x64()
         enable_compilation_cache()
@@ -88,7 +77,6 @@ class _Task:
         if tolerance is not None:
             verdict = validated(Verdict, {"tolerance": tolerance}, "--tolerance")
             study = study.model_copy(update={"verdict": verdict})
-        note(study)
         folder = RunFolder(out, fingerprint(study, self.name, seed), overwrite)
         there = folder.complete and folder.holds(_PAGE, _JSON_FILES[self.name])
         if there:
@@ -191,15 +179,10 @@ def run_demo(
 
 
 def run_batch(
-    paths: Sequence[Path],
-    out: Path,
-    workers: int = 1,
-    scheduler: str | None = None,
-    seed: int | None = None,
-    overwrite: bool = False,
+    paths: Sequence[Path], out: Path, workers: int = 1, scheduler: str | None = None,
+    seed: int | None = None, overwrite: bool = False,
     progress: Progress = lambda label, fraction: None,
-    note: Note = lambda study: None,
-) -> BatchResult:
+) -> BatchResult:  # fmt: skip
     """Run studies into folders of their own; one that fails does not stop the others.
 
     A study with a ``[loop]`` section closes the loop, one with ``[compare]`` or neither compares,
@@ -213,7 +196,7 @@ def run_batch(
     jobs = [
         (str(path), name, task, str(out / name), seed, overwrite)
         for path, name in zip(paths, folder_names(paths), strict=True)
-        for name, task in _tasks_of(path, name, note)
+        for name, task in _tasks_of(path, name)
     ]
     _require_different([job[1] for job in jobs])
     summary = Summary(out, [(job[1], job[2]) for job in jobs])
@@ -224,14 +207,14 @@ def run_batch(
         so_far.end(position, status)
 
     try:
-        with on_stop(summary.write_ended):
+        with on_stop(summary.write):
             if workers == 1 and scheduler is None:
                 for i, job in enumerate(jobs):
                     end(i, run_one(*job, progress=partial(so_far.say, i)))
             else:
-                summary.write_soon()  # once it was written, it takes no time on Ctrl-C
+                summary.write()  # once it was written, it takes no time on Ctrl-C
                 if scheduler is None:
-                    run_in_workers(run_one, jobs, min(workers, len(jobs)), so_far.say, end)
+                    run_in_workers(jobs, min(workers, len(jobs)), so_far.say, end)
                 else:
                     run_on_cluster(run_one, jobs, scheduler, so_far.say, end)
     finally:
@@ -267,14 +250,9 @@ def _require_different(names: Sequence[str]) -> None:
 
 
 def run_one(
-    path: str,
-    name: str,
-    task: str,
-    out: str,
-    seed: int | None,
-    overwrite: bool,
+    path: str, name: str, task: str, out: str, seed: int | None, overwrite: bool,
     progress: Progress = lambda label, fraction: None,
-) -> StudyStatus:
+) -> StudyStatus:  # fmt: skip
     """Run one study and say how it ended; never raises for a failure of the study."""
     started = perf_counter()
 
@@ -293,12 +271,11 @@ def run_one(
     return ended("complete" if result.was_complete else "done", result.text)
 
 
-def _tasks_of(path: Path, name: str, note: Note) -> list[tuple[str, str]]:
+def _tasks_of(path: Path, name: str) -> list[tuple[str, str]]:
     try:
         study = read_study(path)
     except InputError:
         return [(name, "compare")]  # fails again when it runs, and is listed with the reason
-    note(study)
     sections = study.model_fields_set
     if "loop" not in sections:
         return [(name, "compare")]

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from threading import Lock, RLock, Timer
+from threading import Lock
 from time import monotonic
 from typing import Any
 
@@ -249,7 +249,7 @@ def now_and_then(send: Callable[[str, float], None], pause: float = _PAUSE) -> P
 PAGE, TABLE, STATES = SUMMARY_FILES = ("index.html", "table.csv", "batch.json")
 """What lies in the folder of a batch beside the folders of its studies."""
 
-_PAGE_PAUSE = 5.0  # seconds for which news are gathered before the page is written again
+_PAGE_PAUSE = 5.0  # seconds in which the page is written once, however many studies end
 
 
 class Summary:
@@ -259,43 +259,19 @@ class Summary:
         self.out = out
         self._statuses = [StudyStatus(name, task, "waiting", "") for name, task in jobs]
         self._rows = [StudyRow() for _ in jobs]
-        self._timer: Timer | None = None
-        self._lock = RLock()
+        self._last = -_PAGE_PAUSE
 
     def add(self, position: int, status: StudyStatus) -> None:
-        """Take note of a study that has ended; it is on the page a few seconds later."""
+        """Take note of a study that has ended, on the page too unless that was just written."""
         row = StudyRow() if status.status == "failed" else read_row(self.out / status.name)
-        with self._lock:
-            self._statuses[position] = status
-            self._rows[position] = row
-        self.write_soon()
-
-    def write_soon(self) -> None:
-        """Write in a few seconds: the next study may take hours, so the page cannot wait for it."""
-        with self._lock:
-            if self._timer is None:
-                self._timer = Timer(_PAGE_PAUSE, self._write_if_possible)
-                self._timer.daemon = True
-                self._timer.start()
-
-    def _write_if_possible(self) -> None:
-        with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
-            self.write()
-
-    def write_ended(self) -> None:
-        """Write everything now if any study has ended."""
-        if any(status.status != "waiting" for status in self._statuses):
-            self.write()
+        self._statuses[position], self._rows[position] = status, row
+        if monotonic() - self._last >= _PAGE_PAUSE:
+            with suppress(OSError, InputError):  # such as a full disk: the last time, it is told
+                self.write()
 
     def write(self) -> BatchResult:
         """Write everything now and return how the studies ended."""
-        with self._lock:
-            if self._timer is not None:
-                self._timer.cancel()
-                self._timer = None
-            return self._write()
-
-    def _write(self) -> BatchResult:
+        self._last = monotonic()
         result = BatchResult(tuple(self._statuses), self.out / PAGE, tuple(self._rows))
         write_text(self.out / STATES, json.dumps(result.to_json(), indent=2) + "\n")
         table = result.table().to_csv(index=False, lineterminator="\n")

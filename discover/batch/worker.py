@@ -42,7 +42,6 @@ def main() -> None:
 
     jobs: SimpleQueue[list[Any]] = SimpleQueue()
     threading.Thread(target=_listen, args=(jobs,), daemon=True).start()
-    send(ready=True)
     while True:
         job = jobs.get()
         progress = now_and_then(lambda text, fraction: send(progress=[text, float(fraction)]))

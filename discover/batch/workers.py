@@ -1,19 +1,15 @@
 """Studies side by side in processes of this machine, each tied to this one by two pipes."""
 
 import json
-import logging
 import subprocess
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from functools import partial
-from ipaddress import ip_address
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from threading import Lock
 from typing import Any
-from urllib.parse import urlsplit
 from uuid import uuid4
 
 from discover.batch.status import StudyStatus, now_and_then
@@ -21,9 +17,7 @@ from discover.errors import InputError
 from discover.progress import Progress, on_stop
 from discover.python_child import python_command
 
-_log = logging.getLogger(__name__)
 _COMMAND = python_command("-m", "discover.batch.worker")
-_STARTS = 3  # of a worker; what kills it as it starts, such as a short lack of memory, passes
 _DEATHS = 3  # workers that one study may kill
 _DIED = "Several workers died while they ran it; look at their memory and time limits."
 _KEPT = "What was finished is kept; run again to go on."
@@ -33,7 +27,6 @@ Job = tuple[str, str, str, str, int | None, bool]
 
 
 def run_in_workers(
-    run: Callable[..., StudyStatus],
     jobs: Sequence[Job],
     workers: int,
     say: Callable[[int, str, float], None],
@@ -41,11 +34,11 @@ def run_in_workers(
 ) -> None:
     """Run jobs side by side.
 
-    A study whose worker dies goes to another, where it continues from its last finished part. Where
-    no worker can be started, the studies run in this process. `say`: called with the position of a
-    job, what is going on in it, and the fraction done. `end`: with the position, and how it ended.
+    A study whose worker dies goes to another, where it continues from its last finished part.
+    `say`: called with the position of a job, what is going on in it, and the fraction done. `end`:
+    with the position, and how it ended.
     """
-    team = _Team(run)
+    team = _Team()
     with on_stop(team.stop), ThreadPoolExecutor(workers) as threads:
         try:
             waiting = {
@@ -61,12 +54,10 @@ def run_in_workers(
 class _Team:
     """The workers of a batch. Each serves one study at a time, and then waits for the next."""
 
-    def __init__(self, run: Callable[..., StudyStatus]):
-        self._run = run
+    def __init__(self):
         self._idle: SimpleQueue[_Worker] = SimpleQueue()
         self._all: list[_Worker] = []
         self._lock = Lock()
-        self._alone = Lock()
         self._stopped = False
 
     def stop(self) -> None:
@@ -82,10 +73,7 @@ class _Team:
         for _ in range(_DEATHS):
             worker = self._worker()
             if worker is None:
-                if self._stopped:
-                    break
-                with self._alone:
-                    return self._run(*job, progress=progress)
+                break
             status = worker.run(job, progress)
             if status is not None:
                 self._idle.put(worker)
@@ -94,28 +82,14 @@ class _Team:
         return StudyStatus(name, task, "failed", f"{_DIED} {_KEPT}")
 
     def _worker(self) -> "_Worker | None":
-        """Return a worker that waits, or a new one; None if none can be started."""
+        """Return a worker that waits, or a new one; None if all were stopped."""
         with suppress(Empty):
             return self._idle.get_nowait()
-        reason = ""
-        for _ in range(_STARTS):
-            with self._lock:
-                if self._stopped:
-                    return None
-                try:
-                    worker = _Worker()
-                except OSError as error:
-                    reason = str(error)
-                    continue
-                self._all.append(worker)
-            if worker.is_ready():
-                return worker
-            reason = f"exit code {worker.kill()}"
-        if not self._stopped:
-            _log.warning(
-                "No worker could be started (%s); studies run one after the other instead.", reason
-            )
-        return None
+        with self._lock:
+            if self._stopped:
+                return None
+            self._all.append(_Worker())
+            return self._all[-1]
 
 
 class _Worker:
@@ -128,42 +102,33 @@ class _Worker:
             _COMMAND, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
         )
 
-    def is_ready(self) -> bool:
-        """Wait until it has started, and return whether it has."""
-        return self._next() is not None
-
     def run(self, job: Job, progress: Progress) -> StudyStatus | None:
         """Run a job and return how it ended; None if the worker died."""
         assert self._process.stdin is not None
+        assert self._process.stdout is not None
         try:
             self._process.stdin.write(json.dumps(job).encode("ascii") + b"\n")
             self._process.stdin.flush()
         except OSError:
             return None
-        while (word := self._next()) is not None:
+        # a word cut short is none
+        while (line := self._process.stdout.readline()).endswith(b"\n"):
+            word = json.loads(line)
             if "status" in word:
                 return StudyStatus(**word["status"])
             progress(*word["progress"])
         return None
 
-    def _next(self) -> dict[str, Any] | None:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        return json.loads(line) if line.endswith(b"\n") else None  # a word cut short is none
-
-    def kill(self) -> int:
-        """End the process and return its exit code."""
+    def kill(self) -> None:
+        """End the process."""
         self._process.kill()
-        return self._process.wait()
+        self._process.wait()
 
 
 def run_on_cluster(
-    run: Callable[..., StudyStatus],
-    jobs: Sequence[Job],
-    scheduler: str,
-    say: Callable[[int, str, float], None],
-    end: Callable[[int, StudyStatus], None],
-) -> None:
+    run: Callable[..., StudyStatus], jobs: Sequence[Job], scheduler: str,
+    say: Callable[[int, str, float], None], end: Callable[[int, StudyStatus], None],
+) -> None:  # fmt: skip
     """Run jobs side by side on a dask cluster, whose workers know files by the same paths.
 
     For ``tls://`` the certificates are those that dask's own settings name,
@@ -176,13 +141,6 @@ def run_on_cluster(
         raise InputError(
             "--scheduler needs dask: install discover-rheology[batch], or use --workers."
         ) from None
-    if not _is_protected(scheduler):
-        warnings.warn(
-            f"The connection to {scheduler[:100]} is not encrypted, and whoever can reach it can "
-            "run programs under your name. Start the scheduler with TLS and give its tls:// "
-            "address.",
-            stacklevel=2,
-        )
     try:
         client = Client(scheduler, timeout="20s")
     except Exception as error:  # each kind of address fails in its own way
@@ -204,22 +162,6 @@ def run_on_cluster(
         for future in as_completed(futures):
             i = futures[future]
             end(i, _status_of(future, jobs[i]))
-
-
-def _is_protected(scheduler: str) -> bool:
-    """Return whether others are kept from a connection: by TLS, or as it never leaves here.
-
-    On a loopback address other users of the machine are not; but whoever started a scheduler there
-    has let them in already, and no certificate here keeps them out.
-    """
-    address = urlsplit(scheduler if "://" in scheduler else f"tcp://{scheduler}")
-    if address.scheme in ("tls", "wss", "inproc"):
-        return True
-    host = address.hostname or ""
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _run_on_worker(

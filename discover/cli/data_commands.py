@@ -174,7 +174,7 @@ def shift(
     from discover.dataset.linear.linear_tests import read_linear_tests
     from discover.dataset.linear.superposition import move_tests, shift_table
     from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
-    from discover.report.data import agreement_words, superposition_page, superposition_words
+    from discover.report.data import superposition_page, superposition_words
     from discover.study.atomic import make_folder, remove_file, write_text
 
     out = _required(out)
@@ -185,24 +185,24 @@ def shift(
             f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
             f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
         )
-    moved = move_tests(read_linear_tests(root), reference, vertical, between)
+    found = move_tests(read_linear_tests(root), reference, vertical, between)
+    files = {f"{kind}.csv": found.master(kind) for kind in found.tests}
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    names = (*moved.files, "shift_factors.csv", "report.html")
+    names = (*files, "shift_factors.csv", "report.html")
     _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
-    write_text(out / "shift_factors.csv", shift_table(found := moved.found))
-    text = superposition_page(found, root.resolve().name, moved.agreements, moved.own)
-    page = write_text(out / "report.html", text)
+    write_text(out / "shift_factors.csv", shift_table(found))
+    page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
     written, without = [], []
-    for name, table in moved.files.items():
+    for name, table in files.items():
         if table is None:
             remove_file(out / name)
             without.append(name)
         else:
             write_text(out / name, table.to_dataframe().to_csv(index=False))
             written.append(name)
-    words = [*superposition_words(found, moved.own), *agreement_words(moved.agreements)]
+    words = superposition_words(found)
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
         typer.echo(json.dumps({"verdict": found.verdict, "laws": laws, "said": words}, indent=2))
@@ -229,14 +229,6 @@ def import_data(
     unit: Annotated[
         list[str] | None, typer.Option("--unit", help="Unit of a quantity: stress=kPa.")
     ] = None,
-    names: Annotated[
-        Path | None,
-        typer.Option(
-            "--names",
-            envvar="DISCOVER_NAMES",
-            help='TOML file of further names of quantities: stress = ["Sigma corr."].',
-        ),
-    ] = None,
     geometry: Annotated[
         str | None,
         typer.Option(
@@ -244,9 +236,6 @@ def import_data(
             help="For torque, angle and force: cone_plate:radius_mm=25,angle_deg=1 or "
             "plate_plate:radius_mm=25,gap_mm=1.",
         ),
-    ] = None,
-    lve: Annotated[
-        Path | None, typer.Option("--lve", help="File with the linear frequency sweep.")
     ] = None,
     block: Annotated[
         list[int] | None, typer.Option("--block", min=1, help="Import only these blocks of a file.")
@@ -302,9 +291,9 @@ def import_data(
         "encoding": encoding,
     }  # fmt: skip
     pairs = {"columns": column, "units": unit, "tests": test, "temperatures": temperature}
-    merged = options.merge_mapping(mapping, pairs, layout, names, geometry, block, start_time)
-    paths, sweep, changed = options.sources_of(merged, mapping, files or [], lve)
-    imported = import_files(paths, merged, sweep)
+    merged = options.merge_mapping(mapping, pairs, layout, geometry, block, start_time)
+    paths, changed = options.sources_of(merged, mapping, files or [])
+    imported = import_files(paths, merged)
     options.write_folder(imported, out, overwrite, mapping)
     # a folder of several temperatures is for one to be chosen from
     whole = any(name in imported.files for name in DATA_FILES)

@@ -17,7 +17,6 @@ from discover.dataset.importing.mapping import (
     read_mapping,
     write_mapping,
 )
-from discover.dataset.importing.names import read_names
 from discover.dataset.importing.quantities import to_celsius
 from discover.dataset.importing.text_rows import is_number
 from discover.dataset.load import DATA_FILES, TESTS_FILE
@@ -28,14 +27,10 @@ from discover.study.atomic import make_folder, write_text
 
 
 def merge_mapping(
-    path: Path | None,
-    pairs: AnyMapping[str, Sequence[str] | None],
-    layout: AnyMapping[str, object],
-    names: Path | None = None,
-    geometry: str | None = None,
-    blocks: Sequence[int] | None = None,
-    start_time_s: float | None = None,
-) -> Mapping:
+    path: Path | None, pairs: AnyMapping[str, Sequence[str] | None],
+    layout: AnyMapping[str, object], geometry: str | None = None,
+    blocks: Sequence[int] | None = None, start_time_s: float | None = None,
+) -> Mapping:  # fmt: skip
     """Return the mapping of a file with the options of the command line on top.
 
     `pairs`: ``columns``, ``units``, as ``stress=Shear stress``; ``tests``, ``creep``,
@@ -46,8 +41,6 @@ def merge_mapping(
     content = {} if path is None else read_mapping(path).model_dump(exclude_none=True)
     for key, example in (("columns", "stress='Shear stress'"), ("units", "stress=kPa")):
         content[key] = {**content.get(key, {}), **_pairs(pairs[key] or (), example)}
-    if names is not None:
-        content["names"] = {**content.get("names", {}), **read_names(names)}
     if geometry is not None:
         kind, _, rest = geometry.partition(":")
         numbers = {
@@ -106,24 +99,20 @@ def _number(text: str, where: str) -> float:
 
 
 def sources_of(
-    mapping: Mapping, path: Path | None, files: Sequence[Path], sweep: Path | None
-) -> tuple[list[Path], Path | None, list[str]]:
+    mapping: Mapping, path: Path | None, files: Sequence[Path]
+) -> tuple[list[Path], list[str]]:
     """Return the files to import, or else those of the mapping file, and which have changed."""
     if files or path is None:
-        return list(files), sweep, []
-    runs: list[Path] = []
+        return list(files), []
+    found: list[Path] = []
     changed = []
     remedy = f"Correct [[source]] in {path.name}, or put the file there."
     for source in mapping.source:
-        file = path.parent / source.file
-        digest = hashlib.sha256(read_bytes(file, source.file, remedy)).hexdigest()
+        found.append(path.parent / source.file)
+        digest = hashlib.sha256(read_bytes(found[-1], source.file, remedy)).hexdigest()
         if source.sha256 is not None and digest != source.sha256:
             changed.append(f"{source.file} has changed since it was imported before.")
-        if source.sweep:
-            sweep = sweep or file
-        else:
-            runs.append(file)
-    return runs, sweep, changed
+    return found, changed
 
 
 def write_folder(
@@ -170,43 +159,35 @@ if TYPE_CHECKING:  # --help needs no data
     from discover.dataset import Dataset
     from discover.dataset.checking.runs import Finding
 
-STUDY_FILE = "study.toml"
-PAGE = "report.html"
-IMPORT_PAGE = "data.html"
-"""What an import calls its page: a data folder may be a folder of results too."""
-
+STUDY_FILE, PAGE = "study.toml", "data.html"
 _MARK = '<meta name="generator" content="discover data">'
 _LOOKED_AT = 1000  # characters of a page, in which the mark stands
 
 
 def write_page(
-    dataset: "Dataset",
-    folder: str,
-    out: Path,
-    findings: Sequence["Finding"],
+    dataset: "Dataset", folder: str, out: Path, findings: Sequence["Finding"],
     said: Sequence[str] = (),
-    names: tuple[str, str] = (PAGE, IMPORT_PAGE),
-) -> tuple[Path, list[str]]:
+) -> tuple[Path, list[str]]:  # fmt: skip
     """Write a page on a data folder, and a first study unless there is one.
 
-    `folder`: as the study names it. `names`: of the page, the second where a result has the first.
-    Returns the page's path, and what was kept, in words.
+    `folder`: as the study names it. Returns the page's path, and what was kept, in words.
     """
     from discover.report.data import data_page, first_study
 
     make_folder(out)
-    path, place = _place_for_page(out, *names), out / STUDY_FILE
-    kept = [] if path.name == names[0] else [f"{out / names[0]} is not a data page and is kept."]
+    path, place = out / PAGE, out / STUDY_FILE
+    if path.is_file() and _MARK not in path.read_text("utf-8", "replace")[:_LOOKED_AT]:
+        raise InputError(
+            f"{path} is no page on data, and is not written over. Choose another --out."
+        )
     write_text(path, data_page(dataset, findings, folder, said))
     study = first_study(dataset, folder)
     if not os.path.lexists(place):
         write_text(place, study)
     elif not place.is_file() or place.read_bytes() != study.encode("utf-8", "backslashreplace"):
-        kept.append(
-            f"{place} was there before and is kept. For a new one remove it, or choose another "
-            "--out."
-        )
-    return path, kept
+        return path, [f"{place} was there before and is kept. For a new one remove it, or choose "
+                      "another --out."]  # fmt: skip
+    return path, []
 
 
 def write_import_page(
@@ -220,19 +201,4 @@ def write_import_page(
         dataset = load_dataset(place)
     except InputError:
         return None  # the check says why
-    return write_page(dataset, place, folder, findings, said, (IMPORT_PAGE, PAGE))[0]
-
-
-def _place_for_page(folder: Path, *names: str) -> Path:
-    """Return the first place where there is no page, or one on data, which a new one replaces."""
-    for path in (folder / name for name in names):
-        if not os.path.lexists(path):
-            return path
-        if path.is_file() and not path.is_symlink():
-            with path.open(encoding="utf-8", errors="replace") as page:
-                if _MARK in page.read(_LOOKED_AT):
-                    return path
-    raise InputError(
-        f"{folder} holds a {names[0]} and a {names[1]} that are no pages on data, and they are "
-        "not written over. Choose another --out."
-    )
+    return write_page(dataset, place, folder, findings, said)[0]

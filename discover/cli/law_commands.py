@@ -68,15 +68,10 @@ def fit(
     ]
     dataset = load_dataset(data)
     found = fit_law(
-        law,
-        dataset,
-        bounds=ranges,
-        start=numbers[0],
-        fixed=numbers[1],
-        effects={"solvent_viscosity": "fit"} if solvent else None,
-        held_out=held_out or (),
+        law, dataset, bounds=ranges, start=numbers[0], fixed=numbers[1],
+        effects={"solvent_viscosity": "fit"} if solvent else None, held_out=held_out or (),
         tolerance=TOLERANCE if tolerance is None else tolerance,
-    )
+    )  # fmt: skip
     if out is not None:
         _write(found, out, overwrite)
     if as_json:

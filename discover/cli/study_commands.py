@@ -3,15 +3,12 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from discover.cli import console
 from discover.cli.console import progress_bar
-
-if TYPE_CHECKING:  # --help needs no studies
-    from discover.study.schema import Study
 
 
 def _command(task: str, words: str) -> Callable[..., None]:
@@ -31,7 +28,7 @@ def _command(task: str, words: str) -> Callable[..., None]:
         folder = out or Path("results") / run.folder_names([study])[0]
         with progress_bar(quiet) as report:
             execute = getattr(run, task)
-            result = execute(study, folder, seed, overwrite, report, _tell_of_folder, tolerance)
+            result = execute(study, folder, seed, overwrite, report, tolerance)
         if as_json:
             typer.echo(result.json_file.read_text("utf-8"))
         elif not quiet:
@@ -77,9 +74,7 @@ def batch(
 
     folder = out or Path("results") / "batch"
     with progress_bar(quiet) as report:
-        result = run_batch(
-            studies, folder, workers, scheduler, seed, overwrite, report, _tell_of_folder
-        )
+        result = run_batch(studies, folder, workers, scheduler, seed, overwrite, report)
     if as_json:
         typer.echo(json.dumps(result.to_json(), indent=2))
     elif not quiet:
@@ -108,24 +103,3 @@ def demo(
         for title, page in pages.items():
             console.say(f"{title}: {page.resolve()}")
         typer.echo("Open them in a browser.")
-
-
-def _tell_of_folder(study: "Study") -> None:
-    """Print a note if a study's data lie outside the folders where one would look.
-
-    A study file may come from somebody else; what it reads should surprise nobody.
-    """
-    from discover.errors import InputError
-    from discover.study.data import folder_elsewhere
-
-    try:
-        folder = folder_elsewhere(study)
-    except InputError:
-        return
-    if folder is not None:
-        name = "the study" if study.path is None else study.path.name
-        console.say(
-            f"discover: note: {name} reads its data from {folder}, which is neither "
-            "next to it nor under DISCOVER_DATA or the working directory.",
-            err=True,
-        )

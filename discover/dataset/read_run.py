@@ -1,6 +1,5 @@
 """Read one run of a data folder: which test it is, its samples, its rate, and what came before."""
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +22,7 @@ from discover.words import did_you_mean
 
 INDEX_FILE = "runs.csv"
 
-DEFAULT_WINDOW = 15  # samples over which the strain is taken to be a cubic in time
+WINDOW = 15  # samples over which the strain is taken to be a cubic in time
 _DEGREE = 3
 _CHUNK = 50_000
 
@@ -89,7 +88,7 @@ def reason_to_set_aside(index: Table, row: int, rate_before: bool) -> str | None
 
 def _word(index: Table, row: int, column: str) -> str:
     values, cell = _VALUES[column], _cell(index, row, column)
-    if column == "start" and _is_finite(cell):
+    if column == "start" and is_number(cell):
         return values[0]  # a time at which the run started, as `sequence` takes it
     if cell and cell not in values:
         raise InputError(
@@ -102,19 +101,12 @@ def _word(index: Table, row: int, column: str) -> str:
 
 def _number(index: Table, row: int, column: str) -> float:
     cell = _cell(index, row, column)
-    if cell and not _is_finite(cell):
+    if cell and not is_number(cell):
         raise InputError(
             f"{column} in {index.name} holds {cell!r} on line {index.lines[row]}. Write a number, "
             "or leave the cell empty."
         )
     return float(cell or 0.0)
-
-
-def _is_finite(cell: str) -> bool:
-    try:
-        return math.isfinite(float(cell))
-    except ValueError:
-        return False
 
 
 def _cell(index: Table, row: int, column: str) -> str:
@@ -127,14 +119,9 @@ def table_of_run(root: Path, name: str) -> Table:
 
 
 def read_run(
-    table: Table,
-    index: Table,
-    row: int,
-    clock_factor: float = 1.0,
-    rate_is_measured: bool = False,
-    rate_window: int = DEFAULT_WINDOW,
+    table: Table, index: Table, row: int, clock_factor: float = 1.0, rate_is_measured: bool = False,
     rate_before: float | None = None,
-) -> Run:
+) -> Run:  # fmt: skip
     """Return the run on a line of ``runs.csv`` from its samples; InputError if they are wrong."""
     name = table.name
     # float() would also read 1_2, nan or inf, which are labels here
@@ -146,7 +133,7 @@ def read_run(
     time, stress, (rate, strain, *normal) = _columns(table, test)
     derived = False
     if rate is None:
-        rate, derived = _rate(table, test, time, strain, rate_window)
+        rate, derived = _rate(table, test, time, strain)
     if strain is None and test.step_strain:
         strain = np.full(len(time), test.step_strain)
     if test.control == "rate":
@@ -161,7 +148,7 @@ def read_run(
         protocol, source = _imposed(name, time, stress), "what the fluid answered"
     elif derived:
         protocol = sampled_rate(time, rate)
-        source = f"derived from strain: moving cubic over {min(rate_window, len(table))} samples"
+        source = f"derived from strain: moving cubic over {min(WINDOW, len(table))} samples"
     elif np.ptp(rate) <= _CONSTANT * abs(level := float(np.median(rate))):
         protocol = start_up(level)
         source = "measured, constant" if measured else "commanded, constant"
@@ -171,19 +158,11 @@ def read_run(
         source = f"read sample by sample, {between} between samples"
     metadata["shear_rate_source"] = source
     run = Run(
-        name=name,
-        time=time,
-        protocol=in_flow(protocol, test.flow),
-        rate=rate,
-        stress=stress,
-        first_normal_stress_difference=normal[0],
-        second_normal_stress_difference=normal[1],
-        strain=strain,
-        clock_factor=clock_factor,
-        rate_is_measured=measured,
-        rate_before=test.rate_before,
-        metadata=metadata,
-    )
+        name=name, time=time, protocol=in_flow(protocol, test.flow), rate=rate, stress=stress,
+        first_normal_stress_difference=normal[0], second_normal_stress_difference=normal[1],
+        strain=strain, clock_factor=clock_factor, rate_is_measured=measured,
+        rate_before=test.rate_before, metadata=metadata,
+    )  # fmt: skip
     return _begun(run, test, f"Line {index.lines[row]} of {INDEX_FILE}")
 
 
@@ -214,7 +193,7 @@ def _imposed(name: str, time: Values, stress: Values) -> FlowProtocol:
 
 
 def _rate(
-    table: Table, test: DeclaredTest, time: Values, strain: Values | None, window: int
+    table: Table, test: DeclaredTest, time: Values, strain: Values | None
 ) -> tuple[Values, bool]:
     """Return the rate of a run that records none, and whether it is derived from its strain."""
     if strain is None:
@@ -226,7 +205,7 @@ def _rate(
         # the strain is what is fitted; the rate is only told
         return np.gradient(strain, time) if len(time) > 1 else np.zeros(1), True
     try:
-        rate = differentiate(time, strain, window)
+        rate = differentiate(time, strain)
     except InputError as error:
         raise InputError(f"{table.name}: {error}") from error
     if not np.all(np.isfinite(rate)):
@@ -237,21 +216,19 @@ def _rate(
     return rate, True
 
 
-def differentiate(time: Values, values: Values, window: int = DEFAULT_WINDOW) -> Values:
+def differentiate(time: Values, values: Values) -> Values:
     """Return the time derivative of a noisy record, from a moving cubic fit.
 
-    The cubic is that of the `window` samples, 5 or more, nearest in order   [Savitzky & Golay 1964,
-    Anal. Chem. 36, 1627, for any spacing]. Raises InputError if window or record are shorter.
+    The cubic is that of the `WINDOW` samples nearest in order   [Savitzky & Golay 1964, Anal. Chem.
+    36, 1627, for any spacing]. Raises InputError if there are fewer than five.
     """
-    if window < _DEGREE + 2:
-        raise InputError(f"The smoothing window must hold at least 5 samples; got {window}.")
     n = len(time)
     if n < _DEGREE + 2:
         raise InputError(
             f"A rate cannot be derived from {n} samples of strain; give at least 5, or a "
             "column shear_rate_1_s."
         )
-    window = min(window, n)
+    window = min(WINDOW, n)
     slopes = []
     # a window of its own for each sample: in parts, so that a million samples fit in memory
     for samples in np.split(np.arange(n), np.arange(_CHUNK, n, _CHUNK)):

@@ -59,44 +59,34 @@ class Run(NotebookView):
 
     Attributes
     ----------
-    name
-        File name, or name of the protocol.
-    time
-        Sampling times in s, shape (n,), increasing, from the start of the flow at 0.
+    name, metadata
+        File name, or name of the protocol; what else the source says of the run.
+    time, rate, stress
+        In s, increasing, from the start of the flow at 0; in 1/s; and σ12 in Pa; shape (n,).
     protocol
         The rate as a function of time, which flow has it, and what came before t = 0.
-    rate
-        Rate at the sampling times, in 1/s, shape (n,).
-    stress
-        The stress recorded, in Pa, shape (n,): σ12 in shear.
     first_normal_stress_difference, second_normal_stress_difference
         N1 and N2 in Pa, shape (n,), where measured.
     strain
-        Strain at the sampling times, shape (n,), where recorded. Of oscillations by their first
-        harmonic the amplitude, as are rate and stress.
+        Shape (n,), where recorded. Of oscillations by their first harmonic the amplitude, as are
+        rate and stress.
     storage_modulus, loss_modulus
         G′ and G″ in Pa of such oscillations, shape (n,).
     rate_steps
         Steps of the rate between two samples whose instants are fitted, or were.
     clock_factor
         Time on the instrument's clock is ``time / clock_factor``: not one for shifted data.
-    rate_is_measured
-        Whether the rate was measured, or derived from measured strain, and not commanded.
-    rate_before
-        Rate in 1/s of the steady flow before t = 0; zero where there was none.
-    strain_before
-        Strain, added up without regard to its sign, that the same sample had seen in earlier runs.
-    metadata
-        What else the source says of the run.
-    weight
-        How much its samples weigh in a fit relative to other runs: one over the size of its
-        noise, in units of the mean. Reported misfits do not contain it.
-    normal_weights
-        The same of its N1 and N2, where they are fitted together with the stress.
+    rate_is_measured, rate_error
+        Whether the rate was measured, or derived from strain, and not commanded; its relative
+        standard error where it is the mean of rates read with noise.
+    rate_before, strain_before
+        Rate in 1/s of the steady flow before t = 0, or zero; strain, added up without its sign,
+        that the sample had seen in earlier runs.
+    weight, normal_weights
+        Of samples of the stress, and of N1 and N2, relative to other runs: one over the size of
+        their noise in units of the mean. Reported misfits do not contain them.
     loading
         How much a factor of its own on its record may differ from one; None where there is none.
-    rate_error
-        Relative standard error of the rate, where that is the mean of rates read with noise.
 
     Examples
     --------
@@ -104,9 +94,8 @@ class Run(NotebookView):
     >>> import numpy as np
     >>> times = np.linspace(0.0, 5.0, 51)
     >>> stress = 50.0 * (1 - np.exp(-times))
-    >>> run = dc.Run("slow.csv", times, dc.start_up(0.5), np.full(51, 0.5), stress)
-    >>> run.name, run.stress.shape
-    ('slow.csv', (51,))
+    >>> dc.Run("slow.csv", times, dc.start_up(0.5), np.full(51, 0.5), stress).stress.shape
+    (51,)
     """
 
     name: str

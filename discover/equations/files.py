@@ -101,13 +101,10 @@ def read_json(path: Path) -> Any:
 
 
 FORMATS: Mapping[str, Callable[[Equation], str]] = {
-    "python": numpy_code,
-    "sympy": sympy_code,
-    "latex": equation_latex,
-    "json": lambda equation: json_text(equation_to_json(equation)),
-    "rheotool": rheotool_text,
+    "python": numpy_code, "sympy": sympy_code, "latex": equation_latex,
+    "json": lambda equation: json_text(equation_to_json(equation)), "rheotool": rheotool_text,
     "ufl": ufl_code,
-}
+}  # fmt: skip
 """Functions that write an equation, by the name of the format."""
 
 

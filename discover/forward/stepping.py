@@ -15,8 +15,7 @@ from discover.forward.periodic_states import periodic_start
 from discover.forward.steady_states import steady_state
 from discover.protocols.kinematics import Kinematics
 from discover.protocols.protocol import FlowProtocol
-from tensor_library.algebra import contracted
-from tensor_library.kinematics import VelocityGradient
+from tensor_library.algebra import VelocityGradient, contracted
 
 Tree = TypeVar("Tree")
 

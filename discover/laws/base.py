@@ -12,13 +12,15 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float
 
 from discover.plain_numbers import as_numbers
-from tensor_library.algebra import Symmetric, identity_like, trace
-from tensor_library.isotropic_function import IsotropicFunction
-from tensor_library.kinematics import (
+from tensor_library.algebra import (
+    Symmetric,
     VelocityGradient,
+    identity_like,
     rate_of_deformation,
+    trace,
     upper_convected_production,
 )
+from tensor_library.isotropic_function import IsotropicFunction
 from tensor_library.law_terms import LawTerm
 
 State = Symmetric | Float[Array, " s"]

@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, State
-from tensor_library.algebra import Symmetric
-from tensor_library.kinematics import VelocityGradient
+from tensor_library.algebra import Symmetric, VelocityGradient
 from tensor_library.law_terms import LawTerm
 
 Tree = TypeVar("Tree")

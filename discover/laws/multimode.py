@@ -17,7 +17,7 @@ from discover.laws.each_mode import of_each_mode, over_modes, require_modes
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
-from tensor_library.kinematics import VelocityGradient, rate_of_deformation
+from tensor_library.algebra import VelocityGradient, rate_of_deformation
 
 
 def _as_modes(value: ArrayLike | Sequence[float]) -> Float[Array, " k"]:
@@ -154,8 +154,8 @@ class Fluid(eqx.Module):
         law
             Of every mode; by default upper convected Maxwell.
         **options
-            `modes`, `most_modes`, `tolerance`, known `solvent_viscosity` and `elastic_modulus`,
-            as of `discover.dataset.relaxation_spectrum`.
+            `modes`, known `solvent_viscosity` and `elastic_modulus`, as of
+            `discover.dataset.relaxation_spectrum`.
 
         Raises
         ------

@@ -26,26 +26,9 @@ from discover.protocols.protocol import (
 )
 
 __all__ = [
-    "FlowProtocol",
-    "after_alternation",
-    "after_steady_flow",
-    "after_step_strain",
-    "another_between_samples",
-    "imposed_stress",
-    "in_flow",
-    "kinematics_of",
-    "measured_rate",
-    "oscillations",
-    "oscillatory_shear",
-    "paper_test_protocols",
-    "paper_training_protocols",
-    "recorded_at",
-    "sampled_rate",
-    "settled",
-    "shear_rates",
-    "stack_protocols",
-    "start_up",
-    "steady_rates",
-    "step_rates",
-    "strains",
-]
+    "FlowProtocol", "after_alternation", "after_steady_flow", "after_step_strain",
+    "another_between_samples", "imposed_stress", "in_flow", "kinematics_of", "measured_rate",
+    "oscillations", "oscillatory_shear", "paper_test_protocols", "paper_training_protocols",
+    "recorded_at", "sampled_rate", "settled", "shear_rates", "stack_protocols", "start_up",
+    "steady_rates", "step_rates", "strains",
+]  # fmt: skip

@@ -40,22 +40,9 @@ def after_steady_flow(protocol: FlowProtocol, rate: float, end: float) -> FlowPr
     ----------
     protocol
         From t = 0 on.
-    rate
-        Of the flow before, in 1/s.
-    end
-        Time of the last sample, in s.
-
-    Raises
-    ------
-    InputError
-        If the rate is zero, a time is not positive, or the protocol is an oscillation by a formula.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> stopped = dc.after_steady_flow(dc.start_up(0.0), 5.0, end=60.0)
-    >>> bool(stopped.begins < 0)
-    True
+    rate, end
+        Of the flow before, in 1/s, not 0; time of the last sample, in s. InputError if they are
+        none, or the protocol is an oscillation by a formula.
     """
     require_flow(protocol, "after_steady_flow")
     end, rate = _positive("end", end), as_number("rate", rate)
@@ -74,26 +61,11 @@ def after_step_strain(
     ----------
     protocol
         From t = 0 on.
-    strain
-        Put on.
+    strain, duration
+        Put on, in so many s; 0 is at once.
     first
         Time of the first sample after 0, in s: a step at once takes a thousandth of it, which
-        changes a relaxing stress by less than a thousandth.
-    duration
-        Over which the strain was put on at a constant rate, in s; 0 is at once.
-
-    Raises
-    ------
-    InputError
-        If the strain is not finite, a time is not positive, or the protocol is an oscillation by a
-        formula.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> relaxation = dc.after_step_strain(dc.start_up(0.0), 2.0, first=0.01)
-    >>> bool(relaxation.begins < 0)
-    True
+        changes a relaxing stress by less than that. InputError as of `after_steady_flow`.
     """
     require_flow(protocol, "after_step_strain")
     first = _positive("first", first)
@@ -116,24 +88,8 @@ def after_alternation(
     ----------
     protocol
         Its rate over the first period of the record is that of every cycle before.
-    period
-        In s.
-    times
-        Of the samples, in s, shape (n,).
-
-    Raises
-    ------
-    InputError
-        If the period is not positive.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> import numpy as np
-    >>> times = np.linspace(0.0, 4 * np.pi, 201)
-    >>> wave = dc.measured_rate(times, np.cos(times))
-    >>> bool(dc.after_alternation(wave, 2 * np.pi, times).begins < 0)
-    True
+    period, times
+        In s; times of the samples have shape (n,). InputError if the period is not positive.
     """
     require_flow(protocol, "after_alternation")
     period, times = _positive("period", period), np.atleast_1d(as_numbers("times", times))
@@ -187,12 +143,11 @@ def settled(protocol: FlowProtocol, relaxation_time: float) -> FlowProtocol:
     before = np.roll(knots[inside] - start, -first)
     before = begins + (before - before[0]) % period - more * period
     cycles = np.concatenate([before + k * period for k in range(more)])
+    again = np.tile(np.roll(rates[inside], -first), more)
     return replace(
         protocol,
         table_times=on_device(np.concatenate([cycles, knots])),
-        table_rates=on_device(
-            np.concatenate([np.tile(np.roll(rates[inside], -first), more), rates])
-        ),
+        table_rates=on_device(np.concatenate([again, rates])),
         begins=jnp.asarray(float(cycles[0])),
     )
 

@@ -69,14 +69,9 @@ _RECORDED: dict[RecordedQuantity, tuple[float, ...]] = {
 
 
 _IN_WORDS = {
-    "sigma12": "σ12",
-    "N1": "N1",
-    "N2": "N2",
-    "tensile_stress": "tensile stress",
-    "strain": "strain",
-    "storage_modulus": "G′",
-    "loss_modulus": "G″",
-}
+    "sigma12": "σ12", "N1": "N1", "N2": "N2", "tensile_stress": "tensile stress",
+    "strain": "strain", "storage_modulus": "G′", "loss_modulus": "G″",
+}  # fmt: skip
 
 
 class Kinematics(eqx.Module):
@@ -157,20 +152,6 @@ def quantity_of(kinematics: Kinematics | None) -> RecordedQuantity:
     return next(name for name in names if np.array_equal(_RECORDED[name], recorded))
 
 
-def kinematics_recording(
-    kinematics: Kinematics | None, quantity: RecordedQuantity, count: int
-) -> Kinematics:
-    """Return the kinematics of so many runs as if N1 or N2 of theirs were recorded.
-
-    None stands for runs in simple shear.
-    """
-    every = kinematics or stack_kinematics([kinematics_of("shear")] * count)
-    assert every is not None
-    recorded = np.tile(_RECORDED[quantity], (count, 1))
-    viscous = np.sum(recorded * _rate(np.asarray(every.gradient)), axis=-1)
-    return replace(every, recorded=on_device(recorded), viscous=on_device(viscous))
-
-
 def normal_stress_differences(
     kinematics: Kinematics | None,
     recorded: Float[np.ndarray, "trials runs n"],
@@ -219,16 +200,7 @@ def in_words(quantities: Iterable[str]) -> str:
 
 
 FlowClass = Literal[
-    "laos",
-    "start_up",
-    "cessation",
-    "steps",
-    "superposed",
-    "step_strain",
-    "flow_curve",
-    "creep",
-    "uniaxial",
-    "planar",
-    "biaxial",
-]
+    "laos", "start_up", "cessation", "steps", "superposed", "step_strain", "flow_curve", "creep",
+    "uniaxial", "planar", "biaxial",
+]  # fmt: skip
 FLOW_CLASSES: tuple[FlowClass, ...] = get_args(FlowClass)

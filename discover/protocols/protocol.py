@@ -23,40 +23,36 @@ from discover.protocols.kinematics import (
     of_one_kind,
     quantity_of,
 )
-from tensor_library.kinematics import VelocityGradient
+from tensor_library.algebra import VelocityGradient
 
 
 class FlowProtocol(eqx.Module):
     """Rate of deformation as a function of time: a piecewise-linear table plus a sum of cosines.
 
-    One class holds every protocol, so that runs of different kinds stack into one batch and
-    superposed flows need nothing new. A jump is two table entries at the same time. The fluid is at
-    rest until the protocol begins, which is before t = 0 where something came before the record: a
-    step of strain, a steady flow, an oscillation that had gone on.
+    One class holds every protocol, so that runs of all kinds stack into one batch. A jump is two
+    table entries at one time. The fluid is at rest until the protocol begins, which is before t = 0
+    where a step of strain, a steady flow or an oscillation came before the record.
 
     Attributes
     ----------
     table_times, table_rates
-        Table of shear rate against time, in s and 1/s, shape (m,); held at its end values.
+        In s and 1/s, shape (m,); held at the end values.
     amplitudes, frequencies, phases
         Cosine terms a cos(ω t + φ), shape (c,), in 1/s, rad/s and rad.
     begins
         Time in s, zero or negative, until which the fluid was at rest.
     cycle
-        Times in s between which the last cycle before the record lies, of an oscillation that had
-        gone on for ever; the same twice otherwise.
+        Times in s of the last cycle before the record, of an oscillation that had gone on; else the
+        same twice.
     kinematics
         Which flow has this rate; None is simple shear, for which a scalar is enough.
-    control
-        ``rate``; ``stress`` where the table holds the recorded stress that is imposed, in Pa, and
-        the strain is what is recorded; ``steady`` where each sample is a steady state at its rate,
-        and ``oscillation`` where it is a periodic state whose rate has this amplitude; time then
-        only counts the samples.
-    modulus
-        Which modulus is recorded of oscillations.
+    control, modulus
+        ``rate``; ``stress``: the table holds the stress imposed, in Pa, and the strain is recorded;
+        ``steady`` or ``oscillation``: each sample is a state, counted by time, at this rate or
+        amplitude of it. Which modulus is recorded of oscillations.
     table_strains
-        Strain that belongs to the table, shape (m,): the amplitude of oscillations; at a given
-        stress the strain recorded, which only sets the pace of the integration. None elsewhere.
+        Shape (m,): amplitudes of oscillations; at a given stress the strain recorded, which only
+        sets the pace of the integration. None elsewhere.
     """
 
     table_times: Float[Array, " m"]
@@ -151,6 +147,16 @@ def _checked(name: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
     return array
 
 
+def _pair(name: str, times: Sequence[float] | np.ndarray, rates: Sequence[float] | np.ndarray):
+    t, r = _checked("times", times), _checked("rates", rates)
+    if t.size != r.size or np.any(np.diff(t) <= 0):
+        raise InputError(
+            f"{name} needs as many rates as times, and strictly increasing times; got {t.size} "
+            f"times and {r.size} rates."
+        )
+    return t, r
+
+
 def require_flow(protocol: object, name: str) -> None:
     """Refuse what is no flow, as an argument of a function of this name."""
     if not isinstance(protocol, FlowProtocol):
@@ -160,11 +166,8 @@ def require_flow(protocol: object, name: str) -> None:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
-    table_times, table_rates, *waves = (
-        on_device(np.asarray(part, float))
-        for part in (times, rates, amplitudes, frequencies, phases)
-    )
-    return FlowProtocol(table_times, table_rates, waves[0], waves[1], waves[2])
+    parts = times, rates, amplitudes, frequencies, phases
+    return FlowProtocol(*(on_device(np.asarray(part, float)) for part in parts))
 
 
 def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> FlowProtocol:
@@ -172,18 +175,13 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
 
     Parameters
     ----------
-    amplitude
-        Of the shear rate, in 1/s; dimensionless, the Weissenberg number.
-    frequency
-        In rad/s, positive; dimensionless, the Deborah number.
-    phase
-        In rad; 0 starts at the largest rate, as in the paper.
+    amplitude, frequency, phase
+        In 1/s, rad/s (positive) and rad; dimensionless, the Weissenberg and Deborah numbers.
 
     Examples
     --------
     >>> import discover as dc
-    >>> import jax.numpy as jnp
-    >>> float(dc.oscillatory_shear(2.0, 0.5).rate(jnp.asarray(0.0)))
+    >>> float(dc.oscillatory_shear(2.0, 0.5).rate(0.0))
     2.0
     """
     _checked("amplitude, frequency and phase", [amplitude, frequency, phase])
@@ -195,15 +193,7 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
 
 
 def start_up(rate: float) -> FlowProtocol:
-    """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> import jax.numpy as jnp
-    >>> float(dc.start_up(0.5).rate(jnp.asarray(2.0)))
-    0.5
-    """
+    """Return the constant shear rate γ̇(t) = rate, in 1/s, from rest at t = 0."""
     _checked("rate", [rate])
     return _protocol([0.0], [rate])
 
@@ -213,25 +203,10 @@ def step_rates(times: Sequence[float], rates: Sequence[float]) -> FlowProtocol:
 
     Parameters
     ----------
-    times
-        Times of the jumps in s, increasing; the first rate also holds before ``times[0]``.
-    rates
-        Rate from each jump on, in 1/s, as many as `times`.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> import jax.numpy as jnp
-    >>> protocol = dc.step_rates([0.0, 10.0], [0.1, 1.0])
-    >>> float(protocol.rate(jnp.asarray(12.0)))
-    1.0
+    times, rates
+        In s, increasing, and in 1/s, as many; the first rate also holds before ``times[0]``.
     """
-    t, r = _checked("times", times), _checked("rates", rates)
-    if t.size != r.size or np.any(np.diff(t) <= 0):
-        raise InputError(
-            f"step_rates needs as many rates as times, and increasing times; got {t.size} times "
-            f"and {r.size} rates."
-        )
+    t, r = _pair("step_rates", times, rates)
     # each jump is a pair of entries at one time
     table_times = np.concatenate([t[:1], np.repeat(t[1:], 2)])
     table_rates = np.concatenate([np.repeat(r[:-1], 2), r[-1:]])
@@ -247,34 +222,22 @@ def measured_rate(
 
     Parameters
     ----------
-    times
-        In s, strictly increasing.
-    rates
-        In 1/s, as many as `times`.
+    times, rates
+        In s, strictly increasing, and in 1/s, as many.
 
     Examples
     --------
     >>> import discover as dc
-    >>> import jax.numpy as jnp
-    >>> float(dc.measured_rate([0.0, 1.0], [0.0, 3.0]).rate(jnp.asarray(0.5)))
+    >>> float(dc.measured_rate([0.0, 1.0], [0.0, 3.0]).rate(0.5))
     1.5
     """
-    t, r = _checked("times", times), _checked("rates", rates)
-    if t.size != r.size or np.any(np.diff(t) <= 0):
-        raise InputError(
-            f"measured_rate needs as many rates as times, and strictly increasing times; got "
-            f"{t.size} times and {r.size} rates."
-        )
-    return _protocol(t, r)
+    return _protocol(*_pair("measured_rate", times, rates))
 
 
 def in_flow(protocol: FlowProtocol, kind: str) -> FlowProtocol:
     """Return the protocol with its rate in another flow: uniaxial, planar or biaxial extension.
 
-    Raises
-    ------
-    InputError
-        If there is no such flow.
+    Raises InputError if there is no such flow.
 
     Examples
     --------
@@ -324,14 +287,11 @@ def _padded(protocol: FlowProtocol, entries: int, cosines: int) -> FlowProtocol:
         for v in (protocol.amplitudes, protocol.frequencies, protocol.phases)
     )
     return replace(
-        protocol,
-        table_times=on_device(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
-        table_rates=on_device(np.pad(rates, (0, rows), mode="edge")),
-        amplitudes=amplitudes,
-        frequencies=frequencies,
-        phases=phases,
+        protocol, table_times=on_device(np.concatenate([times, times[-1] + 1.0 + np.arange(rows)])),
+        table_rates=on_device(np.pad(rates, (0, rows), mode="edge")), amplitudes=amplitudes,
+        frequencies=frequencies, phases=phases,
         table_strains=None if strains is None else on_device(strains),
-    )
+    )  # fmt: skip
 
 
 def recorded_at(

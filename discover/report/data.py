@@ -1,14 +1,13 @@
 """Pages on data: what was read, linear tests side by side, shifted curves."""
 
-from collections.abc import Mapping, Sequence
-from itertools import groupby
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from discover.dataset.checking.runs import Finding
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.linear_tests import NAMES, SWEEP, Agreement
+from discover.dataset.linear.linear_tests import NAMES, SWEEP
 from discover.dataset.linear.superposition import FAILED, SUPERPOSED, ShiftLaw, Superposition
 from discover.dataset.linear_viscoelasticity import relaxation_spectrum
 from discover.dataset.material_functions import linear_sweep_as_run
@@ -19,7 +18,6 @@ from discover.errors import InputError
 from discover.report.page import attempt, render
 from discover.report.plots.data import data_pictures, linear_function, superposition_pictures
 from discover.report.wording import percent
-from discover.statistics import HALF_BAND
 from discover.words import counted, significant
 
 # From so many runs on one can be spared as a test
@@ -107,88 +105,6 @@ def first_study(dataset: Dataset, folder: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def agreement_words(agreements: Sequence[Agreement]) -> list[str]:
-    """Return whether linear tests predict one another, a sentence for each two."""
-    groups = groupby(sorted(agreements, key=_pair), key=_pair)
-    said = [_sentence(list(group)) for _, group in groups]
-    return [*said, *_apart(agreements)]
-
-
-def _pair(one: Agreement) -> tuple[str, str]:
-    return one.source, one.test
-
-
-def _sentence(group: list[Agreement]) -> str:
-    source, test = NAMES[group[0].source], NAMES[group[0].test]
-    off = [one for one in group if not one.agrees]
-    good = [one for one in group if one.agrees]
-    parts = []
-    if good:
-        sizes = _range([one.error for one in good])
-        parts.append(f"predicts the {test} to {sizes} (root mean square) at {_degrees(good)}")
-    if off:
-        biases = [one.bias for one in off]
-        if all(one.bias > 0.5 * one.error for one in off):
-            where = f"lies {_range(biases)} above what was measured on average"
-        elif all(one.bias < -0.5 * one.error for one in off):
-            where = f"lies {_range([-bias for bias in biases])} below what was measured on average"
-        else:
-            where = f"is off by {_range([one.error for one in off])} (root mean square)"
-        left = _range([one.left for one in off])
-        parts.append(
-            f"does not predict {'it' if good else f'the {test}'} at {_degrees(off)}: what it "
-            f"predicts {where}, and divided by one factor at each temperature {left} would be left"
-        )
-    return f"The {source} {'; it '.join(parts)}."
-
-
-def _apart(agreements: Sequence[Agreement]) -> list[str]:
-    """Return which of three tests stands apart by one factor, if the two others agree better."""
-    kinds = sorted({one.source for one in agreements})
-    if len(kinds) < 3:
-        return []
-
-    def bias(first: str, second: str) -> float:
-        both = [abs(one.bias) for one in agreements if {one.source, one.test} == {first, second}]
-        return sum(both) / len(both) if both else float("inf")
-
-    pairs = sorted((bias(a, b), a, b) for i, a in enumerate(kinds) for b in kinds[i + 1 :])
-    (least, first, second), (more, *_) = pairs[0], pairs[1]
-    third = next(kind for kind in kinds if kind not in (first, second))
-    if not (least <= 0.5 * more and more > 0.1):
-        return []
-    return [
-        f"The {NAMES[first]} and the {NAMES[second]} agree on their size to {percent(least)} on "
-        f"average, and the {NAMES[third]} stands apart from both, by {percent(more)} or more: a "
-        f"gain, a trim or a loading of the {NAMES[third]}, or one that the two others share."
-    ]
-
-
-def _range(values: Sequence[float]) -> str:
-    low, high = percent(min(values)), percent(max(values))
-    return low if low == high else f"{low.removesuffix(' %')} to {high}"
-
-
-def _degrees(group: Sequence[Agreement]) -> str:
-    return f"{', '.join(f'{one.celsius:g}' for one in group)} °C"
-
-
-def agreement_lines(agreements: Sequence[Agreement]) -> list[dict[str, str]]:
-    """Return the lines of the table on the page."""
-    return [
-        {
-            "source": NAMES[one.source],
-            "test": NAMES[one.test],
-            "temperature": f"{one.celsius:g}",
-            "times": f"{one.times[0]:.3g} to {one.times[1]:.3g}",
-            "error": percent(one.error),
-            "bias": f"{'+' if one.bias > 0 else '−'}{percent(abs(one.bias))}",
-            "left": percent(one.left),
-        }
-        for one in agreements
-    ]
-
-
 _DESCRIBES = 0.1
 """Decades of a_T, root mean square, by which a law may miss the shifts and still describe them."""
 
@@ -200,20 +116,13 @@ _SYMBOLS = {"C1": ("C1", ""), "C2_K": ("C2", "K"), "activation_energy_J_mol": ("
 _PLURALS = {kind: f"{name}s" for kind, name in NAMES.items()} | {"relaxation": "relaxation moduli"}
 
 
-def superposition_words(
-    found: Superposition, own: Mapping[str, Superposition] | None = None
-) -> list[str]:
-    """Return what can be said of a superposition, a sentence each.
-
-    `found`: tests and shifts. `own`: what tables over time ask for by themselves, by kind, where
-    the shifts are the sweeps'.
-    """
+def superposition_words(found: Superposition) -> list[str]:
+    """Return what can be said of a superposition, a sentence each."""
     said = [_verdict(found, kind) for kind in found.leading]
     if found.verdict == "not_superposed":
         return said
     led = [kind for kind in found.tests if kind not in found.leading]
     said += [_verdict(found, kind) for kind in led if found.misfits(kind)]
-    said += [_own_words(found, one, kind) for kind, one in (own or {}).items()]
     open_ = [
         f"{found.celsius[i]:g}" for i in np.flatnonzero(np.max(found.error, axis=1) > _UNKNOWN)
     ]
@@ -257,27 +166,6 @@ def _verdict(found: Superposition, kind: str) -> str:
     )
 
 
-def _own_words(found: Superposition, own: Superposition, kind: str) -> str:
-    """Return whether tables by themselves ask for the shifts that the sweeps gave."""
-    other = []
-    for i, degrees in enumerate(found.celsius):
-        j = np.flatnonzero(own.celsius == degrees)
-        if not len(j) or degrees == found.reference:
-            continue
-        apart = abs(own.log_shift[j[0]] - found.log_shift[i])
-        if apart > HALF_BAND * float(np.hypot(own.error[j[0], 0], found.error[i, 0])):
-            theirs, ours = own.factors(int(j[0]))[0], found.factors(i)[0]
-            other.append(f"at {degrees:g} °C {_factor(theirs)} and not {_factor(ours)}")
-    if not other:
-        return f"The {_PLURALS[kind]} by themselves ask for the same a_T, within the intervals."
-    return f"The {_PLURALS[kind]} by themselves ask for another a_T: {'; '.join(other)}."
-
-
-def _factor(factor: tuple[float, float, float]) -> str:
-    value, low, high = factor
-    return f"{value:.3g} (95 % CI {low:.3g} to {high:.3g})"
-
-
 def _law_words(law: ShiftLaw, found: Superposition) -> str:
     if law.error > _DESCRIBES:
         return (
@@ -300,12 +188,7 @@ def _law_words(law: ShiftLaw, found: Superposition) -> str:
     )
 
 
-def superposition_page(
-    found: Superposition,
-    name: str,
-    agreements: Sequence[Agreement],
-    own: Mapping[str, Superposition] | None,
-) -> str:
+def superposition_page(found: Superposition, name: str) -> str:
     """Return the page."""
     pictures = attempt("The pictures", lambda: superposition_pictures(found))
     kinds = [kind for kind in found.tests if found.misfits(kind)]
@@ -313,9 +196,7 @@ def superposition_page(
     return render(
         "superposition.html",
         name=name,
-        words=superposition_words(found, own),
-        agreements=agreement_words(agreements),
-        agreement_lines=agreement_lines(agreements),
+        words=superposition_words(found),
         doubtful=found.verdict != "superposed",
         pictures=pictures if isinstance(pictures, list) else [],
         missing=None if isinstance(pictures, list) else pictures.sentence,

@@ -1,7 +1,6 @@
 """Files that are whole or absent, and one process at a time in a folder of them."""
 
 import contextlib
-import json
 import os
 import secrets
 import socket
@@ -66,14 +65,9 @@ def replaceable(path: Path) -> os.stat_result | None:
     except OSError:
         return None  # what is wrong with the folder, opening tells
     if not stat.S_ISREG(found.st_mode):
-        kinds = (
-            (stat.S_ISDIR, "a folder"), (stat.S_ISLNK, "a link"), (stat.S_ISFIFO, "a pipe"),
-            (stat.S_ISSOCK, "a socket"),
-        )  # fmt: skip
-        kind = next((words for holds, words in kinds if holds(found.st_mode)), "a device")
         raise InputError(
-            f"{path} is {kind}, but a file is to be written there. Remove it, or choose another "
-            "name."
+            f"{path} is no plain file but a folder, a link or a device, and a file is to be "
+            "written there. Remove it, or choose another name."
         )
     require_not_read(path, found)
     return found
@@ -111,10 +105,11 @@ def make_folder(path: str | Path) -> Path:
 
 try:
     import fcntl
-except ImportError:  # Windows: only the process id in the file speaks
+except ImportError:  # Windows
     fcntl = None
 
 LOCK_FILE = ".discover-lock"
+_LOCKING = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
 
 # Locks of this process by folder; several RunFolder objects of one process share one
 _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDictionary()
@@ -123,8 +118,8 @@ _held: "weakref.WeakValueDictionary[str, FolderLock]" = weakref.WeakValueDiction
 class FolderLock:
     """A lock on a folder, held until `release`, until it is forgotten, or until the process ends.
 
-    The operating system drops it however the process ends; it does not age. Where a file system
-    knows no locks, the process and host named in the file decide.
+    The operating system drops it however the process ends; it does not age. Where a system or its
+    disk knows no locks, there is none.
     """
 
     def __init__(self, path: Path, descriptor: int):
@@ -146,11 +141,13 @@ def lock_folder(folder: str | Path) -> FolderLock:
     if held is not None and held._finalizer.alive:
         return held
     for _ in range(20):
-        descriptor = _open(path)
-        owner = _owner(descriptor)
-        if not _take(descriptor, owner):
+        descriptor = os.open(path, _LOCKING, 0o644)
+        if not _take(descriptor):
+            who = os.read(descriptor, 100).decode("ascii", "replace") or "another process"
             os.close(descriptor)
-            raise InputError(_busy(Path(folder), owner))
+            raise InputError(
+                f"{folder} is in use by {who}. Wait for it, stop it, or use another --out."
+            )
         # the former owner may have removed the file between our opening and locking it
         with contextlib.suppress(OSError):
             if os.fstat(descriptor).st_ino == os.stat(path).st_ino:
@@ -159,78 +156,20 @@ def lock_folder(folder: str | Path) -> FolderLock:
     else:
         raise InputError(f"{folder} cannot be locked: others come and go in it. Use another --out.")
     os.ftruncate(descriptor, 0)
-    me = {"pid": os.getpid(), "host": socket.gethostname()}
-    os.lseek(descriptor, 0, os.SEEK_SET)
-    os.write(descriptor, json.dumps(me).encode())
+    os.write(descriptor, f"process {os.getpid()} on {socket.gethostname()[:60]}".encode())
     lock = FolderLock(path, descriptor)
     _held[str(path)] = lock
     return lock
 
 
-def _open(path: Path) -> int:
-    """Open the lock file; whatever else somebody put in its place is refused, and not written."""
-    flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOFOLLOW", 0)
-    refused = InputError(
-        f"{path} is not a plain file with one name, so the folder cannot be locked. Remove it, or "
-        "use another --out."
-    )
+def _take(descriptor: int) -> bool:
     try:
-        descriptor = os.open(path, flags, 0o644)
-    except OSError as error:
-        if not os.path.lexists(path) or (path.is_file() and not path.is_symlink()):
-            raise
-        raise refused from error
-    found = os.fstat(descriptor)
-    # a file of two names is somebody's other file too
-    if stat.S_ISREG(found.st_mode) and found.st_nlink <= 1:
-        return descriptor
-    os.close(descriptor)
-    raise refused
-
-
-def _take(descriptor: int, owner: dict) -> bool:
-    if fcntl is not None:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            return True
-        except BlockingIOError:
-            return False
-        except OSError:
-            pass  # a file system without locks
-    if not owner:
-        return True
-    return owner.get("host") == socket.gethostname() and not _runs(owner.get("pid"))
-
-
-def _owner(descriptor: int) -> dict:
-    try:
-        owner = json.loads(os.read(descriptor, 4096))
-    except (OSError, ValueError, RecursionError):
-        return {}  # being written, or damaged
-    return owner if isinstance(owner, dict) else {}
-
-
-def _runs(pid: object) -> bool:
-    if not isinstance(pid, int) or isinstance(pid, bool) or not 0 < pid < 2**31:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
         return False
-    if pid == os.getpid():
-        return False  # a namesake of the past: this process would be in `_held`
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except OSError:
-        return True  # runs, and belongs to somebody else
+    except (OSError, AttributeError):
+        pass  # a file system without locks, or Windows
     return True
-
-
-def _busy(folder: Path, owner: dict) -> str:
-    pid, host = owner.get("pid"), owner.get("host")
-    who = f"process {pid} on {host}" if isinstance(pid, int) else "another process"
-    return (
-        f"{folder} is in use by {str(who)[:120]}. Wait for it, stop it, or use another --out. If "
-        f"it is long gone, remove {folder / LOCK_FILE}."
-    )
 
 
 def _release(path: Path, descriptor: int, pid: int) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from discover._version import __version__
 from discover.dataset import Dataset
-from discover.dataset.load import folder_roots, load_dataset, resolve_folder
+from discover.dataset.load import load_dataset, resolve_folder
 from discover.dataset.material_functions import TABLES
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
@@ -184,18 +184,6 @@ def parse_study(content: dict, where: str = "the study") -> Study:
 
 def _base(study: Study) -> Path | None:
     return None if study.path is None else study.path.parent
-
-
-def folder_elsewhere(study: Study) -> Path | None:
-    """Return the data folder of a study if it lies outside all folders where one would look.
-
-    A link that leads out of them counts as outside. Raises InputError if there is no such folder.
-    """
-    if study.data.folder is None:
-        return None
-    folder = resolve_folder(study.data.folder, _base(study)).resolve()
-    roots = (root.resolve() for root in folder_roots(_base(study)))
-    return None if any(folder.is_relative_to(root) for root in roots) else folder
 
 
 def fingerprint(study: Study, *extra: object) -> str:

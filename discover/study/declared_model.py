@@ -161,12 +161,9 @@ def forward_model(declared: DeclaredModel) -> ForwardDeclared:
         named = declared.law_name, declared.parameters
         return ForwardDeclared.named(*named, *modes, free=declared.free, **options)
     return ForwardDeclared(
-        declared.law,
-        *modes,
-        fit_modulus="modulus_Pa" in declared.free,
-        fit_relaxation_time="relaxation_time_s" in declared.free,
-        **options,
-    )
+        declared.law, *modes, fit_modulus="modulus_Pa" in declared.free,
+        fit_relaxation_time="relaxation_time_s" in declared.free, **options,
+    )  # fmt: skip
 
 
 def _of_sweep(model: Model, dataset: Dataset) -> RelaxationSpectrum:

@@ -99,22 +99,13 @@ def read_earlier(written: str, study_file: Path | None) -> EarlierResult:
 def _of_loop(content: Mapping[str, Any], file: Path) -> EarlierResult:
     declared = content.get("declared")
     if not isinstance(declared, dict) or not isinstance(content.get("stages"), list):
-        raise InputError(
-            f"[model] from: {file} does not say what its loop started from: it was written by an "
-            f"earlier version. {_AGAIN}"
-        )
-    if declared.get("law") is None and declared.get("by_mode"):
-        raise InputError(
-            f"[model] from: in the loop of {file} {', '.join(map(str, declared['by_mode']))} "
-            "differs from one relaxation mode to the next, and the file does not have the law of "
-            "each mode: an earlier version wrote it, or the loop added a mode to a law with "
-            f"constants of its own. {_AGAIN} If that does not help, declare both modes."
-        )
+        raise InputError(f"[model] from: {file} does not say what its loop started from. {_AGAIN}")
     if declared.get("law") is None:
+        differing = ", ".join(map(str, declared.get("by_mode") or ()))
+        why = f"has {differing} by mode" if differing else "is no sum of library terms"
         raise InputError(
-            f"[model] from: the law that the loop of {file} started from is no sum of library "
-            "terms and has no name, so it cannot be taken from a file. Declare it with law and its "
-            "constants."
+            f"[model] from: the law that the loop of {file} started from {why} and has no name, so "
+            "it cannot be taken from a file. Declare it with law and its constants."
         )
     unexplained = content.get("verdict") == "unexplained"
     if unexplained and not content["stages"]:
@@ -255,12 +246,9 @@ def _damage(file: Path) -> Iterator[None]:
 
 
 def _text(
-    file: Path,
-    law: str,
-    equation: Equation,
-    effects: tuple[KnownEffect, ...],
+    file: Path, law: str, equation: Equation, effects: tuple[KnownEffect, ...],
     of_modes: tuple[tuple[KnownEffect, ...], ...] = (),
-) -> str:
+) -> str:  # fmt: skip
     n, modes = len(equation.terms), len(equation.modulus)
     named = equation.named
     below = "the Maxwell part"

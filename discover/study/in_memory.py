@@ -125,7 +125,7 @@ def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
     solvent, modes = float(base.solvent_viscosity), base.n_modes
     modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     known: dict[str, Any] = {"solvent_viscosity": solvent}
-    for options in ({}, known, {"modes": modes}, {"most_modes": modes}):
+    for options in ({}, known, {"modes": modes}):
         try:
             found = relaxation_spectrum(data.linear_sweep, **options)
         except InputError:

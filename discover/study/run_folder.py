@@ -3,7 +3,6 @@
 import contextlib
 import hashlib
 import json
-import os
 import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -37,13 +36,6 @@ class RunFolder:
         self._written: dict[str, str] = {}
         with _writable(f"The folder {self.path} cannot be written to", "with"):
             self._lock = lock_folder(self.path)
-        figures = self.path / "figures"
-        for folder in (self._state, figures):
-            if os.path.islink(folder):
-                raise InputError(
-                    f"{folder} is a link, and nothing is written to where a link leads. Remove it, "
-                    "or use another --out."
-                )
         if not overwrite:
             require_ours(self.path, _RESULTS, STATE_FOLDER)
         found = _read_json(self._state / STATE_FILE)
@@ -64,7 +56,7 @@ class RunFolder:
                     "was changed. Use --overwrite to replace them, or another --out."
                 )
         self.complete = bool(found and found.get("complete") is True)
-        for folder in (self.path, make_folder(self._state), make_folder(figures)):
+        for folder in (self.path, make_folder(self._state), make_folder(self.path / "figures")):
             # what a killed process was about to write: it is ours, and only we are here
             for rest in folder.glob(f".*{PART_SUFFIX}"):
                 with contextlib.suppress(OSError):

@@ -1,7 +1,7 @@
 """The study file: what may be written in it, and nothing else."""
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -51,16 +51,18 @@ class Sweep(Section):
     """Its values."""
 
 
+Stress = Literal["sigma12", "N1", "N2"]
+Recorded = Literal[
+    "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
+]
+
+
 class NextExperiment(Section):
     """What the user could measure next."""
 
     flows: Annotated[tuple[FlowClass, ...], Field(min_length=1)] = FLOW_CLASSES
     """Classes of flow that could be measured."""
-    observe: Annotated[tuple[Literal["sigma12", "N1", "N2"], ...], Field(min_length=1)] = (
-        "sigma12",
-        "N1",
-        "N2",
-    )
+    observe: Annotated[tuple[Stress, ...], Field(min_length=1)] = ("sigma12", "N1", "N2")
     """What could be recorded."""
     weissenberg_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.5, 1.0, 2.0, 4.0)
     """Weissenberg numbers that could be reached."""
@@ -168,15 +170,7 @@ class Data(Section):
     """Whether `shear_rate_1_s` was commanded or measured."""
     rate_before: str | None = None
     """Column of `runs.csv` with the rate of the steady flow before each run, in 1/s."""
-    observe: (
-        tuple[
-            Literal[
-                "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
-            ],
-            ...,
-        ]
-        | None
-    ) = None
+    observe: tuple[Recorded, ...] | None = None
     """What is fitted of what was recorded; every stress but N1 and N2 where left out. The rest
     tests the result."""
     sequence: str | None = None
@@ -206,11 +200,6 @@ class Data(Section):
         if both:
             raise ValueError(f"the run {sorted(both)[0]!r} is both in fit and in held_out")
         return self
-
-
-def _by_hand(given: Any) -> int:
-    """Return how many modes a constant is listed for; 0 where it is no list."""
-    return len(given) if isinstance(given, tuple) else 0
 
 
 class Model(Section):
@@ -245,9 +234,7 @@ class Model(Section):
         default_factory=dict
     )
     """Known effects added to the law, with values or `"fit"`; `discover effects` lists them."""
-    from_: Annotated[str, Field(min_length=1, max_length=1000)] | None = Field(
-        default=None, alias="from"
-    )
+    from_: Annotated[str | None, Field(min_length=1, max_length=1000, alias="from")] = None
     """Result folder whose law, modes and effects are taken over."""
 
     @model_validator(mode="after")
@@ -277,7 +264,8 @@ class Model(Section):
             )
         if self.sweep_rad_s is not None and self.modes is None:
             raise ValueError('sweep_rad_s limits the sweep of modes = "lve"; write that too')
-        by_hand = _by_hand(self.modulus_Pa), _by_hand(self.relaxation_time_s)
+        constants = (self.modulus_Pa, self.relaxation_time_s)
+        by_hand = [len(one) if isinstance(one, tuple) else 0 for one in constants]
         if by_hand[0] != by_hand[1]:
             raise ValueError(
                 "modulus_Pa and relaxation_time_s of modes go together, with as many values; got "

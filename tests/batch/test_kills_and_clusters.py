@@ -10,7 +10,6 @@ import os
 import random
 import re
 import runpy
-import shutil
 import signal
 import socket
 import subprocess
@@ -171,8 +170,8 @@ def at_work(out):
     """Processes that hold the folder of a study."""
     pids = set()
     for lock in out.glob(f"*/{LOCK_FILE}"):
-        with contextlib.suppress(OSError, ValueError):
-            pids.add(json.loads(lock.read_text())["pid"])
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            pids.add(int(lock.read_text().split()[1]))
     return pids
 
 
@@ -309,8 +308,8 @@ def test_workers_open_no_port_and_a_name_that_is_no_utf_8_costs_no_study_its_pla
 
 
 @pytest.mark.parametrize("deaths", [1, 99])
-def test_workers_killed_while_they_start_do_not_end_the_batch(
-    studies, calm, tmp_path, monkeypatch, caplog, deaths
+def test_a_worker_killed_while_it_starts_does_not_end_the_batch_and_many_are_told(
+    studies, calm, tmp_path, monkeypatch, deaths
 ):
     count = tmp_path / "starts.txt"
     count.touch()
@@ -322,9 +321,12 @@ def test_workers_killed_while_they_start_do_not_end_the_batch(
     *python, code = worker_with_stand_in(tmp_path)
     monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
     result = batch.run_batch(studies, tmp_path / "out", workers=2)
-    assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
-    assert results(tmp_path / "out") == calm
-    assert ("one after the other" in caplog.text) == (deaths > 2)
+    if deaths == 1:
+        assert [s.status for s in result.studies] == ["done", "done", "done", "failed"]
+        assert results(tmp_path / "out") == calm
+    else:
+        assert [s.status for s in result.studies] == ["failed"] * 4
+        assert all(s.text.startswith("Several workers died") for s in result.studies)
 
 
 def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
@@ -362,7 +364,7 @@ def test_nothing_that_lies_in_the_working_directory_is_run_by_a_worker(tmp_path,
 
 def test_no_more_workers_start_than_there_are_studies(studies, tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(batch, "run_in_workers", lambda run, jobs, n, *rest: asked.append(n))
+    monkeypatch.setattr(batch, "run_in_workers", lambda jobs, n, *rest: asked.append(n))
     batch.run_batch(studies, tmp_path / "out", workers=1000)
     assert asked == [len(studies)]
 
@@ -382,55 +384,16 @@ def test_workers_without_the_same_files_are_told_from_those_that_have_them(tmp_p
 
 
 @pytest.mark.parametrize(
-    ("address", "protected"),
-    [
-        ("tls://10.0.0.1:8786", True),
-        ("tcp://127.0.0.1:8786", True),
-        ("localhost:8786", True),
-        ("tcp://[::1]:8786", True),
-        ("tcp://10.0.0.1:8786", False),
-        ("head-node:8786", False),
-        ("ucx://10.0.0.1:8786", False),
-    ],
+    ("address", "said"),
+    [("tcp://10.0.0.1:8786", ""), ("tls://10.0.0.1:8786", "dask's settings distributed.comm.tls")],
 )
-def test_a_scheduler_that_does_not_answer_is_told_and_a_connection_that_others_can_use_warned_of(
-    studies, tmp_path, monkeypatch, address, protected
-):
+def test_a_scheduler_that_does_not_answer_is_told(studies, tmp_path, monkeypatch, address, said):
     distributed = pytest.importorskip("distributed")
 
     def no_answer(address, timeout):
         raise OSError("Timed out")
 
     monkeypatch.setattr(distributed, "Client", no_answer)
-    said = (
-        contextlib.nullcontext() if protected else pytest.warns(UserWarning, match="not encrypted")
-    )
-    with said, pytest.raises(InputError, match=re.escape(address)):
+    with pytest.raises(InputError, match=re.escape(address)) as caught:
         batch.run_batch(studies, tmp_path / "out", scheduler=address)
-
-
-def test_a_scheduler_with_tls_takes_the_certificates_of_dasks_settings(studies, calm, tmp_path):
-    dask = pytest.importorskip("dask")
-    distributed = pytest.importorskip("distributed")
-    openssl = shutil.which("openssl") or pytest.skip("there is no openssl to make a certificate")
-    key, certificate = str(tmp_path / "key.pem"), str(tmp_path / "certificate.pem")
-    words = ["req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=dask"]
-    subprocess.run(
-        [openssl, *words, "-keyout", key, "-out", certificate], check=True, capture_output=True
-    )
-    pair = {"cert": certificate, "key": key}
-    roles = {f"distributed.comm.tls.{role}": pair for role in ("client", "scheduler", "worker")}
-    settings = {"distributed.comm.tls.ca-file": certificate, **roles}
-    options = {"n_workers": 1, "processes": False, "protocol": "tls://", "dashboard_address": None}
-    with dask.config.set(settings):
-        security = distributed.Security()
-        with distributed.LocalCluster(**options, host="127.0.0.1", security=security) as cluster:
-            address = cluster.scheduler_address
-            assert address.startswith("tls://127.0.0.1")
-            batch.run_batch(studies, tmp_path / "out", scheduler=address)
-            with (
-                dask.config.set({"distributed.comm.tls.ca-file": None}),
-                pytest.raises(InputError, match=r"distributed\.comm\.tls"),
-            ):
-                batch.run_batch(studies, tmp_path / "other", scheduler=address)
-    assert results(tmp_path / "out") == calm
+    assert said in str(caught.value)

@@ -8,6 +8,7 @@ from pathlib import Path
 import harm
 import malformed
 import pytest
+import run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from malformed import Outcome, attempt, complaint
@@ -59,7 +60,6 @@ def test_the_same_input_unspoiled_is_accepted(tmp_path, monkeypatch, kind):
         (0, "done", "", None),
         (None, "", "", None),
         (1, "", CLEAR, "ends with 1"),
-        (124, "", "", "takes too long"),
         (2, "", "", "says nothing"),
         (2, "", "discover: Correct it.", "names no place"),
         (2, "", "discover: s.toml is wrong.", "names no remedy"),
@@ -94,11 +94,11 @@ def test_a_fault_of_the_software_is_seen(tmp_path, monkeypatch, error):
     )
 
 
-def test_a_reader_that_waits_for_ever_would_be_found(tmp_path, monkeypatch):
-    monkeypatch.setattr(malformed, "LIMIT", 0.2)
+def test_a_reader_that_waits_for_ever_is_late(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe")
-    monkeypatch.setattr("discover.cli.main", lambda: (tmp_path / "pipe").read_text())
-    assert complaint(CASE, malformed.run_call(["demo"])) == "takes too long"
+    monkeypatch.setattr(malformed, "attempt", lambda *_: (tmp_path / "pipe").read_text())
+    monkeypatch.setattr(malformed.resource, "setrlimit", lambda *_: None)
+    assert run.ask("malformed", "data folder 0", "harm", 0, None, 0.02)["verdict"] == "late"
 
 
 def test_names_from_files_cannot_steer_the_terminal_and_need_no_utf_8(tmp_path, monkeypatch):
@@ -135,20 +135,6 @@ def test_a_batch_says_its_failures_on_standard_error_however_quiet(tmp_path):
     assert outcome.code == 2
     assert outcome.stdout == ""
     assert outcome.stderr.startswith("discover: s (compare): ")
-
-
-def test_a_study_that_reads_from_elsewhere_says_so(tmp_path):
-    mine, other = tmp_path / "mine", tmp_path / "other"
-    for folder in (mine, other):
-        folder.mkdir()
-        harm.write_files(folder, harm.SANE["FOLDER"])
-    for path, told in ((".", False), ("../other", True), (str(other), True)):
-        (mine / "s.toml").write_text(f'[data]\nfolder = "{path}"\n')
-        outcome = malformed.run_call(
-            ["close-loop", str(mine / "s.toml"), "--out", str(tmp_path / "out"), "--overwrite"]
-        )
-        assert outcome.code is None
-        assert (str(other) in outcome.stderr) is told, outcome
 
 
 def test_a_study_named_by_dots_cannot_write_beside_the_folder_of_results():

@@ -1,18 +1,13 @@
-"""Claims: names of quantities are known in many languages and spellings, and a user's own too."""
-
-import tomllib
+"""Claims: names of quantities are known in many languages and spellings."""
 
 import numpy as np
 import pytest
 from made_exports import columns
-from typer.testing import CliRunner
 
-from discover.cli import app
 from discover.dataset.importing import import_files
 from discover.dataset.importing.mapping import Mapping, make_mapping
 from discover.dataset.importing.names import name_table, plain, shipped_names
 from discover.dataset.importing.quantities import QUANTITIES
-from discover.errors import InputError
 
 RATE = [0.5, 2.0, 8.0, 32.0]
 STRESS = [3.0, 6.0, 12.0, 24.0]
@@ -151,51 +146,6 @@ def test_a_normal_stress_coefficient_times_rate_squared_is_N1(tmp_path):
     names, units = ("Shear rate", "Shear stress", "Ψ1"), ("1/s", "Pa", "Pa·s²")
     table = columns(read(tmp_path, lines(names, units, RATE, STRESS, psi)).files["flow_curve.csv"])
     np.testing.assert_allclose(table["N1_Pa"], np.multiply(psi, np.square(RATE)))
-
-
-def test_names_of_the_users_own_are_read_and_kept_for_the_next_import(tmp_path):
-    export = tmp_path / "house.txt"
-    export.write_text(lines(("Kanal 7", "Kanal 9"), ("1/s", "Pa"), RATE, STRESS), "utf-8")
-    own = tmp_path / "own.toml"
-    own.write_text('shear_rate = ["Kanal 7"]\n[stress]\nhouse = ["KANAL_9"]\n', "utf-8")
-    run = CliRunner().invoke
-    given = ["data", "import", str(export), "--no-page"]
-    assert run(app, [*given, "--out", str(tmp_path / "none")]).exit_code == 2
-    assert run(app, [*given, "--names", str(own), "--out", str(tmp_path / "one")]).exit_code == 0
-    by_variable = [*given, "--out", str(tmp_path / "two")]
-    assert run(app, by_variable, env={"DISCOVER_NAMES": str(own)}).exit_code == 0
-    kept = tomllib.loads((tmp_path / "one" / "import.toml").read_text("utf-8"))["names"]
-    assert kept == {"shear_rate": ["Kanal 7"], "stress": ["KANAL_9"]}
-    again = ["data", "import", "--mapping", str(tmp_path / "one" / "import.toml"), "--no-page"]
-    assert run(app, [*again, "--out", str(tmp_path / "three")]).exit_code == 0
-    tables = [(tmp_path / n / "flow_curve.csv").read_text() for n in ("one", "two", "three")]
-    assert len(set(tables)) == 1
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('shear_rte = ["a"]', "Did you mean 'shear_rate'"),
-        ('stress = "tau"', "must be a list"),
-        ("stress = [3]", "not a name"),
-        ('stress = ["()"]', "not a name"),
-        ("stress = [", "own.toml"),
-    ],
-)
-def test_a_wrong_file_of_names_is_one_message(tmp_path, text, said):
-    own = tmp_path / "own.toml"
-    own.write_text(text, "utf-8")
-    export = tmp_path / "a.txt"
-    export.write_text(lines(("Shear rate", "Stress"), ("1/s", "Pa"), RATE, STRESS), "utf-8")
-    given = ["data", "import", str(export), "--out", str(tmp_path / "o"), "--names", str(own)]
-    result = CliRunner().invoke(app, given)
-    assert result.exit_code == 2
-    assert said in result.output.replace("\n", " ")
-
-
-def test_a_mapping_file_with_names_of_an_unknown_quantity_is_refused():
-    with pytest.raises(InputError, match="Did you mean 'shear_rate'"):
-        make_mapping({"names": {"shear_rte": ["a"]}}, "import.toml")
 
 
 def test_a_number_of_the_interval_is_no_time_though_german_calls_that_intervallzeit():

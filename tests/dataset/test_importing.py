@@ -1,7 +1,6 @@
 """Text exports of rheometers become data folders, number for number."""
 
 import math
-import os
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ from typer.testing import CliRunner
 from discover.cli import app
 from discover.dataset import load_dataset
 from discover.dataset.importing import Mapping, import_files
-from discover.dataset.importing.mapping import read_mapping
 from discover.dataset.importing.text_export import blocks_of_rows
 from discover.dataset.importing.text_rows import read_rows
 from discover.errors import InputError
@@ -134,36 +132,6 @@ def test_an_import_is_repeated_from_its_mapping_file_alone(tmp_path):
     assert invoke("--mapping", first / "import.toml", "--out", second).exit_code == 2
 
 
-@pytest.mark.parametrize("raw", [b"\xe9.csv", b"50%e9 \xff.csv", "é%20.csv".encode()])
-def test_a_file_whose_name_is_no_utf_8_is_imported_again_from_its_mapping(tmp_path, raw):
-    source = tmp_path / os.fsdecode(raw)
-    try:
-        german(source)
-    except OSError:
-        pytest.skip("this disk takes UTF-8 names alone")
-    columns = ("--column", "time=Zeit", "--column", "shear_rate=Schergeschwindigkeit",
-               "--column", "stress=Schubspannung")  # fmt: skip
-    made = invoke(source, *columns, "--out", tmp_path / "one")
-    assert made.exit_code == 0, made.output
-    assert read_mapping(tmp_path / "one" / "import.toml").source[0].file == f"../{source.name}"
-    again = invoke("--mapping", tmp_path / "one" / "import.toml", "--out", tmp_path / "two")
-    assert again.exit_code == 0, again.output
-    (run,) = {path.name for path in (tmp_path / "one").iterdir()} - {"runs.csv", "import.toml"}
-    assert (tmp_path / "two" / run).read_bytes() == (tmp_path / "one" / run).read_bytes()
-    source.unlink()
-    gone = invoke("--mapping", tmp_path / "one" / "import.toml", "--out", tmp_path / "three")
-    assert gone.exit_code == 2
-    assert "There is no file" in gone.stderr
-
-
-def test_a_source_has_one_name(tmp_path):
-    (tmp_path / "map.toml").write_text(
-        '[[source]]\nfile = "a.csv"\nfile_percent_encoded = "%E9.csv"\n'
-    )
-    with pytest.raises(InputError, match="file or file_percent_encoded, not both"):
-        read_mapping(tmp_path / "map.toml")
-
-
 def test_files_in_different_units_come_back_the_same_when_repeated(tmp_path):
     for name, unit, factor in (("a", "kPa", 1e-3), ("b", "Pa", 1.0)):
         rows = [f"Time [s],Shear rate [1/s],{'Stress' if name == 'a' else 'Shear stress'} [{unit}]"]
@@ -206,7 +174,7 @@ def test_a_sweep_is_imported_beside_the_runs(tmp_path):
     rows += lines(OMEGA, storage * 1e-6, loss * 1e-3)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
     out = tmp_path / "data"
-    arguments = (tmp_path / "melt.txt", "--lve", tmp_path / "sweep.txt", "--out", out)
+    arguments = (tmp_path / "melt.txt", tmp_path / "sweep.txt", "--out", out)
     assert invoke(*arguments).exit_code == 0
     sweep = load_dataset(out).linear_sweep
     assert sweep is not None
@@ -338,7 +306,7 @@ def test_a_whole_folder_mangled_as_an_export_comes_back_as_it_was(measured_data,
     rows += lines(sweep.angular_frequency / (2 * np.pi), *moduli)
     (tmp_path / "sweep.txt").write_text("\n".join(rows))
     out = tmp_path / "data"
-    result = invoke(*files, "--lve", tmp_path / "sweep.txt", "--out", out)
+    result = invoke(*files, tmp_path / "sweep.txt", "--out", out)
     assert result.exit_code == 0, result.output
     again = load_dataset(out)
     for run in original.runs[:4]:

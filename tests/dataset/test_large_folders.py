@@ -3,45 +3,11 @@
 import numpy as np
 import pytest
 
-from discover.dataset import check_folder, load_dataset
+from discover.dataset import check_folder
 from discover.dataset.checking.runs import doubts_among_runs
 from discover.dataset.run import Run
 from discover.dataset.tables import table
 from discover.protocols.protocol import start_up
-
-
-def write_sweep(folder, n):
-    omega = np.geomspace(1e-3, 1e3, n)
-    rows = (
-        f"{w!r},{100 * w * w / (1 + w * w)!r},{100 * w / (1 + w * w)!r}" for w in omega.tolist()
-    )
-    (folder / "runs.csv").write_text("file\na.csv\n")
-    (folder / "a.csv").write_text("time_s,shear_rate_1_s,stress_Pa\n0.1,1,9\n0.2,1,17\n0.3,1,25\n")
-    (folder / "lve.csv").write_text("\n".join(["omega_rad_s,Gp_Pa,Gpp_Pa", *rows]))
-    return omega
-
-
-def test_a_sweep_of_twenty_thousand_rows_is_thinned_and_said(tmp_path):
-    omega = write_sweep(tmp_path, 20_000)
-    data = load_dataset(tmp_path)
-    assert data.linear_sweep is not None
-    kept = data.linear_sweep.angular_frequency
-    assert len(kept) <= 400
-    assert set(kept.tolist()) <= set(omega.tolist())  # as recorded, none made up
-    assert (kept[0], kept[-1]) == (omega[0], omega[-1])
-    assert np.max(np.diff(np.log(kept))) < 0.05
-    said = [str(finding) for finding in check_folder(tmp_path)]
-    assert any("of 20,000 frequencies" in text for text in said)
-    assert "of 20,000 frequencies" in data.thinned
-
-
-def test_a_sweep_of_a_common_length_is_kept_whole(tmp_path):
-    omega = write_sweep(tmp_path, 60)
-    data = load_dataset(tmp_path)
-    assert data.linear_sweep is not None
-    np.testing.assert_array_equal(data.linear_sweep.angular_frequency, omega)
-    assert data.thinned == ""
-    assert not [f for f in check_folder(tmp_path) if "frequencies" in str(f)]
 
 
 def test_a_check_reads_the_samples_of_each_run_once(tmp_path, monkeypatch):

@@ -34,19 +34,6 @@ def test_the_fitted_moduli_reproduce_a_broad_sweep():
     assert np.all(spectrum.modulus > 0)
 
 
-def test_a_looser_rule_takes_fewer_modes_and_a_larger_error():
-    frequency = np.geomspace(1e-3, 1e3, 61)
-    # times off the grids that are tried, so that no grid fits exactly
-    times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
-    sweep = sweep_of(1e4 * times**-0.3, times, frequency)
-    noise = 1 + 0.03 * np.random.default_rng(0).standard_normal(61)
-    sweep = LinearSweep(frequency, sweep.storage_modulus * noise, sweep.loss_modulus)
-    tight, loose = relaxation_spectrum(sweep), relaxation_spectrum(sweep, tolerance=3.0)
-    assert len(loose) < len(tight)
-    assert loose.relative_error > tight.relative_error
-    assert loose.relative_error <= 3.0 * loose.best_error
-
-
 def test_a_sweep_of_one_frequency_is_refused():
     one = np.ones(1)
     with pytest.raises(InputError, match="at least 2 frequencies"):
@@ -157,7 +144,7 @@ def test_noise_of_a_sweep_at_small_strain_widens_nothing():
 def test_modes_too_few_leave_a_pattern_that_more_would_not():
     frequency = np.geomspace(1e-3, 1e3, 61)
     times = 1.3 * np.geomspace(1e-3, 1e3, 41) ** 0.97
-    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, frequency), most_modes=4)
+    found = relaxation_spectrum(sweep_of(1e4 * times**-0.3, times, frequency), modes=4)
     assert len(found) == 4
     assert found.best_error < 0.1 * found.relative_error
     assert found.pattern == pytest.approx(found.relative_error, rel=0.05)
@@ -230,7 +217,7 @@ def test_the_number_of_modes_may_be_given_and_bounded():
     sweep = made(*MATERIALS["melt"], noise=0.01)
     assert len(relaxation_spectrum(sweep, modes=2)) == 2
     assert len(relaxation_spectrum(sweep, modes=4)) == 4
-    best = relaxation_spectrum(sweep, most_modes=2)
+    best = relaxation_spectrum(sweep, modes=2)
     assert len(best) == 2
     assert best.relative_error == pytest.approx(relaxation_spectrum(sweep).errors[2], rel=0.05)
     with pytest.raises(InputError, match="modes must be from 1"):

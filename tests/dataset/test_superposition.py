@@ -227,7 +227,6 @@ def test_sweeps_lead_and_what_was_measured_over_time_goes_along(tmp_path):
     assert result.exit_code == 0, result.output
     said = " ".join(json.loads(result.stdout)["said"])
     assert "The relaxation moduli superpose with the shifts of the sweeps" in said
-    assert "by themselves ask for the same a_T" in said
     run = load_dataset(tmp_path / "master").material_functions["relaxation"]
     measured = np.exp(-run.time[:, None] / TIMES) @ MODULI * 0.01  # a strain of 1 %
     # averages over a twentieth of a decade of a curve, and shifts good to 0.5 % of a decade
@@ -255,5 +254,4 @@ def test_polystyrene_superposes(measured_data, tmp_path):
     result = invoke(measured_data / "ps-linear", "--out", tmp_path / "master", "--vertical")
     assert result.exit_code == 0, result.output
     assert "The sweeps superpose" in result.stdout
-    assert "the sweep stands apart from both" in result.stdout
     assert set(load_dataset(tmp_path / "master").material_functions) == {"relaxation", "creep"}

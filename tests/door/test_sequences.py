@@ -88,7 +88,7 @@ def test_modes_come_from_the_sweep(data):
     np.testing.assert_allclose(fluid.modulus, [MODULUS], rtol=1e-6)
     np.testing.assert_allclose(fluid.relaxation_time, [TIME], rtol=1e-6)
     law = dc.make_law("giesekus", {"alpha": 0.3})
-    assert dc.Fluid.from_sweep(data.linear_sweep, law, most_modes=2).law is law
+    assert dc.Fluid.from_sweep(data.linear_sweep, law, modes=2).law is law
     with pytest.raises(dc.InputError, match=r"no lve\.csv"):
         dc.Fluid.from_sweep(None)
 

@@ -253,32 +253,6 @@ def test_what_is_no_state_is_refused(effect, values, said):
 
 
 EXPONENTIAL = "(exp(epsilon*tr(sigma))-1)*sigma"
-NAMED = {
-    "ucm": {},
-    "giesekus": {"alpha": 0.3},
-    "johnson_segalman": {"xi": 0.4},
-    "ptt_linear": {"epsilon": 0.2},
-    "ptt_exponential": {"epsilon": 0.2},
-    "fene_p": {"L2": 12.0},
-}
-
-
-def same_stress_rate(first, second):
-    generator = np.random.default_rng(0)
-    for _ in range(5):
-        stress = generator.normal(size=(3, 3))
-        stress = jnp.asarray(0.5 * (stress + stress.T))
-        gradient = jnp.asarray(generator.normal(size=(3, 3)))
-        gradient = gradient - jnp.trace(gradient) / 3 * jnp.eye(3)
-        np.testing.assert_allclose(
-            first.stress_rate(stress, gradient), second.stress_rate(stress, gradient), rtol=1e-9
-        )
-
-
-@pytest.mark.parametrize("name", NAMED)
-def test_a_named_law_and_its_terms_are_the_same_law_in_any_flow(name):
-    law = make_law(name, NAMED[name])
-    same_stress_rate(Equation(law_terms(law)).law(), law)
 
 
 def test_one_parameter_with_two_values_keeps_both():

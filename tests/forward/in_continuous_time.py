@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 
 from discover.effects import KinematicEffect, Record, SignalEffect
 from discover.protocols.protocol import shear_rates
-from tensor_library.kinematics import rate_of_deformation
+from tensor_library.algebra import rate_of_deformation
 
 # Samples of a run between which a rate that an instrument shapes is a straight line
 _DENSE = 801

@@ -9,7 +9,6 @@ from independent.instruments import (
     alternation_as_from_rest,
     nothing,
     relaxation_as_run,
-    scaled,
 )  # fmt: skip
 from independent.noise import correlated, outliers, proportional, rms, white
 
@@ -110,7 +109,6 @@ def test_relaxation_and_alternation_are_what_they_are_taken_for_not():
     late, wt = alternation_as_from_rest(MAXWELL, 2.0, 1.5, TIMES), 1.5
     known = 100.0 * (np.cos(wt * TIMES) + wt * np.sin(wt * TIMES)) / (1 + wt**2)
     np.testing.assert_allclose(late.stress, known, atol=1e-4)
-    np.testing.assert_allclose(scaled(late, 10.0, 1e3).stress, 10.0 * late.stress)
 
 
 def test_noise_has_the_size_and_the_kind_asked_for():

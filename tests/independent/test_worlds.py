@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from calibration_tables import calibration_error, comparison_table, is_right, loop_table, share
+from calibration import calibration_error, comparison_table, is_right, loop_table, share
 from independent.worlds import FLOWS, NOISES, draw_world, known_flaws, known_laws, unknown_laws
 from run import ask
 

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent.named import CONSTANTS, material
-from law_accuracy import FLOWS, measured
+from law_solutions import FLOWS, measured
 from scipy.integrate import solve_ivp
 
 from discover.laws import make_law, registry

@@ -93,12 +93,12 @@ def test_the_command_writes_page_and_study_and_says_where(tmp_path):
     shown = CliRunner().invoke(app, ["data", "show", str(sweeps(folder)), "--out", str(out)])
     assert shown.exit_code == 0
     assert "amplitude sweep" in shown.output
-    assert sorted(path.name for path in out.iterdir()) == ["report.html", "study.toml"]
+    assert sorted(path.name for path in out.iterdir()) == ["data.html", "study.toml"]
     assert str(folder) in (out / "study.toml").read_text()
     assert not [path for path in folder.iterdir() if path.suffix != ".csv"]
 
 
-def test_a_look_at_data_keeps_a_study_and_a_report_that_are_there(tmp_path):
+def test_a_look_at_data_keeps_a_study_and_a_page_of_somebody_that_are_there(tmp_path):
     folder = tmp_path / "melt"
     folder.mkdir()
     out = tmp_path / "seen"
@@ -106,16 +106,13 @@ def test_a_look_at_data_keeps_a_study_and_a_report_that_are_there(tmp_path):
     first = CliRunner().invoke(app, words)
     again = CliRunner().invoke(app, words)  # of its own it makes new ones
     assert first.output == again.output
-    assert sorted(path.name for path in out.iterdir()) == ["report.html", "study.toml"]
+    assert sorted(path.name for path in out.iterdir()) == ["data.html", "study.toml"]
 
     (out / "study.toml").write_text("changed by hand")
-    (out / "report.html").write_text("<!doctype html><title>a finished result</title>")
     said = CliRunner().invoke(app, words)
     assert said.exit_code == 0
-    assert said.output.replace("\n", " ").count("is kept") == 2
+    assert said.output.replace("\n", " ").count("is kept") == 1
     assert (out / "study.toml").read_text() == "changed by hand"
-    assert "a finished result" in (out / "report.html").read_text()
-    assert "Drawn" in (out / "data.html").read_text()
 
     (out / "data.html").write_text("written by hand")
     refused = CliRunner().invoke(app, words)

@@ -262,8 +262,8 @@ _NO_TERM = {
     [
         ("loop.json", None, "holds neither loop.json nor comparison.json"),
         ("loop.json", {"verdict": "no_signal"}, "hold no signal"),
-        ("loop.json", {"verdict": "effects_added"}, "written by an earlier version"),
-        ("loop.json", {**LOOP, "declared": _BY_MODE}, "alpha differs from one relaxation mode"),
+        ("loop.json", {"verdict": "effects_added"}, "does not say what its loop started from"),
+        ("loop.json", {**LOOP, "declared": _BY_MODE}, "has alpha by mode and has no name"),
         ("loop.json", {**LOOP, "stages": [_OF_THREE]}, "damaged"),
         ("loop.json", {**LOOP, "declared": {"law": None}}, "is no sum of library terms"),
         ("loop.json", {**LOOP, "stages": [{"effect": "stress_gain"}]}, "is damaged"),

@@ -3,12 +3,10 @@
 import os
 import socket
 import time
-import tomllib
 
 import numpy as np
 import pytest
 
-from discover.dataset.tables.table import read_toml
 from discover.errors import InputError
 from discover.simulate import synthetic_dataset
 from discover.study import RunFolder, parse_study, read_study
@@ -85,37 +83,22 @@ def test_no_run_held_out_may_be_written():
     assert study("data", held_out=[]).data.held_out == ()
 
 
-@pytest.mark.parametrize("line", ["{} = 1", "[{}]", "x = {{ {} = 1 }}", '[data]\n"a".{} = 1'])
-def test_a_key_of_thousands_of_parts_is_refused_before_it_is_parsed(tmp_path, line):
-    path = tmp_path / "deep.toml"
-    path.write_text(line.format(".".join(["a"] * 20_000)))
-    with pytest.raises(InputError, match="more than 16 parts"):
-        read_study(path)
-
-
-def seconds_to_refuse(text, reason, folder):
-    path = folder / "study.toml"
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [(".".join(["a"] * 300_000) + " = 1", "dots on line 1"), ("." * 900_000, "dots on line 1"),
+     ("[[" + " . ".join(["a"] * 150_000), "dots on line 1"),
+     ('"' + '\\"' * 400_000, "not valid TOML"), ('"""' + '\\"' * 400_000, "not valid TOML")],
+    ids=["key", "dots", "header", "string", "lines"],
+)  # fmt: skip
+def test_a_key_of_thousands_of_parts_or_a_string_without_end_is_refused_at_once(
+    tmp_path, text, reason
+):
+    path = tmp_path / "study.toml"
     path.write_text(text)
     begun = time.process_time()
     with pytest.raises(InputError, match=reason):
         read_study(path)
-    return time.process_time() - begun
-
-
-@pytest.mark.parametrize(
-    "text",
-    [".".join(["a"] * 300_000) + " \n", ".".join(['"a\\""'] * 120_000) + " = 1\n",
-     "[" + ".".join(["a"] * 300_000) + "]", "[[" + " . ".join(["a"] * 150_000),
-     "x = {" + ".".join(["'#'"] * 200_000) + " = 1}", "x.\"'\"." + ".".join(["a"] * 300_000)],
-    ids=["no value", "escapes", "header", "open header", "literals", "quotes"],
-)  # fmt: skip
-def test_whatever_follows_a_deep_key_it_is_refused_within_a_second(tmp_path, text):
-    assert seconds_to_refuse(text, "more than 16 parts on line 1", tmp_path) < 1.0
-
-
-@pytest.mark.parametrize("text", ['"' + '\\"' * 400_000, '"""' + '\\"' * 400_000, "." * 900_000])
-def test_strings_that_never_end_are_read_once(tmp_path, text):
-    assert seconds_to_refuse(text, "not valid TOML", tmp_path) < 2.0
+    assert time.process_time() - begun < 2.0
 
 
 def test_dots_in_values_are_no_parts_of_a_key(tmp_path):
@@ -123,22 +106,6 @@ def test_dots_in_values_are_no_parts_of_a_key(tmp_path):
     name = ".".join(["run"] * 50) + ".csv"
     path.write_text(f'[data]\nfolder = "."\nfit = ["{name}"]\n')
     assert read_study(path).data.fit == (name,)
-
-
-DOTS = "a." * 40
-
-
-@pytest.mark.parametrize(
-    "text",
-    [f'x = "{DOTS}\\"{DOTS}"', f"x = '{DOTS}\\'", f'x = """{DOTS}\n"" {DOTS}\\""" {DOTS}"""""',
-     f"x = '''{DOTS}\n'' {DOTS}'''", f"# {DOTS}\nx = 1 # \"{DOTS}", f"x = {[1.5] * 2000}",
-     ".".join(["a"] * 16) + " = 1", f'"{DOTS}" = 1'],
-    ids=["basic", "literal", "lines", "literal lines", "comment", "floats", "16 parts", "one part"],
-)  # fmt: skip
-def test_dots_that_divide_no_key_are_let_through(tmp_path, text):
-    path = tmp_path / "good.toml"
-    path.write_text(text)
-    assert read_toml(path, "study file", "")[0] == tomllib.loads(text)
 
 
 @pytest.mark.parametrize("kind", ["pipe", "link", "folder", "socket"])
@@ -154,34 +121,14 @@ def test_a_lock_that_is_no_plain_file_is_refused_at_once(tmp_path, kind, monkeyp
         lock.symlink_to(tmp_path / "elsewhere")
     else:
         lock.mkdir()
-    with pytest.raises(InputError, match="not a plain file"):
+    with pytest.raises(InputError, match="cannot be written to"):
         RunFolder(tmp_path, "abc")
     assert not (tmp_path / "elsewhere").exists()
-
-
-def test_a_lock_that_is_another_file_by_a_second_name_is_left_as_it_is(tmp_path):
-    precious = tmp_path / "precious"
-    precious.write_text("thesis")
-    (tmp_path / "out").mkdir()
-    os.link(precious, tmp_path / "out" / LOCK_FILE)
-    with pytest.raises(InputError, match="one name"):
-        RunFolder(tmp_path / "out", "abc")
-    assert precious.read_text() == "thesis"
 
 
 def test_a_lock_left_behind_is_taken_over(tmp_path):
     (tmp_path / LOCK_FILE).write_text('{"pid": 1, "host": "another"}')
     assert not RunFolder(tmp_path, "abc").complete
-
-
-@pytest.mark.parametrize("name", ["state", "figures"])
-def test_a_planted_link_is_not_followed(tmp_path, name):
-    (tmp_path / "elsewhere").mkdir()
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / name).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match="is a link"):
-        RunFolder(tmp_path / "out", "abc")
-    assert list((tmp_path / "elsewhere").iterdir()) == []
 
 
 def test_a_folder_for_results_may_be_a_link_itself(tmp_path):

@@ -47,11 +47,6 @@ def check_folder(
     ----------
     folder, clock_factor, base
         As in `discover.dataset.load.load_dataset`.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> dc.check_folder("melt")  # doctest: +SKIP
     """
     findings: list[Finding] = []
     place = "folder", ""

@@ -79,8 +79,6 @@ def doubts_of_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum) -> Iterato
     """Doubts about a linear sweep; that modes fit G′ and G″ stands for Kramers–Kronig."""
     if spectrum.best_error > _SWEEP_TOLERANCE:
         yield found("contradiction", SWEEP_FILE, percent=100 * spectrum.best_error)
-    if sweep.thinned:
-        yield found("thinned", SWEEP_FILE, how=sweep.thinned)
     yield from _inertia(sweep)
     if spectrum.solid:
         yield found("solid", SWEEP_FILE, what=spectrum.solid)
@@ -104,15 +102,10 @@ def _inertia(sweep: LinearSweep) -> Iterator[Finding]:
         remedy = f'Give the study [model] modes = "lve" and sweep_rad_s = {window}, or correct the '
         remedy += "inertia."
     yield found(
-        "inertia",
-        SWEEP_FILE,
-        inertia=-term.inertia,
-        half=HALF_BAND * term.deviation,
-        percent=100 * np.max(share),
-        before=percent_of(term.error_before),
-        after=percent_of(term.error_after),
-        remedy=remedy,
-    )
+        "inertia", SWEEP_FILE, inertia=-term.inertia, half=HALF_BAND * term.deviation,
+        percent=100 * np.max(share), before=percent_of(term.error_before),
+        after=percent_of(term.error_after), remedy=remedy,
+    )  # fmt: skip
 
 
 class SweepInertia(NamedTuple):

@@ -16,8 +16,8 @@ from discover.dataset.importing.folder_files import (
     unread_columns,
 )
 from discover.dataset.importing.in_time import joined_intervals
-from discover.dataset.importing.mapping import Mapping, Source, TestName, key_of
-from discover.dataset.importing.names import alternatives, name_table
+from discover.dataset.importing.mapping import Mapping, Source, TestName
+from discover.dataset.importing.names import alternatives
 from discover.dataset.importing.oscillations import waves_of, without_names
 from discover.dataset.importing.quantities import (
     UnsaidUnits,
@@ -42,8 +42,7 @@ def blocks_of_file(path: Path, mapping: Mapping) -> list[tuple[int, Block]]:
     if found is None:
         rows = read_rows(path, layout.delimiter, layout.decimal, layout.encoding)
         found = blocks_of_rows(rows, layout.header_row)
-        names = name_table(mapping.names)
-        if not any(guess_columns(block, mapping.columns, names) for block in found):
+        if not any(guess_columns(block, mapping.columns) for block in found):
             wave = without_names(rows)
             found = found if wave is None else [wave]
         require_blocks(found, path.name)
@@ -104,23 +103,21 @@ class _Found:
             add(getattr(other, name))
 
 
-def import_files(
-    paths: Sequence[Path], mapping: Mapping, sweep: Path | None = None
-) -> ImportedFolder:
+def import_files(paths: Sequence[Path], mapping: Mapping) -> ImportedFolder:
     """Return the data folder that exports hold, in SI units.
 
     A block of numbers is taken for the test that its quantities and their course make it: records
     in time become runs, sweeps and flow curves the tables beside them. Rows without a needed number
     are dropped and counted. A file that cannot be understood is named in `unread`.
 
-    `mapping`: what is known; the rest is found from names, units and numbers. `sweep`: file whose
-    first frequency sweep becomes ``lve.csv``. Raises InputError if no file can be understood.
+    `mapping`: what is known; the rest is found from names, units and numbers. Raises InputError if
+    no file can be understood.
     """
     all_, sources = _Found(), []
     for path in paths:
         try:
             one = _read(path, mapping)
-            sources.append(_source(path, False))
+            sources.append(_source(path))
         except InputError as error:
             if len(paths) == 1:
                 raise
@@ -128,10 +125,7 @@ def import_files(
             all_.unread.append(said if path.name in said else f"{path.name}: {said}")
         else:
             all_.add(one)
-    if sweep is not None:
-        _read_sweep(sweep, mapping, all_)
-        sources.append(_source(sweep, True))
-    elif paths and not all_.records:
+    if paths and not all_.records:
         raise InputError(f"None of the {len(paths)} files can be read. {' '.join(all_.unread[:6])}")
     if not all_.records:
         raise InputError(
@@ -183,7 +177,7 @@ def _read(path: Path, mapping: Mapping) -> _Found:
     there: dict[str, None] = {}
     tables: list[tuple[int, Readings]] = []
     for number, block in blocks:
-        key = f"{key_of(file)}:{number}"
+        key = f"{file}:{number}"
         where = f"{file}, block {number} {block.name}".strip()
         name = plain + (f"-{number}" if len(blocks) > 1 else "")
         readings = Readings.of(block, mapping.of_block(file, number), file)
@@ -283,28 +277,7 @@ def _taken(readings: Readings, chosen: TestName | None, key: str) -> Recognised:
     return found if chosen in (None, found.kind) else Recognised(chosen, every, "as asked")
 
 
-def _read_sweep(path: Path, mapping: Mapping, found: _Found) -> None:
-    """Add the first frequency sweep of a file as the linear sweep."""
-    for _, block in blocks_of_file(path, mapping.model_copy(update={"blocks": None})):
-        readings = Readings.of(block, mapping, path.name)
-        if not readings.has("omega", "Gp", "Gpp"):
-            continue
-        one = _taken(readings, "frequency_sweep", "")
-        made = record(readings, one, None)
-        found.named |= readings.named()
-        found.note(readings, made)
-        made.chosen = True
-        found.records.append(made)
-        found.said.append(_summary(f"{path.name} {block.name}".strip(), readings, one, made))
-        return
-    raise InputError(
-        f"{path.name} holds no sweep: a block with angular frequency, storage and loss modulus is "
-        'needed. Name its columns with --column omega="…" --column Gp="…" --column Gpp="…".'
-    )
-
-
 _WAVES = {"strain_wave", "stress_wave", "wave_time"}
-# these are read only where they have to stand for another
 # these are read only where they have to stand for another
 _THROUGH = {
     "viscosity", "complex_modulus", "complex_viscosity", "phase_angle", "loss_factor",
@@ -344,6 +317,6 @@ def _is_part(key: str, made: Record) -> bool:
     return key in made.table or key in _THROUGH | {INSTRUMENT.get(name) for name in made.table}
 
 
-def _source(path: Path, sweep: bool) -> Source:
+def _source(path: Path) -> Source:
     digest = hashlib.sha256(read_bytes(path, path.name)).hexdigest()
-    return Source(file=str(path), sha256=digest, sweep=sweep)
+    return Source(file=str(path), sha256=digest)

@@ -4,7 +4,7 @@ import contextlib
 import io
 import re
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -25,12 +25,9 @@ from discover.validation import require_new_name
 from discover.words import unknown_name
 from tensor_library.closed_forms import Registry
 
-# bytes of a part that is no sheet: the list of sheets, or styles, which are read as objects
-_LARGEST_PART = 10_000_000
-_MOST_COLUMNS = 2000
 _MOST_ROWS = 1_048_576  # as Excel
 _LONGEST_CELL = 1000  # characters
-_GAP = 100  # empty rows, after which lines are no longer counted
+_GAP = 100  # empty rows
 
 
 def read_spreadsheet(path: Path) -> list[Block]:
@@ -39,7 +36,14 @@ def read_spreadsheet(path: Path) -> list[Block]:
 
     content = io.BytesIO(read_bytes(path, path.name, largest=LARGEST_EXPORT))
     try:
-        _require_size(content, path.name)
+        with zipfile.ZipFile(content) as archive:
+            unpacked = sum(part.file_size for part in archive.infolist())
+        if unpacked > LARGEST_EXPORT:
+            raise InputError(
+                f"{path.name} unpacks to {unpacked / 1e6:.0f} MB; the limit is "
+                f"{LARGEST_EXPORT / 1e6:.0f} MB. Save the sheets with the measurement in a "
+                "workbook of their own, or as CSV."
+            )
         book = load_workbook(content, read_only=True, data_only=True, keep_links=False)
     except zipfile.BadZipFile:
         raise InputError(
@@ -50,56 +54,21 @@ def read_spreadsheet(path: Path) -> list[Block]:
     with contextlib.closing(book):
         for sheet in book.worksheets:
             sheet.reset_dimensions()  # a file may claim any size
-            rows = []
-            for row in _rows(sheet, path.name):
+            rows, empty = [], 0
+            for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
                 left -= len(row)
-                if left < 0:
+                if left < 0 or number > _MOST_ROWS:
                     raise InputError(
-                        f"{path.name} has more than {MOST_CELLS} cells. Keep the sheets with the "
-                        "measurement."
+                        f"{path.name}, sheet {sheet.title}, has more than {MOST_CELLS} cells or "
+                        f"{_MOST_ROWS} rows. Keep the sheets with the measurement."
                     )
-                rows.append([_text(cell) for cell in row])
+                empty = 0 if row else empty + 1
+                if empty < _GAP:  # after which lines are no longer counted
+                    rows.append([_text(cell) for cell in row])
             for block in blocks_of_rows(with_points(rows, path.name)):
                 names = filter(None, (str(sheet.title), block.name))
                 blocks.append(replace(block, name=", ".join(dict.fromkeys(names))))
     return require_blocks(blocks, path.name)
-
-
-def _require_size(content: io.BytesIO, name: str) -> None:
-    """Refuse a workbook that would unpack to more than a measurement."""
-    with zipfile.ZipFile(content) as archive:
-        parts = archive.infolist()
-    # what a part says of its size is what is read of it at most
-    whole = sum(part.file_size for part in parts)
-    if whole > LARGEST_EXPORT:
-        raise InputError(
-            f"{name} unpacks to {whole / 1e6:.0f} MB; the limit is {LARGEST_EXPORT / 1e6:.0f} "
-            "MB. Save the sheets with the measurement in a workbook of their own, or as CSV."
-        )
-    for part in parts:
-        is_table = "worksheets/" in part.filename or "sharedStrings" in part.filename
-        if part.file_size > _LARGEST_PART and not is_table and part.filename.endswith("ml"):
-            raise InputError(
-                f"{name} has {part.file_size / 1e6:.0f} MB in {part.filename}, which holds no "
-                "measurement. Copy the numbers to a new workbook, or save each sheet as CSV."
-            )
-
-
-def _rows(sheet, name: str) -> Iterator[tuple]:
-    """Yield the rows of a sheet as wide as they are filled, a gap of many rows as one."""
-    empty = 0
-    for number, row in enumerate(sheet.iter_rows(values_only=True), start=1):
-        far = f"a cell below row {_MOST_ROWS}. Delete what stands far below the measurement."
-        if len(row) > _MOST_COLUMNS:
-            far = (
-                f"a cell in column {len(row)} of row {number}; the limit is {_MOST_COLUMNS} "
-                "columns. Delete what stands far to the right of the measurement."
-            )
-        if number > _MOST_ROWS or len(row) > _MOST_COLUMNS:
-            raise InputError(f"{name}, sheet {sheet.title}, has {far}")
-        empty = 0 if row else empty + 1
-        if empty < _GAP:
-            yield row
 
 
 def _text(cell: object) -> str:
@@ -192,24 +161,15 @@ def register_importer(
 ) -> Importer:
     """Make an importer of one's own known to `discover data import`.
 
+    Raises InputError if the name is taken or is none, or another importer has a suffix.
+
     Parameters
     ----------
-    name
-        As ``--format`` is to spell it: lower-case letters, digits and underscores.
+    name, suffixes
+        As ``--format`` is to spell it: lower-case letters, digits and underscores; endings of names
+        by which such files are known.
     read
         Takes the path of a file and returns its blocks, made with `Block.of`.
-    suffixes
-        Endings of names by which such files are known.
-
-    Raises
-    ------
-    InputError
-        If the name is taken or is none, or another importer has one of the suffixes.
-
-    Examples
-    --------
-    >>> import discover as dc
-    >>> dc.register_importer("house_rheometer", read, suffixes=[".npz"])  # doctest: +SKIP
     """
     require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
     endings = tuple(str(suffix).lower() for suffix in suffixes)

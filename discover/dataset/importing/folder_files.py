@@ -48,7 +48,6 @@ def files_of(found: Sequence[Record]) -> tuple[dict[str, str], list[str]]:
     of_runs = {one.temperature for one in runs}
     for kind, table in TABLES.items():
         records = [one for one in found if one.kind == kind and not one.is_run]
-        records.sort(key=lambda one: not one.chosen)
         groups: list[list[Record]] = []  # by temperature
         for one in _merged(records) if kind == "amplitude_sweep" else records:
             group = next((g for g in groups if g[0].near(one.temperature)), None)
@@ -57,15 +56,14 @@ def files_of(found: Sequence[Record]) -> tuple[dict[str, str], list[str]]:
             group.append(one)
         for group in groups:
             at = f"{group[0].temperature:g}" if len(groups) > 1 else ""
-            main = not at or group[0].chosen
-            base = table if main else f"{table}_{at}C"
-            if not main:
+            base = f"{table}_{at}C" if at else table
+            if at:
                 by_temperature.append({"file": f"{base}.csv", "test": table, "temperature_C": at})
             files[f"{base}.csv"] = _csv(group[0].columns)
             for number, one in enumerate(group[1:], start=2):
                 files[f"{base}-{number}.csv"] = _csv(one.columns)
                 notes.append(_not_used(f"{base}-{number}.csv", table, one))
-        if len(groups) > 1 and not groups[0][0].chosen:
+        if len(groups) > 1:
             at_runs = [g[0] for g in groups if of_runs and all(g[0].near(t) for t in of_runs)]
             if len(at_runs) == 1:
                 files[f"{table}.csv"] = _csv(at_runs[0].columns)

@@ -1,14 +1,11 @@
 """What an import needs to know: which column is what, in which unit, on which geometry."""
 
 import math
-import os
 from pathlib import Path
-from typing import Annotated, Any, Literal
-from urllib.parse import quote, unquote_to_bytes
+from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field, Strict, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from discover.dataset.importing.names import check_names
 from discover.dataset.importing.quantities import QUANTITIES
 from discover.dataset.tables.table import read_toml, toml_string
 from discover.validation import Section, validated
@@ -31,7 +28,6 @@ TestName = Literal[
 """What a block may be taken for: ``run`` is a record in time at a given rate, ``none`` nothing."""
 
 EVERY_BLOCK = "*"
-_ENCODED = "file_percent_encoded"
 
 Celsius = Annotated[float, Field(ge=-273.15, le=2000)]  # a temperature that can be
 
@@ -80,33 +76,21 @@ class Layout(Section):
 
 
 class Source(Section):
-    """A file that was imported, with its hash; ``file_percent_encoded`` if its name is no UTF-8."""
+    """A file that was imported, with its hash."""
 
     file: str
     sha256: str | None = None
-    sweep: bool = False
-
-    @model_validator(mode="before")
-    @classmethod
-    def _decoded(cls, content: Any) -> Any:
-        if not isinstance(content, dict) or not isinstance(content.get(_ENCODED), str):
-            return content
-        if "file" in content:
-            raise ValueError(f"give file or {_ENCODED}, not both")
-        name = os.fsdecode(unquote_to_bytes(content[_ENCODED]))
-        return {"file": name, **{k: v for k, v in content.items() if k != _ENCODED}}
 
 
 class Mapping(Section):
     """Everything that decides an import; written beside the result so that it can be repeated.
 
-    Keys of `names` are the tables of ``names.toml``, of `tests` ``FILE:BLOCK``, ``FILE`` or
-    `EVERY_BLOCK`, of `temperatures`, in °C, ``FILE:BLOCK`` or ``FILE``.
+    Keys of `tests` are ``FILE:BLOCK``, ``FILE`` or `EVERY_BLOCK`, of `temperatures`, in °C,
+    ``FILE:BLOCK`` or ``FILE``.
     """
 
     columns: dict[QuantityName, str] = Field(default_factory=dict)
     units: dict[QuantityName, str] = Field(default_factory=dict)
-    names: dict[str, Annotated[tuple[str, ...], Strict(False)]] = Field(default_factory=dict)
     layout: Layout = Layout()
     geometry: Geometry | None = None
     start_time_s: float = 0.0
@@ -116,31 +100,16 @@ class Mapping(Section):
     source: tuple[Source, ...] = ()
     tests: dict[str, TestName] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _known(self):
-        check_names(self.names, "names")
-        return self
-
     def test_of(self, file: str, block: int) -> TestName | None:
         """Return what the user says that a block of a file, from 1, is; None if nothing."""
-        name = key_of(file)
-        keys = f"{name}:{block}", name, EVERY_BLOCK
+        keys = f"{file}:{block}", file, EVERY_BLOCK
         return next((self.tests[key] for key in keys if key in self.tests), None)
 
     def of_block(self, file: str, block: int) -> "Mapping":
         """Return what holds for a block of a file, its temperature being that of the file."""
-        degrees = self.temperatures.get(f"{key_of(file)}:{block}")
-        of_file = {} if degrees is None else {"temperatures": {key_of(file): degrees}}
+        degrees = self.temperatures.get(f"{file}:{block}")
+        of_file = {} if degrees is None else {"temperatures": {file: degrees}}
         return self.model_copy(update=of_file)
-
-
-def key_of(file: str) -> str:
-    """Return the name of a file as a key of a mapping; percent-encoded if it is no UTF-8."""
-    try:
-        file.encode()
-    except UnicodeEncodeError:
-        return quote(os.fsencode(file))
-    return file
 
 
 def make_mapping(content: dict, where: str) -> Mapping:
@@ -163,21 +132,15 @@ def write_mapping(mapping: Mapping) -> str:
         lines.append(f"temperature_C = {mapping.temperature_C!r}")
     if mapping.blocks is not None:
         lines.append(f"blocks = {list(mapping.blocks)}")
-    for name in ("columns", "units", "names", "layout", "geometry", "tests", "temperatures"):
+    for name in ("columns", "units", "layout", "geometry", "tests", "temperatures"):
         section = getattr(mapping, name)
         content = section if isinstance(section, dict) else section and section.model_dump()
         known = {key: value for key, value in (content or {}).items() if value is not None}
         if known:
             lines += ["", f"[{name}]", *(f"{_key(key)} = {_toml(known[key])}" for key in known)]
     for source in mapping.source:
-        name = key_of(source.file)
-        lines += [
-            "",
-            "[[source]]",
-            f"{'file' if name == source.file else _ENCODED} = {_toml(name)}",
-        ]
+        lines += ["", "[[source]]", f"file = {_toml(source.file)}"]
         lines += [f"sha256 = {_toml(source.sha256)}"] if source.sha256 else []
-        lines += ["sweep = true"] if source.sweep else []
     return "\n".join(lines) + "\n"
 
 
@@ -186,6 +149,4 @@ def _key(name: str) -> str:
 
 
 def _toml(value: object) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
     return toml_string(value) if isinstance(value, str) else repr(value)

@@ -1,4 +1,4 @@
-"""What exports call each quantity: names in many languages, and a user's own.
+"""What exports call each quantity, in many languages.
 
 Names are compared word by word, whatever their capitals, accents, separators and Greek letters. A
 name may be followed by its symbol, and words may be cut short.
@@ -7,15 +7,9 @@ name may be followed by its symbol, and words may be cut short.
 import re
 import tomllib
 import unicodedata
-from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from itertools import pairwise
-from pathlib import Path
-
-from discover.dataset.tables.table import read_toml
-from discover.errors import InputError
-from discover.words import unknown_name
 
 # tables of names.toml that name one quantity, the better first
 _PARTS = {"time": ("step_time", "time"), "omega": ("omega", "frequency")}
@@ -75,14 +69,14 @@ def plain(name: str) -> str:
 
 
 class NameTable:
-    """Names of quantities, those of the project and a user's own, which go first."""
+    """Names of quantities."""
 
-    def __init__(self, own: Mapping[str, Sequence[str]]):
+    def __init__(self):
         self._rank: dict[str, dict[str, int]] = {}
         self._words: dict[tuple[int, str], list[tuple[str, tuple[str, ...]]]] = {}
         for section, names in shipped_names().items():
             ranks = self._rank.setdefault(section, {})
-            for name in (*own.get(section, ()), *names):
+            for name in names:
                 for one in dict.fromkeys((name, name.translate(_UMLAUTS))):
                     words = tuple(word.rstrip(".") for word in words_of(one))
                     ranks.setdefault("".join(words), len(ranks))
@@ -153,38 +147,7 @@ def alternatives(table: str) -> dict[str, str]:
     return {key: "|".join(words) for key, words in content[table].items()}
 
 
-_table = cache(lambda own: NameTable(dict(own)))
-
-
-def name_table(own: Mapping[str, Sequence[str]] | None = None) -> NameTable:
-    """Return the names of the project, with a user's own before them."""
-    return _table(tuple((key, tuple(names)) for key, names in sorted((own or {}).items())))
-
-
-def read_names(path: Path) -> dict[str, tuple[str, ...]]:
-    """Return a user's names by quantity, from a file as ``names.toml``; InputError if wrong."""
-    example = 'Write lines such as stress = ["Sigma corr."].'
-    content, _ = read_toml(path, "file of names", example)
-    parts = {k: [*v.values()] if isinstance(v, dict) else [v] for k, v in content.items()}
-    if wrong := [k for k, lists in parts.items() for p in lists if not isinstance(p, list)]:
-        key = wrong[0][:40]
-        raise InputError(f'{path.name}: {key} must be a list of names, as in {key} = ["its name"].')
-    names = {key: tuple(name for part in lists for name in part) for key, lists in parts.items()}
-    check_names(names, path.name)
-    return names
-
-
-def check_names(names: Mapping[str, Sequence[object]], where: str) -> None:
-    """Refuse a user's names, by quantity, of which one is no quantity or no text with a letter."""
-    for key, listed in names.items():
-        if key not in shipped_names():
-            raise InputError(f"{where}: {unknown_name('quantity', key, shipped_names())}")
-        for name in listed:
-            if not isinstance(name, str) or not plain(name):
-                raise InputError(
-                    f"{where}: {key} holds {str(name)[:40]!r}, which is not a name. Write text in "
-                    "quotes, with a letter in it."
-                )
+name_table = cache(NameTable)
 
 
 _CODE_PAGES = ("cp1252", "cp932", "gb18030", "cp949", "big5", "cp1251", "cp1250", "utf-8")

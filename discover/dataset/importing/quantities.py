@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from discover.dataset.importing.names import NameTable, plain
+from discover.dataset.importing.names import name_table, plain
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import is_clock
 from discover.dataset.material_functions import COMPLIANCE, RELAXATION_MODULUS
@@ -51,7 +51,7 @@ SAME_TEMPERATURE = 1.5  # °C up to which two temperatures are one
 _SHORT = 3  # letters of a name that says too little without its unit
 
 
-def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> dict[str, int]:
+def guess_columns(block: Block, given: Mapping[str, str]) -> dict[str, int]:
     """Return the place of each quantity among the columns of a block that hold a number.
 
     A clock is a time only if no number is. `given`: names of columns that the user gave; they win.
@@ -69,7 +69,7 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
                     "one in the file."
                 )
         else:
-            ranks = {i: name_rank(key, *column, table) for i, column in enumerate(block.columns)}
+            ranks = {i: name_rank(key, *column) for i, column in enumerate(block.columns)}
             places = {i: rank for i, rank in ranks.items() if rank is not None}
             at = sorted(places, key=places.__getitem__)
         numbers = [i for i in at if i in block.filled]
@@ -80,22 +80,22 @@ def guess_columns(block: Block, given: Mapping[str, str], table: NameTable) -> d
     return found
 
 
-def name_rank(key: str, name: str, unit: str, table: NameTable) -> int | None:
+def name_rank(key: str, name: str, unit: str) -> int | None:
     """Return how good a column is for a quantity, 0 the best; None if it is not called so."""
-    rank = table.rank(key, name)
+    rank = name_table().rank(key, name)
     if rank is not None:
         return rank if fits(key, name, unit) else None
     if name == QUANTITIES[key].column:
         return 0
-    inside = None if unit else split_name(key, name, table)
+    inside = None if unit else split_name(key, name)
     return None if inside is None else inside[0]
 
 
-def split_name(key: str, name: str, table: NameTable) -> tuple[int, str] | None:
+def split_name(key: str, name: str) -> tuple[int, str] | None:
     """Return the rank of a name that ends in a unit of the quantity, and it: ``stress_kPa``."""
     for mark in re.finditer(r"[\s_/,;]+", name):
         head, tail = name[: mark.start()], name[mark.end() :]
-        rank = 0 if head == QUANTITIES[key].stem else table.rank(key, head)
+        rank = 0 if head == QUANTITIES[key].stem else name_table().rank(key, head)
         if rank is None or not re.search(r"[^\W\d_]|%", tail):
             continue
         # this project's own 1_s and rad_s, and Pa_s
@@ -182,14 +182,14 @@ class UnsaidUnit(NamedTuple):
     why: str = ""  # what tells it
 
 
-def unsaid_unit(key: str, column: str, raw: Values, get: Get, table: NameTable) -> UnsaidUnit:
+def unsaid_unit(key: str, column: str, raw: Values, get: Get) -> UnsaidUnit:
     """Return the unit of a column without one.
 
     `get`: gives other columns of the block in SI units, None where it has no such column. An
     angular frequency is one in rad/s, a frequency may count.
     """
     choices = _CHOICES.get(key)
-    if choices is None or (key == "omega" and "frequency" not in table.find(column)):
+    if choices is None or (key == "omega" and "frequency" not in name_table().find(column)):
         return UnsaidUnit(column, QUANTITIES[key].unit or "1", "assumed")
     if (told := _told(key, raw, get)) is not None:
         return UnsaidUnit(column, told[0], "told", told[1])

@@ -9,8 +9,8 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.dataset.importing import quantities
-from discover.dataset.importing.mapping import Geometry, Mapping, key_of
-from discover.dataset.importing.names import NameTable, name_table
+from discover.dataset.importing.mapping import Geometry, Mapping
+from discover.dataset.importing.names import name_table
 from discover.dataset.importing.quantities import QUANTITIES, UnsaidUnit, name_rank, to_celsius
 from discover.dataset.importing.text_export import Block
 from discover.dataset.importing.text_rows import Constant, is_clock, seconds, temperature_in
@@ -21,7 +21,6 @@ from discover.errors import InputError
 INSTRUMENT = {
     "stress": "torque", "shear_rate": "angular_velocity", "strain": "angle", "N1": "normal_force",
 }  # fmt: skip
-_COEFFICIENTS = {"N1": "psi1", "N2": "psi2"}  # N1 = Ψ1 γ̇² and N2 = Ψ2 γ̇²
 # a column of strain may be called the one or the other by who gives its unit
 SAME = {"strain": "strain_amplitude", "strain_amplitude": "strain"}
 
@@ -46,7 +45,7 @@ class Readings:
     @classmethod
     def of(cls, block: Block, mapping: Mapping, name: str) -> "Readings":
         """Return readings of a block; InputError if a given name stands above two columns."""
-        columns = quantities.guess_columns(block, mapping.columns, name_table(mapping.names))
+        columns = quantities.guess_columns(block, mapping.columns)
         found = cls(block, columns, mapping, name, mapping.geometry)
         if found.geometry is None:
             found.geometry = found._geometry()
@@ -87,11 +86,6 @@ class Readings:
         kept = [np.zeros(len(self), bool) if v is None else np.isfinite(v) for v in values]
         return np.all([np.ones(len(self), bool), *kept], axis=0)
 
-    @property
-    def names(self) -> NameTable:
-        """What quantities are called."""
-        return name_table(self.mapping.names)
-
     def named(self) -> set[str]:
         """Return the quantities of which the block has a column or its header a number."""
         also = {SAME[key] for key in self.columns if key in SAME}
@@ -110,7 +104,7 @@ class Readings:
 
     def _temperature(self) -> Values | None:
         """Return temperatures as the user, a column, the header, a title or the name gives them."""
-        given = self.mapping.temperatures.get(key_of(self.name))
+        given = self.mapping.temperatures.get(self.name)
         if given is not None:
             self.used["temperature"] = f"{given:g} °C as given"
             return np.full(len(self), given)
@@ -157,7 +151,7 @@ class Readings:
             return seconds([row[at] for row in self.block.cells], self._unit_given(key) or unit)
         raw = self.block.numbers[at]
         if not (unit := self._unit_given(key) or unit):
-            split = quantities.split_name(key, column, self.names)
+            split = quantities.split_name(key, column)
             unit = "" if split is None else split[1]
         if key == "temperature":
             kelvin = to_celsius(0.0, unit or "°C")
@@ -171,7 +165,7 @@ class Readings:
             return np.where(wrong, math.nan, degrees)
         if not unit:
             lines = (c for c in self.block.constants if not c.value)
-            said = (c.unit for c in lines if self.names.rank(key, c.name) is not None)
+            said = (c.unit for c in lines if name_table().rank(key, c.name) is not None)
             unit = next(said, "") or self._unsaid(key, column, raw)
         factor = quantities.factor_to_si(key, unit, column, self.name)
         self.used[key] = shown(column) + (f" [{shown(unit)}]" if unit != "1" else "")
@@ -190,7 +184,7 @@ class Readings:
             used, unsaid = dict(self.used), dict(self.unsaid)
             others = self.columns.keys() - {key}
             found = quantities.unsaid_unit(
-                key, column, raw, lambda k: self._column(k) if k in others else None, self.names
+                key, column, raw, lambda k: self._column(k) if k in others else None
             )
             # what tells a unit is not thereby part of the test
             self.used, self.unsaid = used, {**unsaid, key: found}
@@ -255,7 +249,7 @@ class Readings:
         if key in ("time", "wave_time", "point"):  # the time of the day, the number of points
             return None
         ranks = {
-            constant: name_rank(key, constant.name, constant.unit, self.names)
+            constant: name_rank(key, constant.name, constant.unit)
             for constant in self.block.constants
             if constant.value and (constant.unit or len(constant.name) > 1)
         }

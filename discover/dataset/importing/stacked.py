@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from discover.dataset.importing import quantities
 from discover.dataset.importing.mapping import Mapping
-from discover.dataset.importing.names import name_table, plain
+from discover.dataset.importing.names import plain
 from discover.dataset.importing.quantities import QUANTITIES, guess_columns, name_rank
 from discover.dataset.importing.readings import Readings
 from discover.dataset.importing.text_export import OF_TESTS, Block, plain_words
@@ -83,8 +83,7 @@ def _head(column: tuple[str, str]) -> _Head:
 
 def _quantity(head: _Head) -> str | None:
     """Return which quantity a column of this name would be."""
-    table = name_table()
-    ranks = ((key, name_rank(key, head.base, head.unit, table)) for key in QUANTITIES)
+    ranks = ((key, name_rank(key, head.base, head.unit)) for key in QUANTITIES)
     return next((key for key, rank in ranks if rank is not None), None)
 
 
@@ -128,7 +127,7 @@ def _columns(
         names = tuple((heads[i].base, heads[i].unit) for i in columns)
         cells = tuple(tuple(row[i] for i in columns) for row in part.cells)
         part = replace(part, columns=names, cells=cells, over=(), apart=True)
-        known = set(guess_columns(part, {}, name_table()))
+        known = set(guess_columns(part, {}))
         said = [_constant(one, known) for one in label.split(", ")] if label else []
         constants = (*block.constants, *(one for one in said if one is not None))
         of = label or f"columns {min(group) + 1} to {max(group) + 1}"

@@ -1,29 +1,19 @@
-"""Linear tests at several temperatures, the spectrum of one, and whether it predicts the others."""
+"""Linear tests at several temperatures."""
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
-from scipy.optimize import nnls
-from scipy.special import exprel
 
-from discover.dataset.linear_viscoelasticity import (
-    FLOOR,
-    MOST_MODES,
-    LinearSweep,
-    RelaxationSpectrum,
-    relaxation_spectrum,
-)
+from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.dataset.load import SWEEP_FILE, TESTS_FILE, read_sweep
 from discover.dataset.material_functions import read_over_time
 from discover.dataset.tables import units
 from discover.dataset.tables.table import read_table
 from discover.errors import InputError, Problems
-from discover.statistics.noise.noise_model import rms
 from discover.words import did_you_mean
 
 SWEEP, RELAXATION, CREEP = SWEEP_FILE.removesuffix(".csv"), "relaxation", "creep"
@@ -40,14 +30,6 @@ _COLUMNS = {
 # evenly in time, which would give the last decade all the weight
 PER_DECADE = 20
 _FEWEST = 4
-# times the largest modulus that a compliance shows at once, of a compliance that fits without one:
-# what is faster than its first sample it does not see
-_STIFFEST = 1e3
-_MARGINS = (0.0, 0.25, 0.5)  # decades by which relaxation times go beyond the samples
-_TOLERANCE = 1.5  # how much worse than the best a spectrum may be, as a factor
-# root-mean-square relative error up to which two linear tests agree: two loadings and two kinds of
-# test rarely differ by less than some per cent
-AGREES = 0.1
 
 Values = Float[np.ndarray, " n"]
 
@@ -78,11 +60,6 @@ class LinearTest:
     def sweep(self) -> LinearSweep:
         """As a sweep, which it has to be."""
         return LinearSweep(self.argument, *self.values)
-
-    @property
-    def times(self) -> Values:
-        """Times in s, 1/ω of a sweep."""
-        return 1.0 / self.argument if self.kind == SWEEP else self.argument
 
     def moved(self, log_shift: float, log_vertical: float) -> "LinearTest":
         """Return the test as at the reference: ω a_T, t/a_T, G/b_T, J b_T."""
@@ -181,136 +158,4 @@ def read_linear_tests(root: Path) -> dict[str, dict[float, LinearTest]]:
             f"{TESTS_FILE} lists no kind of linear test (lve, relaxation, creep) at two "
             "temperatures; shifting needs two."
         )
-    return found
-
-
-def spectrum_of(test: LinearTest) -> RelaxationSpectrum:
-    """Return the modes of a linear test, the fewest that fit nearly as well as any."""
-    if test.kind == SWEEP:
-        return relaxation_spectrum(test.sweep)
-    most = min(MOST_MODES, len(test) // 2)
-    trials = [_modes(test, n, m) for n in range(1, most + 1) for m in _MARGINS[: 2 * n]]
-    best = min(error for _, _, error in trials)
-    errors: dict[int, float] = {}
-    for modulus, _, error in trials:
-        errors[len(modulus)] = min(error, errors.get(len(modulus), np.inf))
-    within = [trial for trial in trials if trial[2] <= max(_TOLERANCE * best, FLOOR)]
-    modulus, relaxation_time, error = min(within, key=lambda trial: (len(trial[0]), trial[2]))
-    return RelaxationSpectrum(modulus, relaxation_time, error, best, dict(sorted(errors.items())))
-
-
-def _modes(test: LinearTest, n: int, margin: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return moduli and times of so many modes, and the relative misfit of non-negative ones."""
-    shortest, longest = test.argument[0] * 10.0**-margin, test.argument[-1] * 10.0**margin
-    times = np.geomspace(shortest, longest, n) if n > 1 else np.sqrt([shortest * longest])
-    t, values, in_creep = test.argument[:, None], test.values[0], test.kind == CREEP
-    curves = np.exp(-t / times)
-    if in_creep:
-        curves = np.hstack([np.ones_like(t), t, -np.expm1(-t / times)])
-    weight = FLOOR / np.hypot(FLOOR, test.spread)  # averages that scatter count less
-    design = weight[:, None] * curves / values[:, None]
-    scale = np.linalg.norm(design, axis=0)
-    found, left = nnls(design / scale, weight, maxiter=100 * len(scale) + 100)
-    found, error = found / scale, float(left / np.linalg.norm(weight))
-    if not in_creep:
-        return found[found > 0], times[found > 0], error
-    instant = max(found[0], values.min() / _STIFFEST)
-    modulus, time = modes_of_retardation(instant, found[1], found[2:], times)
-    # of a solid some of the modulus never relaxes, and stays over all times measured
-    return modulus, np.minimum(time, 1e6 * test.argument[-1]), error
-
-
-def predicted(spectrum: RelaxationSpectrum, kind: str, argument: Values) -> np.ndarray:
-    """Return what a spectrum says of a kind of test at frequencies in rad/s or times in s."""
-    if kind == SWEEP:
-        return np.stack(spectrum.moduli(argument))
-    of = relaxation_modulus if kind == RELAXATION else creep_compliance
-    return of(spectrum, argument)[None]
-
-
-def relaxation_modulus(spectrum: RelaxationSpectrum, time: Values) -> Values:
-    """Return G(t) = Σ G_k exp(−t/λ_k) in Pa at times in s; a solvent has none after t = 0."""
-    return np.exp(-time[:, None] / spectrum.relaxation_time) @ spectrum.modulus
-
-
-def creep_compliance(spectrum: RelaxationSpectrum, time: Values) -> Values:
-    """Return J(t) in 1/Pa at times in s: the creep of Maxwell elements side by side.
-
-    Under a unit stress s_k' = −s_k/λ_k + g_k Σ s_j/λ_j, g_k = G_k/ΣG; scaled by (g_k λ_k)^½ the
-    matrix is symmetric, and its modes are those of retardation   [Ferry 1980, ch. 3].
-    """
-    total = float(np.sum(spectrum.modulus))
-    share = np.sqrt(spectrum.modulus / total / spectrum.relaxation_time)
-    rates, modes = np.linalg.eigh(np.outer(share, share) - np.diag(1 / spectrum.relaxation_time))
-    weights = (share @ modes) ** 2
-    # one rate is zero but for rounding
-    growth = time[:, None] * exprel(np.minimum(rates, 0.0) * time[:, None])
-    return (1.0 + growth @ weights) / total
-
-
-def modes_of_retardation(
-    instant: float, fluidity: float, compliance: Values, retardation_time: Values
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return moduli in Pa and relaxation times in s of J(t) = J_g + Σ J_k (1 − exp(−t/τ_k)) + t/η.
-
-    The inverse of `creep_compliance`: at a constant strain e_k' = J_k σ/τ_k − e_k/τ_k and e' = σ/η,
-    where σ is what J_g leaves of it. `instant`, `compliance` in 1/Pa, `fluidity` in 1/(Pa s).
-    """
-    there = compliance > 0.0
-    rates = 1.0 / retardation_time[there]
-    share = np.sqrt(np.append(compliance[there] * rates, [fluidity] if fluidity > 0.0 else []))
-    decay = np.append(rates, [0.0] if fluidity > 0.0 else [])
-    if not len(share):
-        return np.array([1.0 / instant]), np.array([np.inf])
-    speeds, modes = np.linalg.eigh(np.diag(decay) + np.outer(share, share) / instant)
-    moduli = (share @ modes) ** 2 / instant**2 / speeds
-    order = np.argsort(1.0 / speeds)
-    return moduli[order], (1.0 / speeds)[order]
-
-
-@dataclass(frozen=True)
-class Agreement:
-    """How well the modes of one linear test predict another over the times that it reaches."""
-
-    source: str  # the test that the modes come from: ``lve``, ``relaxation`` or ``creep``
-    test: str  # the one predicted
-    celsius: float  # temperature of both
-    error: float  # root-mean-square relative error of the prediction
-    bias: float  # mean relative error: a gain of one of the two shows here
-    times: tuple[float, float]  # first and last in s, 1/ω for a sweep
-
-    @property
-    def left(self) -> float:
-        """What would be left of the error, were the prediction divided by one factor."""
-        return float(np.sqrt(max(self.error**2 - self.bias**2, 0.0)) / (1.0 + self.bias))
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the error is up to `AGREES`."""
-        return self.error <= AGREES
-
-
-def linear_agreements(tests: Tests) -> list[Agreement]:
-    """How well the modes of each test predict each other test, over the times both reach."""
-    spectra: dict[tuple[str, float], RelaxationSpectrum | None] = {}
-    found = []
-    slack = 1.0 + 1e-9  # of 1/ω
-    pairs = [(a, b) for a in tests for b in tests if a != b]
-    both = ((a, b, t) for a, b in pairs for t in sorted(set(tests[a]) & set(tests[b])))
-    for source, test, celsius in both:
-        one, other = tests[source][celsius], tests[test][celsius]
-        reached, times = one.times, other.times
-        inside = (times >= reached.min() / slack) & (times <= reached.max() * slack)
-        if np.sum(inside) < _FEWEST:
-            continue
-        if (source, celsius) not in spectra:
-            spectra[source, celsius] = None
-            with suppress(InputError):  # too few samples, or moduli that no modes have
-                spectra[source, celsius] = spectrum_of(one)
-        if (spectrum := spectra[source, celsius]) is None:
-            continue
-        made = predicted(spectrum, test, other.argument[inside])
-        error, seen = made / other.values[:, inside] - 1.0, times[inside]
-        ends = float(seen.min()), float(seen.max())
-        found.append(Agreement(source, test, celsius, rms(error), float(np.mean(error)), ends))
     return found

@@ -55,12 +55,9 @@ class ModeFit:
 
 
 def relative_moduli(
-    frequency: Float[np.ndarray, " n"],
-    measured: Float[np.ndarray, "2 n"],
-    times: Float[np.ndarray, " k"],
-    solvent: bool = False,
-    elastic: bool = False,
-) -> Float[np.ndarray, "rows c"]:
+    frequency: Float[np.ndarray, " n"], measured: Float[np.ndarray, "2 n"],
+    times: Float[np.ndarray, " k"], solvent: bool = False, elastic: bool = False,
+) -> Float[np.ndarray, "rows c"]:  # fmt: skip
     """G′ and G″ over those measured of modes (1 Pa), solvent (1 Pa s) and constant (1 Pa)."""
     x, zero = frequency[:, None] * times, np.zeros_like(frequency)
     storage, loss = measured

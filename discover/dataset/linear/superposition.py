@@ -6,7 +6,6 @@ Sweeps lead where there are sweeps: they see the temperature in two curves.
 """
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,14 +16,7 @@ from scipy.optimize import curve_fit
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from discover.dataset.linear.linear_tests import (
-    SWEEP,
-    Agreement,
-    LinearTest,
-    Tests,
-    linear_agreements,
-    of_sweep,
-)
+from discover.dataset.linear.linear_tests import SWEEP, LinearTest, Tests, of_sweep
 from discover.dataset.linear.overlap import lay_over, overlap_misfit
 from discover.dataset.linear_viscoelasticity import LinearSweep
 from discover.errors import InputError
@@ -242,33 +234,13 @@ def shift_table(found: Superposition) -> str:
     return "\n".join(",".join(row) for row in rows) + "\n"
 
 
-@dataclass(frozen=True)
-class MovedTests:
-    """What a folder of linear tests at several temperatures becomes."""
-
-    found: Superposition
-    # what tables over time ask for by themselves, by kind, where the shifts are the sweeps'
-    own: Mapping[str, Superposition]
-    agreements: list[Agreement]  # how well tests predict one another at each temperature
-    files: Mapping[str, LinearTest | None]  # moved tests as one; None where they become none
-
-
 def move_tests(
     tests: Tests, reference: float | None, vertical: bool, between: tuple[float, float] | None
-) -> MovedTests:
-    """Return tests between two temperatures in °C moved to one, and what can be said of them."""
+) -> Superposition:
+    """Return tests between two temperatures in °C moved to one."""
     if between is not None:
         low, high = min(between), max(between)
         chosen = {k: {t: one for t, one in at.items() if low <= t <= high}
                   for k, at in tests.items()}  # fmt: skip
         tests = {kind: at for kind, at in chosen.items() if at}
-    found = superpose(tests, reference, vertical)
-    own = {}
-    for kind, at in tests.items():
-        there = {t: at[t] for t in at if t in found.celsius}
-        if kind == SWEEP or kind in found.leading or found.reference not in there:
-            continue
-        with suppress(InputError):  # too few, or apart: the sweeps' shifts are all there is
-            own[kind] = superpose({kind: there}, found.reference, vertical)
-    files = {f"{kind}.csv": found.master(kind) for kind in tests}
-    return MovedTests(found, own, linear_agreements(tests), files)
+    return superpose(tests, reference, vertical)

@@ -10,12 +10,9 @@ from scipy.interpolate import make_lsq_spline
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
 from discover.statistics.noise.outliers import isolated
-from discover.words import percent_of
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
 MOST_SAMPLES = 20_000
-# a sweep with more is thinned: 40 a decade over ten decades, where instruments give 5 to 20
-MOST_FREQUENCIES = 400
 _FOLLOWED = 1e-3  # error of the strain, over its range, up to which samples kept follow the rate
 _FOLLOWED_RATE = 0.05  # error of the rate, over its largest, up to which straight lines follow it
 _CORNER = 0.01  # share of the largest rate, or stress, that was imposed
@@ -44,32 +41,10 @@ def thin(
     keep[_nearest(time, np.linspace(time[0], time[-1], half))] = True
     for values in (shear_stress, shear_rate):
         keep[[int(np.argmin(values)), int(np.argmax(values))]] = True
-    lost = _strain_error(time, shear_rate, keep)
-    note = (
-        f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half "
-        "evenly in time, and the extremes of stress and rate"
+    return keep, (
+        f"kept {int(keep.sum()):,} of {n:,} samples: half evenly in log time, half evenly in time, "
+        "and the extremes of stress and rate"
     )
-    if lost > _FOLLOWED:
-        note += (
-            f"; the strain between them is then off by {percent_of(lost)} of its range, so the "
-            "rate varies faster than the samples kept: give a shorter record"
-        )
-    return keep, note
-
-
-def thin_sweep(angular_frequency: Float[np.ndarray, " n"]) -> tuple[Bool[np.ndarray, " n"], str]:
-    """Return which frequencies to keep, evenly in log frequency, and a word on it if not all."""
-    n = len(angular_frequency)
-    if n <= MOST_FREQUENCIES:
-        return np.ones(n, dtype=bool), ""
-    position = np.log(angular_frequency)
-    keep = np.zeros(n, dtype=bool)
-    if position[-1] > position[0]:
-        even = np.linspace(position[0], position[-1], MOST_FREQUENCIES - 2)
-        keep[_nearest(position, even)] = True
-    keep[[0, -1]] = True
-    note = f"kept {int(keep.sum()):,} of {n:,} frequencies, evenly in log frequency"
-    return keep, note
 
 
 def evenly_chosen(n: int, most: int) -> Bool[np.ndarray, " n"]:
@@ -140,13 +115,6 @@ def followed_rate(
 def _nearest(time: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     return after - (wanted - time[after - 1] < time[after] - wanted)
-
-
-def _strain_error(time: np.ndarray, rate: np.ndarray, keep: np.ndarray) -> float:
-    """Return the largest error of the integrated rate at the samples kept, over its range."""
-    whole = cumulative_trapezoid(rate, time, initial=0.0)
-    part = cumulative_trapezoid(rate[keep], time[keep], initial=0.0)
-    return float(np.max(np.abs(part - whole[keep])) / max(np.ptp(whole), 1e-300))
 
 
 # The robust deviation; a sample minus the mean of two neighbours has variance 1 + 1/4 + 1/4

@@ -347,16 +347,12 @@ def _of_states(equation: Equation, notation: CodeNotation, by_name: bool) -> dic
         times += [f"({time})"] if time != "1" else []
     there = bool(names)
     return {
-        "state_constants": repr(constants),
-        "state_names": ", ".join(names),
-        "at_rest": repr(rest),
-        "state_rates": ", ".join(rates),
-        "on_modulus": " * ".join(moduli) or "1.0",
-        "on_time": " * ".join(times) or "1.0",
-        "structured": ", structure" if there else "",
+        "state_constants": repr(constants), "state_names": ", ".join(names), "at_rest": repr(rest),
+        "state_rates": ", ".join(rates), "on_modulus": " * ".join(moduli) or "1.0",
+        "on_time": " * ".join(times) or "1.0", "structured": ", structure" if there else "",
         "modulus_factor": "structure_factors(structure)[0] * " if there else "",
         "time_factor": "structure_factors(structure)[1] * " if there else "",
-    }
+    }  # fmt: skip
 
 
 def _constants(equation: Equation) -> str:

@@ -112,14 +112,11 @@ def equation_from_json(content: object, where: str = "the law") -> Equation:
             terms=tuple(LawTerm.from_json(term.model_dump()) for term in law.terms),
             modulus=tuple(mode.modulus_Pa for mode in law.modes),
             relaxation_time=tuple(mode.relaxation_time_s for mode in law.modes),
-            linear_relaxation=law.linear_relaxation,
-            solvent_viscosity=law.solvent_viscosity_Pa_s,
-            title=law.title,
-            notes=law.notes,
-            tested=None if tested is None else tested.read(),
+            linear_relaxation=law.linear_relaxation, solvent_viscosity=law.solvent_viscosity_Pa_s,
+            title=law.title, notes=law.notes, tested=None if tested is None else tested.read(),
             named=None if named is None else NamedPart(named.law, named.constants),
             states=tuple(StatePart(state.effect, state.parameters) for state in law.states),
-        )
+        )  # fmt: skip
     except ValueError as error:
         raise InputError(f"{where}: {error} {again}") from None
 

@@ -68,12 +68,9 @@ def _named(
     return summands, [
         *((rate.format(letters[name]), value) for name, value in rates),
         *((letters[name], value) for name, value in defined),
-        *(
-            (letters[n], notation.digits_of(v))
-            for n, v in fixed.items()
-            if n not in named.differing
-        ),
-    ]
+        *((letters[n], notation.digits_of(v))
+          for n, v in fixed.items() if n not in named.differing),
+    ]  # fmt: skip
 
 
 def _factor(term: LawTerm) -> float | None:

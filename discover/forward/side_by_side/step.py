@@ -24,8 +24,7 @@ from discover.forward.exponential_weights import (
     relax,
 )
 from discover.laws.each_mode import apart, of_each_mode
-from tensor_library.algebra import contracted, integrity_basis
-from tensor_library.kinematics import rate_of_deformation
+from tensor_library.algebra import contracted, integrity_basis, rate_of_deformation
 
 WEIGHTS = 10
 """Weights of a step of each mode: those of `KrogstadWeights` but for the last."""

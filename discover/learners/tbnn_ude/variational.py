@@ -26,8 +26,7 @@ from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwor
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
-from tensor_library.algebra import contracted
-from tensor_library.kinematics import VelocityGradient
+from tensor_library.algebra import VelocityGradient, contracted
 
 
 def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:

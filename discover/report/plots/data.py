@@ -7,7 +7,7 @@ from jaxtyping import Float
 from matplotlib.ticker import EngFormatter
 
 from discover.dataset.dataset import Dataset
-from discover.dataset.linear.linear_tests import CREEP, RELAXATION, SWEEP, predicted, spectrum_of
+from discover.dataset.linear.linear_tests import CREEP, RELAXATION, SWEEP
 from discover.dataset.linear.superposition import Superposition
 from discover.dataset.linear_viscoelasticity import LinearSweep, RelaxationSpectrum
 from discover.dataset.run import Run
@@ -307,7 +307,6 @@ def _functions_over_time(found: Superposition) -> Picture:
                 moved = found.moved(kind, degrees)
                 style = {**_SHIFTED_POINTS, "marker": marker, "color": colour}
                 panel.plot(moved.argument, moved.values[0], label=label, **style)
-            _predictions(found, kind, panel)
             panel.set(yscale="log", xlabel="t/a_T (s)", ylabel=symbol)
             make_logarithmic(panel.xaxis)
         if len(found.celsius) <= 10:
@@ -317,22 +316,7 @@ def _functions_over_time(found: Superposition) -> Picture:
             f"Tables over time as at {found.reference:g} °C, averages evenly spaced in log time, a "
             "mark for each temperature."
         )
-        if found.master(SWEEP) is not None:
-            caption += " The line is what the modes of the moved sweeps predict."
         return picture(drawing, "over_time", caption)
-
-
-def _predictions(found: Superposition, kind: str, panel) -> None:
-    """Draw what the modes of the moved sweeps say, over the times that they reach."""
-    master = found.master(SWEEP)
-    if master is None:
-        return
-    times = np.geomspace(1.0 / master.argument[-1], 1.0 / master.argument[0], 200)
-    measured = [found.moved(kind, degrees).argument for degrees, *_ in _marked(found, kind)]
-    ends = min(one[0] for one in measured), max(one[-1] for one in measured)
-    times = times[(times >= ends[0]) & (times <= ends[1])]
-    values = predicted(spectrum_of(master), kind, times)[0]
-    panel.plot(times, values, color=BEFORE, lw=1.2, label="from the sweeps")
 
 
 def _shifts(found: Superposition) -> Picture:

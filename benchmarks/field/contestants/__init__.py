@@ -1,1 +1,0 @@
-"""One file a contestant, registered by being here: see `docs/evidence.md`."""
