@@ -2,6 +2,20 @@
 
 Traces, squares and anticommutators keep tensors symmetric; laws written with them work on both, and
 on four components they compile to far less than matrix products.
+
+Examples
+--------
+>>> first, second = jnp.array([2.0, 0.0, 0.0, 0.0]), jnp.array([0.0, 0.0, 0.0, 3.0])
+>>> identity_like(first).tolist(), anticommutator(first, second).tolist()  # 11, 22, 33, 12
+([1.0, 1.0, 1.0, 0.0], [0.0, 0.0, 0.0, 6.0])
+>>> float(trace(square(first))), float(inner(second, second))
+(4.0, 18.0)
+>>> to_shear(from_shear(second)).tolist(), simple_shear(jnp.asarray(2.0))[0].tolist()
+([0.0, 0.0, 0.0, 3.0], [0.0, 2.0, 0.0])
+>>> [jnp.diag(flow(jnp.asarray(2.0))).tolist() for flow in (uniaxial_extension, planar_extension)]
+[[2.0, -1.0, -1.0], [2.0, -2.0, 0.0]]
+>>> rate_of_deformation(jnp.asarray(2.0)).tolist()  # of simple shear
+[0.0, 0.0, 0.0, 2.0]
 """
 
 import jax.numpy as jnp

@@ -127,6 +127,11 @@ class ClosedForm:
         Number of operations, for model selection; literature.
     expression
         `function` of SymPy symbols; None for a built-in form.
+
+    Examples
+    --------
+    >>> CLOSED_FORMS["exp"].spelling
+    '(exp(epsilon*tr(sigma))-1)'
     """
 
     name: str
@@ -172,6 +177,10 @@ def register_closed_form(form: ClosedForm) -> ClosedForm:
     An installed package does so in every process: see docs/adding-a-term.md. Raises ValueError if
     a name or spelling is taken or none, the default is out of bounds, the form does not vanish at
     zero stress, or `function` and `expression` differ.
+
+    Examples
+    --------
+    >>> register_closed_form(form)  # doctest: +SKIP
     """
     known = CLOSED_FORMS.present
     for what, text in (("name", form.name), ("inner_name", form.inner_name)):

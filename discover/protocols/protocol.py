@@ -181,7 +181,8 @@ def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) ->
     Examples
     --------
     >>> import discover as dc
-    >>> float(dc.oscillatory_shear(2.0, 0.5).rate(0.0))
+    >>> import jax.numpy as jnp
+    >>> float(dc.oscillatory_shear(2.0, 0.5).rate(jnp.asarray(0.0)))
     2.0
     """
     _checked("amplitude, frequency and phase", [amplitude, frequency, phase])
@@ -228,7 +229,8 @@ def measured_rate(
     Examples
     --------
     >>> import discover as dc
-    >>> float(dc.measured_rate([0.0, 1.0], [0.0, 3.0]).rate(0.5))
+    >>> import jax.numpy as jnp
+    >>> float(dc.measured_rate([0.0, 1.0], [0.0, 3.0]).rate(jnp.asarray(0.5)))
     1.5
     """
     return _protocol(*_pair("measured_rate", times, rates))

@@ -47,6 +47,10 @@ def check_folder(
     ----------
     folder, clock_factor, base
         As in `discover.dataset.load.load_dataset`.
+
+    Examples
+    --------
+    >>> check_folder("melt")  # doctest: +SKIP
     """
     findings: list[Finding] = []
     place = "folder", ""

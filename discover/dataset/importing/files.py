@@ -170,6 +170,10 @@ def register_importer(
         by which such files are known.
     read
         Takes the path of a file and returns its blocks, made with `Block.of`.
+
+    Examples
+    --------
+    >>> register_importer("house_rheometer", read, suffixes=[".npz"])  # doctest: +SKIP
     """
     require_new_name(name, [TEXT, *IMPORTERS.present], "importer")
     endings = tuple(str(suffix).lower() for suffix in suffixes)
