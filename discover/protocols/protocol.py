@@ -166,8 +166,9 @@ def require_flow(protocol: object, name: str) -> None:
 
 
 def _protocol(times, rates, amplitudes=(0.0,), frequencies=(0.0,), phases=(0.0,)) -> FlowProtocol:
-    parts = times, rates, amplitudes, frequencies, phases
-    return FlowProtocol(*(on_device(np.asarray(part, float)) for part in parts))
+    table, waves = (times, rates), (amplitudes, frequencies, phases)
+    t, r, a, f, p = (on_device(np.asarray(part, float)) for part in (*table, *waves))
+    return FlowProtocol(t, r, a, f, p)
 
 
 def oscillatory_shear(amplitude: float, frequency: float, phase: float = 0.0) -> FlowProtocol:

@@ -163,12 +163,14 @@ def lock_folder(folder: str | Path) -> FolderLock:
 
 
 def _take(descriptor: int) -> bool:
+    if fcntl is None:
+        return True
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         return False
-    except (OSError, AttributeError):
-        pass  # a file system without locks, or Windows
+    except OSError:
+        pass  # a file system without locks
     return True
 
 
