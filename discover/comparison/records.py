@@ -108,6 +108,7 @@ _FOLLOWED = 1e-4
 """Error of a felt rate, over its largest, up to which its table leaves points out."""
 
 _POINTWISE = 1e-9
+_NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
 _FEWEST_ENTRIES = 64
 
 
@@ -166,6 +167,7 @@ def corrected(
             )
     found, made = {}, {}
     moves = any(isinstance(known.effect, KinematicEffect) for known in effects)
+    force = _gain_of_force(effects)
     for i, run in enumerate(runs):
         if run.flow != "shear":
             found[run.name] = run
@@ -178,7 +180,10 @@ def corrected(
                 f"With the known effects nothing would be recorded of the stress of {run.name}. "
                 "Check their values in [model] effects."
             )
-        changed = replace(run, stress=one.undone(run.stress))
+        normal = {
+            name: values / force for name in _NORMAL if (values := getattr(run, name)) is not None
+        }
+        changed = replace(run, stress=one.undone(run.stress), **normal)
         if run.quantity == "sigma12":  # what distorts the torque leaves the normal force alone
             made[run.name] = one
         if moves:
@@ -196,6 +201,16 @@ def corrected(
     dataset = replace(data.dataset, runs=tuple(found[run.name] for run in runs))
     fit, held_out = dataset.select(data.fit.names), dataset.select(data.held_out.names)
     return StudyData(dataset, fit, held_out, data.each), made
+
+
+def _gain_of_force(effects: Sequence[KnownEffect]) -> float:
+    """Return by what normal stress differences are multiplied in their records."""
+    factor = jnp.ones(1)
+    for known in effects:
+        if isinstance(known.effect, SignalEffect) and known.effect.of_force:
+            record = Record(jnp.zeros(1), jnp.zeros(1), factor, jnp.ones(()))
+            factor = known.effect.recorded_stress(jnp.asarray(known.values, dtype=float), record)
+    return float(factor[0])
 
 
 @lru_cache(maxsize=16)
@@ -224,7 +239,7 @@ def _instrument(effects: tuple[AbstractEffect, ...]) -> Any:
         # a stress that changes its sign from step to step shows any memory
         probe = jnp.where(jnp.arange(times.size) % 2 == 0, 1.0, -0.5)
         for effect, own in pairs:
-            if not isinstance(effect, SignalEffect):
+            if not isinstance(effect, SignalEffect) or effect.of_force:
                 missed.append(jnp.zeros(()))
                 continue
 

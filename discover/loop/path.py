@@ -34,7 +34,9 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     if held_out:
         fitted, fitter = fitter.errors.of_runs, Fitter(problem, rows)
         ahead = np.zeros(len(fitter.errors))
-        ahead[0], ahead[fitter.errors.of_runs.stop :] = linear[0], linear[fitted.stop :]
+        of_transducers = fitter.errors.of_transducers
+        ahead[of_transducers] = linear[of_transducers]
+        ahead[fitter.errors.of_runs.stop :] = linear[fitted.stop :]
         linear = ahead
     own, flat = fitter.start(fit.names, fit.theta), rows.flat(found[None])
     own.shifts = fitter.shifts_at(fit.theta)

@@ -12,6 +12,7 @@ from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
     KnownEffect,
+    SignalEffect,
     library_effects,
     make_effect,
     named_effects,
@@ -263,17 +264,20 @@ def admission(fitted: Sequence[Run], held: Sequence[Run]) -> Callable[[AbstractE
     """Return which effects are candidates, given the rates.
 
     Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
-    command is none where the rate was measured. Rates are set, or measured, apart from the stress,
-    so this looks at no held-out stress.
+    command is none where the rate was measured; what reads a force is none where no N1 or N2 is
+    fitted. Rates are set, or measured, apart from the stress, so this looks at no held-out stress.
     """
     measured = any(run.rate_is_measured for run in fitted)
     fastest = max(float(np.max(np.abs(run.rate))) for run in fitted)
     asked = max((float(np.max(np.abs(run.rate))) for run in held), default=0.0)
     far = asked > EXTRAPOLATION * fastest
+    of_force = any(run.quantity in ("N1", "N2") for run in fitted)
 
     def admitted(effect: AbstractEffect) -> bool:
         if isinstance(effect, KinematicEffect):
             return not (measured and effect.shapes_command)
+        if isinstance(effect, SignalEffect):
+            return of_force or not effect.of_force
         return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
 
     return admitted
