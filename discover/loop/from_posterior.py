@@ -13,17 +13,16 @@ from scipy.stats import chi2
 
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
-from discover.inference.by_mode.constants import (
+from discover.inference.engine.design import NextTests, design
+from discover.inference.engine.left_out import FEWEST_RUNS
+from discover.inference.engine.problem import NUISANCES
+from discover.inference.engine.rows import TORQUE, Rows
+from discover.loop.constants import (
     ConstantByMode,
     ModeConstant,
     StageParameter,
     end_of_range,
 )
-from discover.inference.engine.design import NextTests, design
-from discover.inference.engine.left_out import FEWEST_RUNS
-from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import TORQUE, Rows
-from discover.inference.step_instants import instants_found
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.final_model import (
     Bounds,
@@ -38,6 +37,7 @@ from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
+from discover.loop.step_instants import instants_found
 from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
 from discover.words import p_value, percent_of
 

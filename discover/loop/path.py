@@ -9,8 +9,7 @@ from jaxtyping import Float
 from scipy.special import logsumexp
 
 from discover.effects import AbstractEffect
-from discover.inference.engine import Explanation as Told
-from discover.inference.engine import Posterior
+from discover.inference.engine import Indistinguishable, Posterior
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_functions import FreeForm
@@ -190,7 +189,7 @@ class Path:
         return np.stack(ends)
 
     @cached_property
-    def _listed(self) -> tuple[Told, ...]:
+    def _listed(self) -> tuple[Indistinguishable, ...]:
         first, *others = self.posterior.explanations[: self.most] or (None,)
         if first is None:
             return ()
@@ -221,7 +220,7 @@ class Path:
             _largest_first(kinds),
         )
 
-    def _shares(self, one: Told) -> Float[np.ndarray, " members"]:
+    def _shares(self, one: Indistinguishable) -> Float[np.ndarray, " members"]:
         """Return the probability of each member of an explanation."""
         judged, *_ = self.posterior.memory["whole"]
         ranks = np.array([judged.rank(judged.found[frozenset(names)]) for names in one.members])

@@ -23,14 +23,14 @@ from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem, explain
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.search import Search
-from discover.inference.scattered_rates import smoothed, unfelt_scatter
-from discover.inference.step_instants import with_places
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
 from discover.loop.run_record import errors_of
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.scattered_rates import smoothed, unfelt_scatter
+from discover.loop.step_instants import with_places
 from discover.words import unknown_name
 
 Say = Callable[[str], None]
