@@ -21,6 +21,7 @@ from discover.effects import (
     SignalEffect,
     StateEffect,
 )
+from discover.effects.signal import NORMAL_FORCE_GAIN
 from discover.errors import InputError
 from discover.forward import TransientFlows
 from discover.forward.flows import transients
@@ -167,7 +168,8 @@ def corrected(
             )
     found, made = {}, {}
     moves = any(isinstance(known.effect, KinematicEffect) for known in effects)
-    force = _gain_of_force(effects)
+    of_force = [k.values[0] or 0.0 for k in effects if k.effect.name == NORMAL_FORCE_GAIN.name]
+    force = 1.0 + sum(of_force)
     for i, run in enumerate(runs):
         if run.flow != "shear":
             found[run.name] = run
@@ -201,16 +203,6 @@ def corrected(
     dataset = replace(data.dataset, runs=tuple(found[run.name] for run in runs))
     fit, held_out = dataset.select(data.fit.names), dataset.select(data.held_out.names)
     return StudyData(dataset, fit, held_out, data.each), made
-
-
-def _gain_of_force(effects: Sequence[KnownEffect]) -> float:
-    """Return by what normal stress differences are multiplied in their records."""
-    factor = jnp.ones(1)
-    for known in effects:
-        if isinstance(known.effect, SignalEffect) and known.effect.of_force:
-            record = Record(jnp.zeros(1), jnp.zeros(1), factor, jnp.ones(()))
-            factor = known.effect.recorded_stress(jnp.asarray(known.values, dtype=float), record)
-    return float(factor[0])
 
 
 @lru_cache(maxsize=16)
