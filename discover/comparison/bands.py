@@ -14,6 +14,7 @@ from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fit import Fit
 from discover.inference.engine.left_out import MOST_MISSED, of_the_next_run
 from discover.inference.engine.problem import NUISANCES
+from discover.inference.engine.rows import transducer_of
 from discover.linear_algebra_threads import in_one_thread
 from discover.loop.expected_errors import misfit, weighed_laws
 from discover.loop.loop import Found
@@ -138,14 +139,14 @@ def _bands(
 ) -> list[Band | None]:
     problem = found.posterior.problem
     batch = make_batch(runs)
-    drawn = [_drawn(found, part.fit, as_recorded) for part in parts]
+    drawn = [_drawn(found, part.fit, runs, as_recorded) for part in parts]
     thetas = np.concatenate([one[0] for one in drawn])
     moduli = np.concatenate([one[1] for one in drawn])
     gains = np.concatenate([one[2] for one in drawn])
     with np.errstate(all="ignore"):
         predicted = np.array(problem.model.observables(thetas, batch, moduli))
         plain = np.array(problem.model.observables([problem.zero], batch))[0]
-    predicted[..., 0] *= gains[:, None, None]
+    predicted[..., 0] *= gains[..., None]
     largest = float(np.max(np.abs(problem.fitted.recorded)))
     each, bands = 1 + 2 * _DRAWS, []
     for i, run in enumerate(runs):
@@ -157,15 +158,20 @@ def _bands(
     return bands
 
 
-def _drawn(found: Found, fit: Fit, as_recorded: bool):
-    """Return constants, moduli and gains of a hypothesis: the likeliest, then pairs of draws."""
+def _drawn(found: Found, fit: Fit, runs: Sequence[Run], as_recorded: bool):
+    """Return constants, moduli and gains of a hypothesis: the likeliest, then pairs of draws.
+
+    A transducer that no fitted run was read by has the gain of the first.
+    """
     problem = found.posterior.problem
     assert fit.covariance is not None
     lot = np.random.default_rng(_SEED).standard_normal((_DRAWS, len(fit.covariance)))
     normal = np.concatenate([np.zeros((1, lot.shape[1])), lot, -lot])
     thetas = fit.drawn(normal)
     linear = fit.linear + normal @ np.linalg.cholesky(fit.covariance)[len(fit.priors) :].T
-    gains = 1.0 + linear[:, 0] if as_recorded else np.ones(len(normal))
+    known = problem.transducers
+    read_by = [known.index(one) if (one := transducer_of(run)) in known else 0 for run in runs]
+    gains = 1.0 + as_recorded * linear[:, read_by]
     moduli = np.tile(problem.moduli, (len(normal), 1))
     if problem.modulus_root is not None:
         of_runs = found.posterior.search.fitter.errors.of_runs

@@ -21,6 +21,7 @@ from discover.effects import (
     SignalEffect,
     StateEffect,
 )
+from discover.effects.signal import NORMAL_FORCE_GAIN
 from discover.errors import InputError
 from discover.forward import TransientFlows
 from discover.forward.flows import transients
@@ -108,6 +109,7 @@ _FOLLOWED = 1e-4
 """Error of a felt rate, over its largest, up to which its table leaves points out."""
 
 _POINTWISE = 1e-9
+_NORMAL = ("first_normal_stress_difference", "second_normal_stress_difference")
 _FEWEST_ENTRIES = 64
 
 
@@ -166,6 +168,8 @@ def corrected(
             )
     found, made = {}, {}
     moves = any(isinstance(known.effect, KinematicEffect) for known in effects)
+    of_force = [k.values[0] or 0.0 for k in effects if k.effect.name == NORMAL_FORCE_GAIN.name]
+    force = 1.0 + sum(of_force)
     for i, run in enumerate(runs):
         if run.flow != "shear":
             found[run.name] = run
@@ -178,7 +182,10 @@ def corrected(
                 f"With the known effects nothing would be recorded of the stress of {run.name}. "
                 "Check their values in [model] effects."
             )
-        changed = replace(run, stress=one.undone(run.stress))
+        normal = {
+            name: values / force for name in _NORMAL if (values := getattr(run, name)) is not None
+        }
+        changed = replace(run, stress=one.undone(run.stress), **normal)
         if run.quantity == "sigma12":  # what distorts the torque leaves the normal force alone
             made[run.name] = one
         if moves:
@@ -224,7 +231,7 @@ def _instrument(effects: tuple[AbstractEffect, ...]) -> Any:
         # a stress that changes its sign from step to step shows any memory
         probe = jnp.where(jnp.arange(times.size) % 2 == 0, 1.0, -0.5)
         for effect, own in pairs:
-            if not isinstance(effect, SignalEffect):
+            if not isinstance(effect, SignalEffect) or effect.of_force:
                 missed.append(jnp.zeros(()))
                 continue
 

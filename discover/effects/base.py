@@ -276,9 +276,13 @@ class SeriesElement(KinematicEffect):
 
 
 class SignalEffect(AbstractEffect):
-    """Changes what was recorded of the stress."""
+    """Changes what was recorded of the stress.
+
+    `of_force`: whether of a normal or tensile stress, which a force tells, and else of a torque.
+    """
 
     kind: ClassVar[Kind] = "signal"
+    of_force: ClassVar[bool] = False
 
     @abstractmethod
     def recorded_stress(self, values: Float[Array, " p"], record: Record) -> Float[Array, " n"]:

@@ -168,6 +168,29 @@ STRESS_GAIN = StressGain(
 )  # fmt: skip
 
 
+class NormalForceGain(StressGain):
+    """The normal or tensile stress recorded is (1 + g_N) times the true one, the torque is not."""
+
+    of_force = True
+
+
+NORMAL_FORCE_GAIN = NormalForceGain(
+    name="normal_force_gain",
+    parameters=(
+        EffectParameter(
+            "gain_error", r"g_\mathrm{N}", low=-0.8, high=4.0, first_trial=0.01,
+            range_source="a factor of five either way: N1 goes as 1/R², and 25 mm entered for "
+            "plates of 40 mm gives a factor of 2.6 (Macosko 1994, ch. 5)",
+        ),
+    ),
+    equation=r"N_{1,\mathrm{rec}} = (1 + g_\mathrm{N})\,N_1",
+    source="Macosko 1994, Rheology, ch. 8: a transducer of normal force is one of its own, softer "
+    "than that of the torque",
+    check="Calibrate the normal force with a dead weight.",
+    visible="g_N of about 0.05.",
+)  # fmt: skip
+
+
 class StressOffset(SignalEffect):
     """A constant is added to the stress recorded."""
 

@@ -60,6 +60,7 @@ class Program:
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
+        self._of_torque = [effect for effect in self._signal if not effect.of_force]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self._made_from = (structure, build)
@@ -213,7 +214,7 @@ class Program:
     def _recorded_modulus(self, theta, present, found, rate, nominal, frequency):
         """Return G′ and G″ as they are recorded, of those of the fluid at a rate that it feels."""
         found = found * rate / nominal
-        for effect in self._signal:
+        for effect in self._of_torque:
 
             def distorted(found, effect=effect):
                 return self._modulus_as_recorded(theta, effect, found, nominal, frequency)
@@ -275,7 +276,7 @@ class Program:
         """Return the true stress of a run at a given one in Pa, and the tool's inertia in Pa s²."""
         flow, imposed, inertia = run.kinematics, run.imposed, jnp.zeros(())
         still = jnp.zeros_like(imposed)
-        for effect in reversed(self._signal):
+        for effect in reversed(self._of_torque):
             values = self.fluid.values(theta, effect)
             inertia = inertia + effect.inertia(values) * run.clock_factor**2
             if effect.acts_on_steady_states:
@@ -300,9 +301,10 @@ class Program:
         return imposed, inertia, strain
 
     def _as_recorded(self, theta, effect: SignalEffect, record: Record, flow: Kinematics | None):
-        """Return the stress after an effect of the torque's signal, where that is recorded."""
+        """Return the stress after an effect on the signal of torque or force, where it is that."""
         changed = effect.recorded_stress(self.fluid.values(theta, effect), record)
-        return changed if flow is None else jnp.where(flow.records_torque, changed, record.stress)
+        of_torque = True if flow is None else flow.records_torque
+        return jnp.where(of_torque != effect.of_force, changed, record.stress)
 
 
 program_of = lru_cache(maxsize=16)(Program)

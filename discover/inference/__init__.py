@@ -1,1 +1,1 @@
-"""What fits of a forward model are worth: one criterion, for a loop and for a comparison."""
+"""Hypotheses weighed by one criterion, for a loop and for a comparison."""

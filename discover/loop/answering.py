@@ -12,7 +12,6 @@ from discover.answer import (
     Constant,
     ExpectedError,
     Mode,
-    Range,
     Suspect,
     sentences,
 )
@@ -22,11 +21,9 @@ from discover.answer.simple_material import SimpleMaterial
 from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
-from discover.equations.equation import flow_numbers
 from discover.equations.formats.rheotool import DENSITY
 from discover.equations.parts import AugmentedLaw
 from discover.errors import InputError
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
 from discover.loop.by_quantity import (
     errors_by_quantity,
@@ -35,8 +32,9 @@ from discover.loop.by_quantity import (
     of_stress,
     with_unseen,
 )
+from discover.loop.constants import ConstantByMode, StageParameter
+from discover.loop.fitted_range import range_of
 from discover.loop.parts import STRUCTURES, Stage
-from discover.loop.run_record import RunRecord
 from discover.loop.sentences import EXPLAINED, suspected, untested_by, what_to_measure_next
 from discover.words import (
     effect_title,
@@ -52,15 +50,6 @@ _MOST_ADDED = 2
 
 _SETTLED = 0.95
 """Probability from which on nothing is said of other laws."""
-
-_TURNS = 0.5
-"""Share of the largest rate that a flow reaches in the other direction, if it oscillates."""
-
-_STAYS = 0.05
-"""Share of the time of a run for which it is at most as slow as the slowest rate of its range."""
-
-_AT_REST = 1e-3
-"""Share of the largest rate up to which a sheared fluid is taken to be at rest, as after a stop."""
 
 _TO_NOISE = 1.5
 """Misfit over the change from sample to sample up to which a simple material leaves only noise."""
@@ -356,54 +345,3 @@ def _renamed(
         else one
         for one in constants
     ]
-
-
-def range_of(records: Sequence[RunRecord], equation: Equation | None = None) -> Range:
-    """Return the flows of the fitted runs, in numbers without units if the equation has them.
-
-    Of a flow curve each sample counts, of an oscillation the amplitude, of other runs the largest
-    rate and the smallest at which the run stays.
-    """
-    fitted = [record for record in records if not record.held_out]
-    flows = tuple(dict.fromkeys(record.flow for record in fitted)) or ("shear",)
-    strains = [float(np.nanmax(np.abs(r.strain))) for r in fitted if np.any(np.isfinite(r.strain))]
-    strain = (0.0, max(strains)) if strains else None
-    if fitted and all(record.control == "oscillation" for record in fitted):
-        frequencies = np.concatenate([record.rate / record.strain for record in fitted])
-        ends = float(np.min(frequencies)), float(np.max(frequencies))
-        return Range(None, None, strain, None, ends, flows)
-    turned = [r for r in fitted if _turns(r)]
-    rates = [rate for r in fitted for rate in _rates_of(r) if rate > 0.0]
-    box = None if equation is None or equation.tested is None else equation.tested.learned_in
-    # one that turns has a frequency besides its rate
-    found = [flow_numbers(r.time, r.rate, 1.0)[1] for r in turned]
-    return Range(
-        None if box is None else box.weissenberg,
-        None if box is None else box.deborah,
-        strain,
-        (min(rates), max(rates)) if rates else None,
-        (min(found), max(found)) if found else None,
-        flows,
-        bool(turned),
-    )
-
-
-def _turns(record: RunRecord) -> bool:
-    return record.is_transient and bool(np.min(record.rate) < -_TURNS * record.fastest)
-
-
-def _rates_of(record: RunRecord) -> list[float]:
-    """Return the slowest rate at which a run stays and its fastest; of states each."""
-    if record.control == "oscillation":
-        return []
-    if _turns(record):
-        return [record.fastest]
-    rates = np.abs(record.rate)
-    if not record.is_transient:
-        return [float(rate) for rate in rates]
-    lasting = np.gradient(record.time) if len(rates) > 1 else np.ones(1)
-    moving = np.flatnonzero(rates > _AT_REST * record.fastest)
-    order = moving[np.argsort(rates[moving])]
-    passed = np.cumsum(lasting[order])
-    slowest = order[np.searchsorted(passed, _STAYS * passed[-1])] if len(order) else 0
-    return [float(rates[slowest]), record.fastest]

@@ -9,9 +9,9 @@ from discover.effects import ConstitutiveEffect, ModeEffect, StateEffect
 from discover.equations import AugmentedLaw, Equation, StatePart, law_parts_by_mode
 from discover.errors import InputError
 from discover.forward import MODULUS, RELAXATION_TIME, AugmentedModel, DeclaredModel
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter, end_of_range
 from discover.laws import Fluid
 from discover.laws.each_mode import with_modes
+from discover.loop.constants import ConstantByMode, StageParameter, end_of_range
 from discover.loop.parts import DeclaredEffect, KnownParameter
 from discover.programs import on_device
 

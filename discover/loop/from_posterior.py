@@ -13,17 +13,16 @@ from scipy.stats import chi2
 
 from discover.effects.letters import spelled_apart
 from discover.forward.declared import DEGREE, constants_of_modes
-from discover.inference.by_mode.constants import (
+from discover.inference.engine.design import NextTests, design
+from discover.inference.engine.left_out import FEWEST_RUNS
+from discover.inference.engine.problem import NUISANCES
+from discover.inference.engine.rows import TORQUE, Rows
+from discover.loop.constants import (
     ConstantByMode,
     ModeConstant,
     StageParameter,
     end_of_range,
 )
-from discover.inference.engine.design import NextTests, design
-from discover.inference.engine.left_out import FEWEST_RUNS
-from discover.inference.engine.problem import NUISANCES
-from discover.inference.engine.rows import Rows
-from discover.inference.step_instants import instants_found
 from discover.loop.expected_errors import spread_of_laws
 from discover.loop.final_model import (
     Bounds,
@@ -38,6 +37,7 @@ from discover.loop.parts import CandidateScore, LawFit, Stage
 from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
+from discover.loop.step_instants import instants_found
 from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
 from discover.words import p_value, percent_of
 
@@ -273,7 +273,8 @@ class Ended(Path):
     def _bench(self) -> dict[str, float]:
         """Return by how much a sound bench is off here, as fitted jointly: its nuisances."""
         problem, fit = self.posterior.problem, self.fit
-        found = {"stress_gain": float(fit.linear[0])}
+        names = ["stress" if one == TORQUE else one for one in problem.transducers]
+        found = {f"{name}_gain": float(g) for name, g in zip(names, fit.linear, strict=False)}
         if 1 not in problem.declared.free_positions:
             found["clock"] = float(fit.theta[1])
         for nuisance in NUISANCES:
@@ -287,7 +288,8 @@ class Ended(Path):
         problem, fit = self.posterior.problem, self.fit
         if not problem.loads_anew:
             return {}
-        runs, first = problem.fitted.runs, 1 + 2 * len(problem.fitted.runs)
+        runs = problem.fitted.runs
+        first = self.posterior.search.fitter.errors.of_runs.stop - len(runs)
         assert fit.covariance is not None
         spread = np.sqrt(np.diag(fit.covariance))[len(fit.priors) :]
         found = {}

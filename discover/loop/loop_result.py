@@ -23,11 +23,11 @@ from discover.equations import (
 from discover.equations.equation import box_of, flow_numbers, mean_relaxation_time
 from discover.equations.parts import LawParts
 from discover.errors import InputError
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.inference.engine.design import NextTests
 from discover.inference.engine.free_functions import FreeForm
 from discover.laws import Fluid
 from discover.loop.answering import loop_answer
+from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.expected_errors import Spread
 from discover.loop.parts import (
     CandidateScore,

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Literal
 
 from discover.equations import Equation, equation_to_json
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws import LAWS
+from discover.loop.constants import ConstantByMode, StageParameter
 
 STRUCTURES = (
     "thixotropy",

@@ -9,8 +9,7 @@ from jaxtyping import Float
 from scipy.special import logsumexp
 
 from discover.effects import AbstractEffect
-from discover.inference.engine import Explanation as Told
-from discover.inference.engine import Posterior
+from discover.inference.engine import Indistinguishable, Posterior
 from discover.inference.engine.bands import quantiles
 from discover.inference.engine.fits import Fit, Fitter
 from discover.inference.engine.free_functions import FreeForm
@@ -34,7 +33,9 @@ def predicted(search: Search, fit: Fit, rows: Rows, held_out: bool) -> Float[np.
     if held_out:
         fitted, fitter = fitter.errors.of_runs, Fitter(problem, rows)
         ahead = np.zeros(len(fitter.errors))
-        ahead[0], ahead[fitter.errors.of_runs.stop :] = linear[0], linear[fitted.stop :]
+        of_transducers = fitter.errors.of_transducers
+        ahead[of_transducers] = linear[of_transducers]
+        ahead[fitter.errors.of_runs.stop :] = linear[fitted.stop :]
         linear = ahead
     own, flat = fitter.start(fit.names, fit.theta), rows.flat(found[None])
     own.shifts = fitter.shifts_at(fit.theta)
@@ -188,7 +189,7 @@ class Path:
         return np.stack(ends)
 
     @cached_property
-    def _listed(self) -> tuple[Told, ...]:
+    def _listed(self) -> tuple[Indistinguishable, ...]:
         first, *others = self.posterior.explanations[: self.most] or (None,)
         if first is None:
             return ()
@@ -219,7 +220,7 @@ class Path:
             _largest_first(kinds),
         )
 
-    def _shares(self, one: Told) -> Float[np.ndarray, " members"]:
+    def _shares(self, one: Indistinguishable) -> Float[np.ndarray, " members"]:
         """Return the probability of each member of an explanation."""
         judged, *_ = self.posterior.memory["whole"]
         ranks = np.array([judged.rank(judged.found[frozenset(names)]) for names in one.members])

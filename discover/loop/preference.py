@@ -17,7 +17,6 @@ from discover.answer.naming import named_law
 from discover.equations import Equation
 from discover.equations.parts import StatePart
 from discover.errors import InputError
-from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine import Posterior
 from discover.inference.engine.discrepancy import Discrepancy
 from discover.inference.engine.fit import Fit
@@ -25,6 +24,7 @@ from discover.inference.engine.left_out import FEWEST_RUNS, left_out, weights_of
 from discover.inference.engine.posterior import smallest
 from discover.laws import Fluid
 from discover.linear_algebra_threads import in_one_thread
+from discover.loop.constants import StageParameter
 from discover.loop.final_model import augmented_fluid, states_of
 from discover.loop.parts import STRUCTURES, NearestLaw
 from discover.statistics.noise.noise_model import rms

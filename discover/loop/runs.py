@@ -1,4 +1,4 @@
-"""Runs that a closed loop fits, and those that judge it: without spikes, cut and thinned."""
+"""Runs that a closed loop fits, and those that judge it: each value once, cut and thinned."""
 
 from collections.abc import Iterator, Sequence
 from typing import Literal
@@ -8,10 +8,10 @@ from jaxtyping import Float
 
 from discover.dataset import Dataset, Run
 from discover.dataset.records.repeats import count_flows, require_no_copies
-from discover.dataset.records.thinning import thin_run, without_spikes
+from discover.dataset.records.thinning import thin_run, without_held_values, without_spikes
 from discover.errors import InputError
 from discover.forward import DeclaredModel
-from discover.inference.step_instants import with_rate_steps
+from discover.loop.step_instants import with_rate_steps
 from discover.protocols import strains
 from discover.protocols.kinematics import STATES
 from discover.statistics.noise.noise_model import rms
@@ -64,7 +64,10 @@ def split_runs(
         [
             thin_run(run, _needed(run, most))
             for run in _without_spikes(
-                cut_to_strain([*map(with_rate_steps, part.runs)], strain), spikes
+                cut_to_strain(
+                    [without_held_values(with_rate_steps(run)) for run in part.runs], strain
+                ),
+                spikes,
             )
         ]
         for part in (fitted, held)

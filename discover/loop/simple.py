@@ -7,8 +7,8 @@ import numpy as np
 from discover.answer.simple_material import SimpleMaterial, material_of, recognise
 from discover.dataset import Run
 from discover.forward import AugmentedModel, data_scales, make_batch
-from discover.inference.by_mode.constants import StageParameter
 from discover.inference.engine.inelastic import Inelastic
+from discover.loop.constants import StageParameter
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import Explanation, Explanations, Stage
 from discover.loop.run_record import RunRecord, errors_of, record_runs

@@ -12,6 +12,7 @@ from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
     KnownEffect,
+    SignalEffect,
     library_effects,
     make_effect,
     named_effects,
@@ -22,14 +23,14 @@ from discover.forward.declared import may_differ_by_mode
 from discover.inference.engine import Posterior, Problem, explain
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.search import Search
-from discover.inference.scattered_rates import smoothed, unfelt_scatter
-from discover.inference.step_instants import with_places
 from discover.laws import LAWS
 from discover.laws.registry import starting_values
 from discover.loop.parts import LawFit
 from discover.loop.path import records_of
 from discover.loop.run_record import errors_of
 from discover.loop.runs import MOST_SAMPLES, require_samples, split_runs
+from discover.loop.scattered_rates import smoothed, unfelt_scatter
+from discover.loop.step_instants import with_places
 from discover.words import unknown_name
 
 Say = Callable[[str], None]
@@ -263,17 +264,20 @@ def admission(fitted: Sequence[Run], held: Sequence[Run]) -> Callable[[AbstractE
     """Return which effects are candidates, given the rates.
 
     Terms that name the rate are none where the loop must extrapolate far in it; what shapes a
-    command is none where the rate was measured. Rates are set, or measured, apart from the stress,
-    so this looks at no held-out stress.
+    command is none where the rate was measured; what reads a force is none where no N1 or N2 is
+    fitted. Rates are set, or measured, apart from the stress, so this looks at no held-out stress.
     """
     measured = any(run.rate_is_measured for run in fitted)
     fastest = max(float(np.max(np.abs(run.rate))) for run in fitted)
     asked = max((float(np.max(np.abs(run.rate))) for run in held), default=0.0)
     far = asked > EXTRAPOLATION * fastest
+    of_force = any(run.quantity in ("N1", "N2") for run in fitted)
 
     def admitted(effect: AbstractEffect) -> bool:
         if isinstance(effect, KinematicEffect):
             return not (measured and effect.shapes_command)
+        if isinstance(effect, SignalEffect):
+            return of_force or not effect.of_force
         return not (far and isinstance(effect, ConstitutiveEffect) and effect.explicit_rate)
 
     return admitted

@@ -22,9 +22,9 @@ from discover.equations import (
 )
 from discover.equations import Tested as Where
 from discover.equations.files import read_result_laws
-from discover.inference.by_mode.constants import ConstantByMode, ModeConstant
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import ErrorPair, LoopResult, RunRecord, Stage, StageParameter
+from discover.loop.constants import ConstantByMode, ModeConstant
 from discover.loop.parts import DeclaredEffect, NearestLaw
 from tensor_library import LawTerm
 

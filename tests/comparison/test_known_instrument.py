@@ -217,3 +217,19 @@ def test_python_says_what_is_wrong_before_anything_is_fitted(weak, options, word
     with pytest.raises(InputError) as caught:
         compare_in_memory(weak, **options)
     assert words in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["normal_force_gain", "stress_gain"])
+def test_a_gain_is_taken_out_of_what_its_transducer_read(name):
+    times = np.linspace(0.1, 4.0, 20)
+    normal, ones = np.full(20, 1.15), np.ones(20)
+    run = Run("a", times, commanded_start_up(1.0), ones, 1.15 * ones, normal)
+    data = Dataset("one", (run,))
+    known = known_effects({name: {"gain_error": 0.15}})
+    (found,) = corrected(divided(data), known)[0].dataset.runs
+    of_force = name == "normal_force_gain"
+    # rounding
+    np.testing.assert_allclose(found.stress, 1.15 if of_force else 1.0, rtol=1e-12)
+    np.testing.assert_allclose(
+        found.first_normal_stress_difference, 1.0 if of_force else 1.15, rtol=1e-12
+    )

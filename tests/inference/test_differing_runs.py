@@ -6,6 +6,7 @@ from scipy.stats import multivariate_normal, multivariate_t
 
 from discover.dataset import Run
 from discover.forward import DeclaredModel
+from discover.inference.engine import explain
 from discover.inference.engine.fits import Fitter
 from discover.inference.engine.priors import Deviations
 from discover.inference.engine.problem import SCATTER_OF_RUNS, Problem
@@ -15,13 +16,13 @@ RATES, NOISE = (0.3, 0.6, 1.0, 1.5, 2.0), 0.002
 TIMES = np.linspace(0.05, 8.0, 160)
 
 
-def start_ups(off):
-    """Return start-ups of a Maxwell fluid of 1 Pa and 1 s, each with a zero of its own."""
+def start_ups(off, rates=RATES):
+    """Return start-ups of a Maxwell fluid of 1 Pa and 1 s, each with a zero of its own in Pa."""
     lot, runs = np.random.default_rng(3), []
-    for i, rate in enumerate(RATES):
+    for rate, zero in zip(rates, off, strict=True):
         stress = rate * (1.0 - np.exp(-TIMES))
         size = np.sqrt(np.mean(stress**2))
-        stress = stress + size * (off[i] + NOISE * lot.standard_normal(len(TIMES)))
+        stress = stress + zero + size * NOISE * lot.standard_normal(len(TIMES))
         rates = np.full(len(TIMES), rate)
         runs.append(Run(f"{rate:g}.csv", TIMES, start_up(rate), rates, stress))
     return runs
@@ -31,7 +32,7 @@ def width_of_zeros(off):
     problem = Problem(DeclaredModel.maxwell([1.0], [1.0]), [], start_ups(off))
     fitter = Fitter(problem, problem.fitted)
     (fit,) = fitter.fit([fitter.start((), problem.zero)])
-    return fitter.errors.widths(fit.linear)[1]
+    return fitter.errors.widths(fit.linear)[fitter.errors.of_runs.start]
 
 
 def test_deviations_of_unknown_size_have_the_density_of_student_and_of_a_known_one_of_gauss():
@@ -45,6 +46,22 @@ def test_deviations_of_unknown_size_have_the_density_of_student_and_of_a_known_o
 def test_runs_whose_zeros_are_off_by_a_hundredth_say_so_and_sound_ones_do_not():
     # each zero is known to the noise over the root of the samples, 0.02 %
     assert width_of_zeros(np.zeros(len(RATES))) < 1.5 * SCATTER_OF_RUNS
-    off = 0.01 * np.array([1.0, -1.0, 0.7, -1.3, 0.6])
+    off = 0.01 * np.array([1.0, -1.0, 0.7, -1.3, 0.6]) * RATES
     # drifts, which are as usual, are counted with them
     assert 3.0 * SCATTER_OF_RUNS < width_of_zeros(off) < 10.0 * SCATTER_OF_RUNS
+
+
+@pytest.mark.parametrize(
+    ("signs", "least", "most"),
+    # of three zeros that are one, and may as well be three, the next has three quarters
+    [((1, 1, 1), 0.6, 0.9), ((1, -1, 0), -0.2, 0.2), ((0, 0, 0), -0.1, 0.1)],
+    ids=["as one", "each another", "none"],
+)
+def test_a_zero_that_runs_have_in_common_is_expected_of_the_next_one_too(signs, least, most):
+    zero, rates = 0.01, (0.8, 1.0, 1.2)
+    (ahead,) = start_ups([0.0], (1.1,))
+    fitted = start_ups(zero * np.array(signs, float), rates)
+    posterior = explain(Problem(DeclaredModel.maxwell([1.0], [1.0]), [], fitted, [ahead]))
+    (band,) = posterior.bands()
+    truth = 1.1 * (1.0 - np.exp(-TIMES))
+    assert least * zero < np.mean(band.middle - truth) < most * zero

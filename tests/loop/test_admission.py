@@ -1,5 +1,7 @@
 """Which effects are candidates, by the rates of the runs alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -30,8 +32,12 @@ def test_terms_that_name_the_rate_are_none_where_the_loop_must_extrapolate_far(f
     assert {"giesekus_mobility", "ptt_linear", "rate_rise_time", "stress_gain"} <= names
 
 
-def test_without_a_run_held_out_all_are_candidates():
-    assert admitted([run(1.0)]) == {effect.name for effect in candidates_of(None)}
+def test_without_a_run_held_out_all_are_candidates_and_a_gain_of_a_force_where_one_is_fitted():
+    every = {effect.name for effect in candidates_of(None)}
+    assert admitted([run(1.0)]) == every - {"normal_force_gain"}
+    with_force = replace(run(1.0), first_normal_stress_difference=np.ones(20))
+    assert admitted([with_force]) == every - {"normal_force_gain"}  # recorded, and not fitted
+    assert admitted([with_force, with_force.observing("N1")]) == every
 
 
 @pytest.mark.parametrize("measured", [False, True])

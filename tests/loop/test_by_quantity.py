@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from discover.loop.answering import range_of, shows_a_derivative
+from discover.loop.answering import shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread
+from discover.loop.fitted_range import range_of
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import what_to_measure_next
 

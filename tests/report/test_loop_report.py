@@ -9,8 +9,8 @@ import pytest
 from standing_alone import stands_alone
 
 from discover.effects import make_effect
-from discover.inference.by_mode.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stage
+from discover.loop.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.loop.parts import Explanation, Explanations, Fold
 from discover.report.loop.report import write_loop
 from discover.report.loop.tables import loop_verdict, noise_range

@@ -9,6 +9,7 @@ from scipy.interpolate import make_lsq_spline
 
 from discover.dataset.run import Run
 from discover.protocols.protocol import in_flow, measured_rate
+from discover.statistics.noise.noise_model import read_times
 from discover.statistics.noise.outliers import isolated
 
 # a record with more samples is thinned: they cost time and say nothing new about a law
@@ -150,3 +151,20 @@ def without_spikes(run: Run) -> tuple[Run, list[float]]:
     if not np.any(off):
         return run, []
     return run.window(~off), [float(t) for t in run.time[off]]
+
+
+def without_held_values(run: Run) -> Run:
+    """Return a run with the first sample of each value, where samples hold values read before.
+
+    A value that is read again is late, and says nothing new: fitted, it is a lag and a noise with
+    neighbours alike. Its metadata say so under ``thinned``.
+    """
+    times = read_times(run.recorded)
+    if times == 1:
+        return run
+    fresh = np.diff(run.recorded, prepend=np.nan) != 0.0
+    text = (
+        f"kept {int(fresh.sum()):,} of {len(run):,} samples: each value stands in {times}, and the "
+        "first is when it was measured"
+    )
+    return replace(run.window(fresh), metadata={**run.metadata, "thinned": text})

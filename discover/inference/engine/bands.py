@@ -90,11 +90,12 @@ class Predictions:
         self.fitter.linearise([ahead])
         assert ahead.jacobian is not None
         own = ahead.jacobian[:, : len(fit.priors)]
-        # of what is linear, only the gain and the moduli are those of the fitted runs
+        # of what is linear, only transducers and moduli are those of the fitted runs
         linear = ahead.jacobian[:, len(fit.priors) :]
         fitted, alone = self.posterior.search.fitter.errors.of_runs, self.fitter.errors.of_runs
         shared = np.zeros((len(self.rows), len(fit.linear)))
-        shared[:, 0] = linear[:, 0]
+        of_transducers = self.fitter.errors.of_transducers
+        shared[:, of_transducers] = linear[:, of_transducers]
         shared[:, fitted.stop :] = linear[:, alone.stop :]
         # zero, drift and loading of another run are as large as those of the fitted runs
         assert fit.covariance is not None
@@ -102,7 +103,8 @@ class Predictions:
         each = (fit.linear[fitted] ** 2 + own_variance).reshape(-1, len(self.problem.fitted.runs))
         seen = np.mean(each, axis=1)
         apart = linear[:, alone] ** 2 @ np.repeat(seen, len(self.rows.runs))
-        found = np.column_stack([own * (1.0 + fit.linear[0]), shared]), apart
+        gain = self.fitter.errors.gain(fit.linear)[:, None]
+        found = np.column_stack([own * gain, shared]), apart
         fit.memory["jacobian"] = found
         return found
 
@@ -130,7 +132,7 @@ class Predictions:
         sound = np.all(np.abs(np.nan_to_num(found, nan=np.inf)) < self._largest, axis=1)
         spread = np.mean((found[sound] - predicted) ** 2, axis=0) if np.any(sound) else 0.0
         _, apart = self._jacobian(fit, predicted)
-        middle = predicted * (1.0 + fit.linear[0])
+        middle = self.fitter.errors.as_read(predicted, fit.linear)
         noise = fit.noise.common * self.fitter.noise.deviation(middle, fit.noise.share)
         missed = self.missed(fit) * self.rows.size
         return middle, spread + apart + missed**2 + noise**2

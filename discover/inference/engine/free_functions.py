@@ -150,10 +150,6 @@ class WithFunction(Fitter):
         """Return what one of each change of slope does to the records, in Pa."""
         return self.variable.columns(fit.predicted, self.rows.size)
 
-    def beside(self, fit: Fit, sizes: Float[np.ndarray, " k"]) -> Fit:
-        """Return a hypothesis with the function, before its first step."""
-        return self.start(fit.names, fit.theta, np.append(fit.linear, sizes))
-
     def on(self, fitter: Fitter) -> "WithFunction | None":
         """Return the same on other rows; None where these have no such variable."""
         for variable in variables(fitter.rows):
@@ -191,11 +187,6 @@ class WithSlip(Fitter):
         thetas = np.tile(fit.theta, (len(self._at), 1))
         thetas[np.arange(len(self._at)), self._at] += step
         return (self.predict(thetas) - fit.predicted).T / _SMALL
-
-    def beside(self, fit: Fit, sizes: Float[np.ndarray, " k"]) -> Fit:
-        """Return a hypothesis with slip, before its first step: from none, `sizes` may be far."""
-        del sizes
-        return self.start(fit.names, fit.theta, fit.linear)
 
     def on(self, fitter: Fitter) -> "WithSlip":
         """Return the same on other rows."""
@@ -296,7 +287,9 @@ def _starts(
     for fit in bases:
         values, sizes = _first_order(fitter, fit, functions[0].signatures(fit), widths)
         for own, value, size in zip(functions, values, sizes, strict=True):
-            scored.append((float(value), own, own.beside(fit, size)))
+            # slip, which is not linear, starts from none: its first order may be far
+            linear = np.append(fit.linear, size)[: len(own.errors)]
+            scored.append((float(value), own, own.start(fit.names, fit.theta, linear)))
     scored.sort(key=lambda one: -one[0])
     chosen: dict[WithFunction | WithSlip, list[Fit]] = {}
     sizes_seen: set[int] = set()  # the best of each: far from none, first order favours large ones

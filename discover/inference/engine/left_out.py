@@ -55,7 +55,8 @@ def _error(fitter: Fitter, part: Fit) -> float:
     rows = fitter.rows
     at = rows.run == part.without
     with np.errstate(over="ignore", invalid="ignore"):  # without the run the law runs away
-        off = (rows.recorded - part.predicted * (1.0 + part.linear[0]))[at] / rows.size[at]
+        ahead = fitter.errors.as_read(part.predicted, part.linear)
+        off = (rows.recorded - ahead)[at] / rows.size[at]
         size = float(np.sqrt(np.mean(off**2)))
     return min(size, MOST_MISSED) if np.isfinite(size) else MOST_MISSED
 
@@ -68,8 +69,9 @@ def to_first_order(fitter: Fitter, fit: Fit) -> Float[np.ndarray, " runs"]:
     both = np.column_stack([fit.jacobian, rows.recorded - record])
     white = fitter.noise.whitened(both, record, fit.noise)
     stiff = np.linalg.inv(fit.covariance)
-    shared = len(fit.priors) + 1  # constants and gain; zero, drift and loading are of each run
-    ahead = rows.recorded - fit.predicted * (1.0 + fit.linear[0])
+    # constants and transducers; zero, drift and loading are of each run
+    shared = len(fit.priors) + fitter.errors.of_transducers.stop
+    ahead = rows.recorded - fitter.errors.as_read(fit.predicted, fit.linear)
     found = []
     for i in range(len(rows.runs)):
         own, at = white[rows.run[fitter.noise.kept] == i], rows.run == i

@@ -1,4 +1,4 @@
-"""Errors of a bench in which records are linear: gain, zeros, drifts, loadings, moduli."""
+"""Errors of a bench in which records are linear: gains, zeros, drifts, loadings, moduli."""
 
 from typing import Any
 
@@ -12,14 +12,20 @@ from discover.inference.engine.problem import (
     SOUND_GAIN,
     Problem,
 )
-from discover.inference.engine.rows import Rows
+from discover.inference.engine.rows import Rows, transducer_of
 
 _NEXT_TO_NONE = 1e-9
 """Width of what there is none of."""
 
+_IN_TIME = ("rate", "stress")
+"""Controls of records in time, which have the zero of their transducer."""
+
 
 class LinearErrors:
-    """Gain of all runs; zero, drift and, where each is its own, loading of each; errors of moduli.
+    """Gain and zero of each transducer; zero, drift, loading of each run; errors of moduli.
+
+    How far zeros of runs are off is told by those of transducers too, and the other way round: runs
+    that were tared together are off together.
 
     `problem`, `rows`: what is known of them, and the rows that have them. `moduli`: how many
     independent errors the moduli have. `deviations`: what is known of each kind, all about zero,
@@ -29,13 +35,18 @@ class LinearErrors:
     def __init__(self, problem: Problem, rows: Rows, moduli: int):
         self.rows, self._loaded, runs = rows, bool(problem.loading), len(rows.runs)
         self._own = (rows.run[:, None] == np.arange(runs)).astype(float)
+        read_by = [[transducer_of(run) == one for one in problem.transducers] for run in rows.runs]
+        in_time = [[run.protocol.control in _IN_TIME] for run in rows.runs]
+        self._read_by = np.array(read_by, float)[rows.run]
+        common = (np.array(read_by) & np.array(in_time))[rows.run] * problem.levels
         level = self._own * rows.size[:, None]
-        self._zeros = np.column_stack([level, level * (rows.time - 0.5)[:, None]])
+        self._zeros = np.column_stack([common, level, level * (rows.time - 0.5)[:, None]])
         own = Deviations(SCATTER_OF_RUNS, SCATTER_KNOWN)
         gain, zeros = Deviations(SOUND_GAIN), own
         if problem.computed:
             gain = zeros = Deviations(_NEXT_TO_NONE)
-        parts = [(1, gain), (2 * runs, zeros)]
+        self._gains = len(problem.transducers)
+        parts = [(self._gains, gain), (self._zeros.shape[1], zeros)]
         if self._loaded:
             parts.append((runs, Deviations(problem.loading) if problem.loads_anew else own))
         parts.append((moduli, Deviations(1.0)))
@@ -49,9 +60,26 @@ class LinearErrors:
         return int(self.deviations[-1][0].stop)
 
     @property
+    def of_transducers(self) -> slice:
+        """Places of the gains and zeros of transducers, which all runs share."""
+        return slice(0, 2 * self._gains)
+
+    @property
     def of_runs(self) -> slice:
         """Places of the zero, drift and loading that each run has of its own."""
-        return slice(1, 1 + (2 + self._loaded) * len(self.rows.runs))
+        first = self.of_transducers.stop
+        return slice(first, first + (2 + self._loaded) * len(self.rows.runs))
+
+    def gain(self, sizes: Float[np.ndarray, " q"]) -> Float[np.ndarray, " rows"]:
+        """Return what the transducer of each row multiplies by."""
+        return 1.0 + self._read_by @ sizes[: self._gains]
+
+    def as_read(
+        self, predicted: Float[np.ndarray, " rows"], sizes: Float[np.ndarray, " q"]
+    ) -> Float[np.ndarray, " rows"]:
+        """Return records by what transducers do, without what each run has of its own."""
+        common = self._zeros[:, : self._gains] @ sizes[self._gains : self.of_transducers.stop]
+        return predicted * self.gain(sizes) + common
 
     @property
     def usual_widths(self) -> Float[np.ndarray, " q"]:
@@ -84,7 +112,8 @@ class LinearErrors:
         do to these.
         """
         loadings = self._own * predicted[:, None] if self._loaded else self._own[:, :0]
-        return np.column_stack([predicted, self._zeros, loadings, shifts])
+        read = self._read_by * predicted[:, None]
+        return np.column_stack([read, self._zeros, loadings, shifts])
 
     def recorded(
         self,
@@ -94,7 +123,8 @@ class LinearErrors:
     ) -> Float[np.ndarray, "trials rows"]:
         """Return records of trials, of what the model predicts of each."""
         runs, k = len(self.rows.runs), shifts.shape[1]
-        gain, zeros, rest = sizes[:, :1], sizes[:, 1 : 1 + 2 * runs], sizes[:, 1 + 2 * runs :]
+        own, zeros, rest = np.split(sizes, np.cumsum([self._gains, self._zeros.shape[1]]), axis=1)
+        gain = own @ self._read_by.T
         if self._loaded:
             gain, rest = gain + rest[:, self.rows.run], rest[:, runs:]
         found = predicted * (1.0 + gain) + zeros @ self._zeros.T
@@ -108,7 +138,7 @@ class LinearErrors:
     ) -> Float[np.ndarray, "rows m"]:
         """Return derivatives of the records, of those of what the model predicts."""
         del predicted  # these errors are in proportion to it, or do not depend on it
-        gain = np.full(len(self.rows), 1.0 + sizes[0])
+        gain = self.gain(sizes)
         if self._loaded:
-            gain += sizes[1 + 2 * len(self.rows.runs) :][self.rows.run]
+            gain += sizes[self._gains + self._zeros.shape[1] :][self.rows.run]
         return slopes * gain[:, None]

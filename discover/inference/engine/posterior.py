@@ -46,7 +46,7 @@ _SEED = 20261128
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Indistinguishable:
     """Hypotheses that these records cannot tell apart, the likeliest first."""
 
     members: tuple[tuple[str, ...], ...]
@@ -81,7 +81,7 @@ class Posterior:
 
     problem: Problem
     search: Search
-    explanations: tuple[Explanation, ...]
+    explanations: tuple[Indistinguishable, ...]
     unexplained: float
     fits: tuple[tuple[Fit, float], ...]
     left: Discrepancy | None
@@ -270,7 +270,7 @@ def smallest(search: Search, fit: Fit) -> float:
 
 def _classes(
     problem: Problem, search: Search, fits: Sequence[Fit], probability: np.ndarray
-) -> tuple[tuple[Explanation, ...], float]:
+) -> tuple[tuple[Indistinguishable, ...], float]:
     """Return classes of hypotheses with the same predictions, and what nameless terms lose."""
     fitter, classes = search.fitter, []
     for fit, p in zip(fits, probability, strict=True):
@@ -298,7 +298,7 @@ def _classes(
         if all(_has_term(problem, names) for names, _ in one["members"]):
             lost += (1.0 - _NAMELESS) * share
             share *= _NAMELESS
-        found.append(Explanation(_without_idle(one["members"]), share))
+        found.append(Indistinguishable(_without_idle(one["members"]), share))
     return tuple(sorted(found, key=lambda one: -one.probability)), lost
 
 

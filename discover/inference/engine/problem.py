@@ -13,9 +13,10 @@ from discover.forward import AugmentedModel, DeclaredModel
 from discover.forward.declared import LARGEST
 from discover.forward.records import data_scales
 from discover.inference.engine.priors import Prior
-from discover.inference.engine.rows import Rows
+from discover.inference.engine.rows import TORQUE, Rows, transducer_of
 from discover.inference.engine.variables import SLIP_CURVE
 from discover.statistics import root_of
+from discover.statistics.noise.noise_model import rms
 
 _TYPICAL = 0.2
 """Of a record, what an effect that is there changes it by: half are smaller, half larger."""
@@ -57,7 +58,7 @@ NUISANCES = (
 """Effects that a sound instrument has a little of; `first_trial` of a gain is 1 %."""
 
 SOUND_GAIN = 0.01
-"""Relative deviation of the calibration of a torque transducer   [ISO 6721-10:2015]."""
+"""Relative deviation of the calibration of a transducer, as of a torque   [ISO 6721-10:2015]."""
 
 SOUND_CLOCK = 0.01
 """Relative deviation of relaxation times: temperature is held to 0.1 to 0.2 K, and a melt's times
@@ -72,7 +73,8 @@ OWN_OF_A_MODE = 0.3
 
 SCATTER_OF_RUNS = 0.001
 """Usual size of zero and drift of a run, and of its gain over that of all, over the root mean
-square of its record: to which a torque is tared, and to which the same loading repeats."""
+square of its record: to which a torque is tared, and to which the same loading repeats. And of the
+zero that all runs of a transducer have, over that of a typical one."""
 
 SCATTER_KNOWN = 1.0
 """Degrees of freedom by which that is known: of six instruments one scatters by 0.5 %."""
@@ -105,6 +107,10 @@ class Problem:
         self.loading = loading or (0.0 if computed else SCATTER_OF_RUNS)
         self.scales = data_scales(fitted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
+        # the torque comes first
+        read_by = {*map(transducer_of, [*fitted, *predicted])}
+        self.transducers = tuple(sorted(read_by, key=lambda one: (one != TORQUE, one)))
+        self.levels = np.array([self._level(one) for one in self.transducers])
         effects = [*candidates, *beside, SLIP_CURVE]
         self.model = AugmentedModel(declared, effects, self.scales)
         self.effects: dict[str, AbstractEffect] = {e.name: e for e in self.model.effects}
@@ -114,6 +120,11 @@ class Problem:
         self._odds = sum(self.odds(effect.name) for effect in candidates)
         covariance = declared.modulus_covariance
         self.modulus_root = None if covariance is None else root_of(covariance)
+
+    def _level(self, transducer: str) -> float:
+        """Return the typical size of what a transducer reads in the fitted runs."""
+        own = [rms(run.recorded) for run in self.fitted.runs if transducer_of(run) == transducer]
+        return float(np.median(own)) if own else 0.0
 
     # what is known ---------------------------------------------------------------------------
 

@@ -8,9 +8,18 @@ from jaxtyping import Bool, Float, Int
 
 from discover.dataset import Run
 from discover.forward import Batch, make_batch
+from discover.protocols.kinematics import MODULI
 
 _CURVES = ("steady", "oscillation")
 """Controls of which each value is an experiment of its own, without a neighbour in time."""
+
+
+TORQUE = "torque"
+
+
+def transducer_of(run: Run) -> str:
+    """Return what reads a record: the torque's transducer, or one for each other quantity."""
+    return TORQUE if run.quantity in ("sigma12", *MODULI) else run.quantity
 
 
 _RUNAWAY = 1e12

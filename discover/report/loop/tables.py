@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from discover.inference.by_mode.constants import ConstantByMode, StageParameter
 from discover.laws.registry import LAWS
+from discover.loop.constants import ConstantByMode, StageParameter
 from discover.loop.loop_result import LoopResult
 from discover.loop.parts import CandidateScore, Fold, LawFit, Stage
 from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, untested_by

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from discover.inference.by_mode.constants import ConstantByMode
+from discover.loop.constants import ConstantByMode
 from discover.report.plots.style import (
     BEFORE,
     NETWORK,

@@ -33,12 +33,17 @@ def independent_samples(values: Float[np.ndarray, " n"]) -> float:
 
 _FEWEST = 10  # values, from which on their repeats are a rule
 _ALIKE = 0.8  # share of them that is read equally often
+_ONE_STEP = 1e-6  # by which jumps of one step differ, over it
 
 
 def read_times(record: Float[np.ndarray, " n"]) -> int:
-    """Return the hold length of a record: how often each value is read; 1 if new or by chance."""
-    lengths = np.diff(np.flatnonzero(np.diff(record)))
-    if len(lengths) < _FEWEST:
+    """Return the hold length of a record: how often each value is read; 1 if new or by chance.
+
+    And of what rises evenly in the steps of a converter, which repeats values too.
+    """
+    at = np.flatnonzero(np.diff(record))
+    lengths, jumps = np.diff(at), np.abs(np.diff(record)[at])
+    if len(lengths) < _FEWEST or np.ptp(jumps) < _ONE_STEP * np.max(jumps):
         return 1
     often = int(np.median(lengths))
     return often if np.mean(lengths == often) > _ALIKE else 1

@@ -8,9 +8,9 @@ from independent.flow import Flow
 from discover.dataset import Run
 from discover.effects import simplest_terms
 from discover.forward import DeclaredModel
-from discover.inference import scattered_rates
-from discover.inference.scattered_rates import smoothed, unfelt_scatter
 from discover.laws.registry import make_law
+from discover.loop import scattered_rates
+from discover.loop.scattered_rates import smoothed, unfelt_scatter
 from discover.protocols import sampled_rate
 from discover.protocols import start_up as commanded
 
