@@ -49,7 +49,7 @@ for stage in result.stages:
     print("To confirm in the laboratory:", stage.check)
 
 # %% [markdown]
-# ## The augmented law
+# ## The law with effects
 #
 # It can be read back, simulated and exported.
 
@@ -66,8 +66,8 @@ print(result.latex())
 record = next(record for record in result.records if record.held_out)
 figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
 axis.plot(record.time, record.measured, ".", color="0.3", label="measured")
-axis.plot(record.time, record.predicted[0], "-.", label="declared model")
-axis.plot(record.time, record.predicted[-1], label="augmented model")
+axis.plot(record.time, record.predicted[0], "-.", label="law as declared")
+axis.plot(record.time, record.predicted[-1], label="law with effects")
 axis.set(xlabel="time", ylabel="σ12", title=record.name)
 axis.legend()
 plt.show()

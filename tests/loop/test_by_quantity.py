@@ -44,7 +44,7 @@ FITTED = [record("slow", 0.1, 0.02), record("middle", 0.3, 0.03), record("fast",
 def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     held = record("seen not", 0.5, float(np.hypot(0.12, NOISE)), held_out=True)
     found = result([*FITTED, held])
-    size = np.sqrt((3 * 0.06**2 + 0.12**2) / 4)
+    size = (3 * 0.06 + 0.12) / 4  # the mean over runs, as everywhere
     told = with_unseen(found)
     assert told is not None
     assert told.size == pytest.approx(size)
@@ -52,7 +52,9 @@ def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     # deviation of four normal draws
     assert told.ci95 == pytest.approx(size * np.sqrt(4 / chi2.ppf((0.975, 0.025), 4)))
     assert told.by_run["seen not"] == pytest.approx(0.12)
-    assert told.unseen
+    assert told.unseen == "unseen runs"
+    assert with_unseen(result(FITTED)).unseen == "left-out runs"
+    assert with_unseen(result([*FITTED, held], left_out_error=None)).unseen == "held-out runs"
 
 
 def test_a_run_beyond_the_rates_does_not_count_inside():
@@ -118,6 +120,11 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     for size, asked in ((0.05, "Measure uniaxial extension"), (2.0, "Measure N1")):
         weak = {"N1": Spread(0.6, 0.8, stress=size), "uniaxial": Spread(1.2, 1.3)}
         assert what_to_measure_next(result(FITTED, spread_of_laws=weak)).startswith(asked)
+    # nor is a liquid stretched that does not keep its shape, such as blood of 0.01 Pa s
+    for viscosity, asked in ((0.03, "Repeat fast"), (3e4, "Measure uniaxial extension")):
+        thin = {"N1": Spread(0.6, 0.8, stress=0.05), "uniaxial": Spread(1.2, 1.3, stress=viscosity)}
+        told = what_to_measure_next(result(FITTED, spread_of_laws=thin, discrepancy=None))
+        assert told.startswith(asked)  # at 1 1/s
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast with another gap")

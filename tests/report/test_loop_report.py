@@ -282,12 +282,12 @@ def without_stages():
     return replace(found, stages=(), records=records, error_after=found.error_before)
 
 
-def test_nothing_is_called_augmented_where_nothing_was_added():
+def test_effects_are_named_only_where_some_were_added():
     with_stage, without = loop_result(), without_stages()
     for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
-        assert "augmented" in draw(with_stage).svg
+        assert "law with effects" in draw(with_stage).svg
         drawn = draw(without).svg
-        assert "augmented" not in drawn
+        assert "law with effects" not in drawn
         assert "declared" in drawn
         assert "→" not in drawn
 
@@ -353,7 +353,7 @@ def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
     assert "strain" in drawn.svg  # start-ups sampled over decades
     two = (oscillating(), oscillating("held.csv", True))
     assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
-    assert drawn.svg.count("deepest at") == 2
+    assert drawn.svg.count("colour scale ±") == 2
 
 
 def several_explanations():
