@@ -135,6 +135,8 @@ class Constant:
         largest = max(map(abs, (*self.ci95, self.value)))
         of_width, of_value = (math.floor(math.log10(size)) for size in (width, largest))
         decimals = min(1 - of_width, max(2 - of_value, -of_width))
+        if decimals < 0 and value:  # a small number beside a large one keeps two digits
+            decimals = min(max(decimals, 1 - math.floor(math.log10(abs(value)))), 0)
         if not 1e-3 <= largest < 1e5 or decimals > 6:
             return ""
         text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"

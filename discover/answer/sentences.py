@@ -122,13 +122,14 @@ def description(answer: Any) -> str:
         return f"Residual of the fitted runs {residual}." if residual else ""
     low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
     size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
-    besides = f"; noise {noise}" if noise else ""
+    # an error below the noise is known no better than that
+    besides = f"; noise {noise}" if noise and answer.noise > found.size else ""
     if not found.unseen:  # of fitted runs it is no error that a prediction could have
         return f"Residual of the fitted runs {size}{besides}."
     one = answer.expected("sigma12")
     was_measured = one.beyond is not None and one.beyond_at.startswith(MEASURED_AT)
     faster = f", faster runs {_at_most(one.beyond)}" if was_measured else ""
-    return f"Error on {found.unseen} {size}{faster}{besides}."
+    return f"Error: {found.unseen} {size}{faster}{besides}."
 
 
 MEASURED_AT = "measured at"
@@ -166,7 +167,7 @@ def where(answer: Any) -> str:
     one = answer.expected("uniaxial")
     missed = (one.inside if one.is_measured else None) or 0.0
     if missed > _USELESS and "uniaxial" not in answer.range.flows:  # else it was fitted
-        place += f", not in {SYMBOLS['uniaxial']} ({_at_most(missed)} error)"
+        place += f", not in {SYMBOLS['uniaxial']}"
     return f"Use in {place}."
 
 

@@ -14,7 +14,6 @@ from discover.answer import (
     Mode,
     Range,
     Suspect,
-    sentences,
 )
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
@@ -219,7 +218,7 @@ def _alternative(result: Any) -> str:
         return ""
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
-    said = [LAWS[near.law].title, *sentences.constants(constants)]
+    said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     return f"Best classical law: {', '.join(said)}, error {percent_of(near.size)}."
 
 

@@ -206,7 +206,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         + [("a_T", f"shift of times at {at}", factor, "–") for at, factor in shifts(answer)],
         "best": "best fit, as a set" if is_a_set(answer) else "best fit",
         "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
-        "suspected": SUSPECTED.lower() + ("; instrument time" if answer.shift_factors else ""),
+        "suspected": SUSPECTED.lower() + _clock(answer),
         "expected": _expected(rows) + _worst(answer),
         "modes": [
             (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
@@ -217,6 +217,12 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
+
+
+def _clock(answer: Answer) -> str:
+    """Return that times of the instrument are its own where those of the law are shifted."""
+    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
+    return "; times on the instrument's clock" if timed and answer.shift_factors else ""
 
 
 def _said(one: Constant) -> str:
