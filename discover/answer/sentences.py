@@ -136,9 +136,9 @@ MEASURED_AT = "measured at"
 """What stands before the rate at which an error beyond the range was measured."""
 
 
-def flows(answer: Any) -> str:
-    """Return the kinds of flow, in words."""
-    return listed([str(_FLOWS.get(one, one)) for one in answer.range.flows])
+def flows_of(kinds: Sequence[str]) -> str:
+    """Return kinds of flow, in words."""
+    return listed([str(_FLOWS.get(one, one)) for one in kinds])
 
 
 _FLOWS = {
@@ -161,7 +161,7 @@ def where(answer: Any) -> str:
         found += [] if one.frequency_rad_s is None else [f"{span(one.frequency_rad_s)} rad/s"]
     if not found:
         return ""
-    place = ", ".join([flows(answer), *found])
+    place = ", ".join([flows_of(answer.range.flows), *found])
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
     one = answer.expected("uniaxial")
@@ -305,7 +305,7 @@ def lines(answer: Any) -> list[str]:
                 text += f", beyond the range {_at_most(one.beyond)}{at}"
             parts.append(text)
         if (worst := worst_run(answer)) is not None:
-            parts.append("worst fitted run {}, {}".format(*worst))
+            parts.append("worst run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
     found += [shifted(answer), suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")

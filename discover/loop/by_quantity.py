@@ -21,7 +21,7 @@ _APART = 0.2
 _WORTH_SAYING = 0.05
 """Relative difference between laws that is told of a quantity that nothing tested."""
 
-_FASTER = 1.01
+FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
 _UNSEEN, _HELD, _FITTED = "unseen runs", "held-out runs", "fitted runs"
@@ -96,7 +96,7 @@ def _held_inside(result: Any) -> list[RunRecord]:
         for record in result.records
         if record.held_out
         and (record.flow, record.quantity) in kinds
-        and record.fastest <= _FASTER * fastest
+        and record.fastest <= FASTER * fastest
         and np.isfinite(record.errors[-1])
     ]
 
@@ -183,7 +183,7 @@ def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    fast = [r for r in held if r.fastest > _FASTER * fastest]
+    fast = [r for r in held if r.fastest > FASTER * fastest]
     errors = unseen_errors(result)
     inside, at = _mean(errors), _measured_at(fast)
     beyond = _mean([_missed(r, result) for r in fast])
@@ -206,8 +206,8 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
         return None
     held = [record for record in own if record.held_out]
     fastest = max((r.fastest for r in records if not r.held_out), default=0.0)
-    fast = [r for r in held if r.fastest > _FASTER * fastest]
-    slow = [r for r in (held or own) if r.fastest <= _FASTER * fastest]
+    fast = [r for r in held if r.fastest > FASTER * fastest]
+    slow = [r for r in (held or own) if r.fastest <= FASTER * fastest]
     inside, beyond = (
         _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )

@@ -255,7 +255,7 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
     if worst is None:
         return []
     note, error = worst
-    return [{"symbol": "worst fitted run", "inside": error, "beyond": "–", "beyond_at": "",
+    return [{"symbol": "worst run", "inside": error, "beyond": "–", "beyond_at": "",
              "known": True, "note": note}]  # fmt: skip
 
 

@@ -76,7 +76,7 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
     answer = replace(MELT, tolerance=asked)
     assert answer.adequate is adequate
     assert tolerance(answer).startswith(f"Tolerance {said}")
-    assert any("worst fitted run a.csv, 8 %" in line for line in answer.lines) is not adequate
+    assert any("worst run a.csv, 8 %" in line for line in answer.lines) is not adequate
     *_, last = answer_screen(answer)["expected"]
     assert ((last["note"], last["inside"]) == ("a.csv", "8 %")) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None

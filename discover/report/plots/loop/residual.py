@@ -2,7 +2,9 @@
 
 import numpy as np
 
+from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
+from discover.loop.by_quantity import FASTER
 from discover.loop.reading import differences
 from discover.report.plots.loop.runs import (
     AS_DECLARED,
@@ -30,7 +32,7 @@ from discover.report.plots.style import (
     picture,
 )
 from discover.report.wording import percent
-from discover.words import effect_title
+from discover.words import effect_title, listed
 
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
@@ -187,9 +189,21 @@ def waterfall_picture(result: LoopResult) -> Picture:
             "waterfall",
             "Error after each effect added: root mean square of prediction minus measurement over "
             "the root-mean-square stress, noise included, mean over runs."
-            + " Lines: from the best run to the worst."
-            * (len(result.records) > 1),
+            + _only_held_out(result)
+            + " Lines: from the best run to the worst." * (len(result.records) > 1),
         )
+
+
+def _only_held_out(result: LoopResult) -> str:
+    """Return which flows are in the mean of held-out runs alone, and whether faster runs are."""
+    fitted = [record for record in result.records if not record.held_out]
+    held = [record for record in result.records if record.held_out]
+    known = {record.flow for record in fitted}
+    others = [flows_of([one]) for one in dict.fromkeys(r.flow for r in held) if one not in known]
+    fastest = max((record.fastest for record in fitted), default=0.0)
+    faster = any(record.flow in known and record.fastest > FASTER * fastest for record in held)
+    parts = [*["faster runs"] * faster, *others]
+    return f" Held-out runs include {listed(parts)}." if parts else ""
 
 
 def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> None:
