@@ -302,7 +302,7 @@ def test_a_mean_of_held_out_runs_says_which_are_in_it_alone():
     given = loop_result()
     fitted, *_ = (r for r in given.records if not r.held_out)
     held = replace(fitted, name="held", held_out=True)
-    assert "include" not in waterfall_picture(replace(given, records=(fitted, held))).caption
+    assert "runs include" not in waterfall_picture(replace(given, records=(fitted, held))).caption
     fast = replace(held, rate=3.0 * held.rate)
     pulled = replace(held, name="pulled", flow="uniaxial", quantity="tensile_stress")
     both = waterfall_picture(replace(given, records=(fitted, fast, pulled))).caption
