@@ -111,8 +111,8 @@ found
 
 # %%
 if found is not None:
-    runs = found.runs_table()
-    labels = [name.removeprefix("pi_").removesuffix(".csv") for name in runs.index]
-    axis = runs.drop(columns="held_out").set_axis(labels).plot.bar(figsize=(8, 3), logy=True)
+    stages = ["as declared", *(f"+ {stage.effect}" for stage in found.stages)]
+    errors = {r.name.removeprefix("pi_").removesuffix(".csv"): r.errors for r in found.records}
+    axis = pd.DataFrame(errors, index=stages).T.plot.bar(figsize=(8, 3), logy=True)
     axis.set(xlabel="", ylabel="relative error")
     plt.show()

@@ -181,7 +181,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
-        "expected": (), "modes": (), "linear": "", "solvent": 0.0, "best": "best fit",
+        "expected": (), "modes": (), "linear": "", "solvent": 0.0, "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -204,7 +204,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             for symbol, one in zip(symbols, answer.constants, strict=True)
         ]
         + [("a_T", f"shift of times at {at}", factor, "–") for at, factor in shifts(answer)],
-        "best": "best fit, as a set" if is_a_set(answer) else "best fit",
+        "set": is_a_set(answer),
         "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
         "suspected": SUSPECTED.lower() + _clock(answer),
         "expected": _expected(rows) + _worst(answer),
@@ -236,8 +236,8 @@ def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]
     for symbol, one in rows:
         row = {
             "symbol": symbol,
-            "inside": expected(one, "inside"),
-            "beyond": expected(one, "beyond"),
+            "inside": _in_cell(expected(one, "inside")),
+            "beyond": _in_cell(expected(one, "beyond")),
             "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
             "known": one.is_known,
             "note": _unbroken(one.note),
@@ -255,7 +255,7 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
     if worst is None:
         return []
     note, error = worst
-    return [{"symbol": "worst run", "inside": error, "beyond": "–", "beyond_at": "",
+    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "–", "beyond_at": "",
              "known": True, "note": note}]  # fmt: skip
 
 

@@ -78,7 +78,7 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
     assert tolerance(answer).startswith(f"Tolerance {said}")
     assert any("worst run a.csv, 8 %" in line for line in answer.lines) is not adequate
     *_, last = answer_screen(answer)["expected"]
-    assert ((last["note"], last["inside"]) == ("a.csv", "8 %")) is not adequate
+    assert ((last["note"], last["inside"]) == ("a.csv", "8\N{NO-BREAK SPACE}%")) is not adequate
     assert answer.to_json()["use"]["expected_error"]["N1"] is None
     assert Answer("", instead="No signal.").adequate is None
 
@@ -262,7 +262,7 @@ def test_a_tolerance_is_not_said_to_be_missed_by_what_nothing_measured():
 
 def test_constants_far_from_the_middle_of_their_intervals_are_a_set():
     skewed, even = Constant("epsilon", 0.80, (0.17, 0.82)), Constant("alpha", 0.2, (0.1, 0.3))
-    note = "<th>best fit, as a set</th>"
+    note = "best&nbsp;fit, as&nbsp;a&nbsp;set"
     pair = replace(MELT, constants=(skewed, even))
     assert note in render("answer.html", screen=answer_screen(pair))
     assert note not in render("answer.html", screen=answer_screen(replace(pair, constants=(even,))))
@@ -386,6 +386,8 @@ def test_a_chance_and_a_level_keep_to_a_line():
 
 
 def test_numbers_keep_to_a_line_with_their_units():
+    sure, *_ = answer_screen(MELT)["expected"]
+    assert sure["inside"] == "6\N{NO-BREAK SPACE}%"
     exact = replace(MELT, constants=(Constant("eta_s", 2e-7, (1e-7, 3e-7), "Pa s"),))
     (row,) = answer_screen(exact)["constants"]
     assert row[2].split(" ") == ["2\N{NO-BREAK SPACE}×\N{NO-BREAK SPACE}10⁻⁷", row[2][-4:]]
