@@ -127,8 +127,9 @@ def description(answer: Any) -> str:
     if not found.unseen:  # of fitted runs it is no error that a prediction could have
         return f"Residual of the fitted runs {size}{besides}."
     one = answer.expected("sigma12")
-    was_measured = one.beyond is not None and one.beyond_at.startswith(MEASURED_AT)
-    faster = f", faster runs {_at_most(one.beyond)}" if was_measured else ""
+    faster = ""
+    if one.beyond is not None and one.beyond_at.startswith(MEASURED_AT):
+        faster = f", faster runs {_at_most(one.beyond)}"
     return f"Error: {found.unseen} {size}{faster}{besides}."
 
 
