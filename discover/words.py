@@ -145,6 +145,8 @@ _EFFECTS = {
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",
     "rate_rise_time": "slow motor",
+    "relaxation_mode": "added mode",
+    "solvent_viscosity": "Newtonian part",
     "thixotropic_modulus_by_stress": "stress-driven thixotropic modulus",
     "thixotropic_relaxation_by_stress": "stress-driven thixotropic relaxation",
     "thixotropic_relaxation_two_times": "two-time thixotropic relaxation",

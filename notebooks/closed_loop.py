@@ -49,7 +49,7 @@ for stage in result.stages:
     print("To confirm in the laboratory:", stage.check)
 
 # %% [markdown]
-# ## The augmented law
+# ## The law with effects
 #
 # It can be read back, simulated and exported.
 
@@ -66,8 +66,8 @@ print(result.latex())
 record = next(record for record in result.records if record.held_out)
 figure, axis = plt.subplots(figsize=(7, 3), layout="constrained")
 axis.plot(record.time, record.measured, ".", color="0.3", label="measured")
-axis.plot(record.time, record.predicted[0], "-.", label="declared model")
-axis.plot(record.time, record.predicted[-1], label="augmented model")
+axis.plot(record.time, record.predicted[0], "-.", label="law as declared")
+axis.plot(record.time, record.predicted[-1], label="law with effects")
 axis.set(xlabel="time", ylabel="σ12", title=record.name)
 axis.legend()
 plt.show()
@@ -111,8 +111,8 @@ found
 
 # %%
 if found is not None:
-    runs = found.runs_table()
-    labels = [name.removeprefix("pi_").removesuffix(".csv") for name in runs.index]
-    axis = runs.drop(columns="held_out").set_axis(labels).plot.bar(figsize=(8, 3), logy=True)
+    stages = ["as declared", *(f"+ {stage.effect}" for stage in found.stages)]
+    errors = {r.name.removeprefix("pi_").removesuffix(".csv"): r.errors for r in found.records}
+    axis = pd.DataFrame(errors, index=stages).T.plot.bar(figsize=(8, 3), logy=True)
     axis.set(xlabel="", ylabel="relative error")
     plt.show()

@@ -129,7 +129,7 @@ pd.DataFrame(rows).T.fillna("")
 # %%
 found = None
 if comparison is not None:
-    best = min(comparison.classical, key=lambda fit: fit.criterion or float("inf"))
+    best = min(comparison.classical, key=lambda fit: (fit.criterion is None, fit.criterion))
     law = dc.make_law(best.law, dict(best.parameters))
     found = dc.close_loop(
         whole,
@@ -145,9 +145,9 @@ found
 
 # %%
 if found is not None:
-    runs = found.runs_table()
-    labels = [name.removeprefix("pi_").removesuffix(".csv") for name in runs.index]
-    axis = runs.drop(columns="held_out").set_axis(labels).plot.bar(figsize=(8, 3), rot=0)
+    stages = ["as declared", *(f"+ {stage.effect}" for stage in found.stages)]
+    errors = {r.name.removeprefix("pi_").removesuffix(".csv"): r.errors for r in found.records}
+    axis = pd.DataFrame(errors, index=stages).T.plot.bar(figsize=(8, 3), rot=0)
     axis.set(xlabel="", ylabel="relative error of σ12")
     plt.show()
 
@@ -158,7 +158,7 @@ if found is not None:
 #   removes most of the error at −23 °C. Small strains do not say whether it is that, a lag of the
 #   transducer or a delay.
 # - **The law is not determined by these data.** None of the classical laws describes the fitted
-#   runs to better than a sixth of their stress; Giesekus's mobility goes to the end of its range.
+#   runs to better than 15 % of their stress; Giesekus's mobility comes near the end of its range.
 #   The laws that fit about as well differ in runs that they did not see, and neither N1 nor N2
 #   follows from σ12.
 # - **What is missing** is a loss of network with strain: the second loop removes most of the error

@@ -83,18 +83,21 @@ class Constant:
 
     @property
     def number(self) -> str:
-        """Value to as many digits as the interval leaves it, with its unit."""
+        """Value to as many digits as the interval leaves it, with its unit.
+
+        Of what is not determined that of the best fit, which goes with the other constants.
+        """
         if not self.determined:
-            return "not determined"
+            return f"{significant(self.reciprocal.value, 2)}{self.reciprocal._unit}"
         if (other := self.reciprocal) is not self:
             return other.number
         return f"{self._plain(self.value)}{self._unit}"
 
     @property
     def interval(self) -> str:
-        """95 % interval, or a dash; also of what is not determined."""
+        """95 % interval, or a dash, or that it is not determined."""
         if not self.determined:
-            return "–"
+            return "not determined"
         if (other := self.reciprocal) is not self:
             return other.interval
         if self.bound:
@@ -132,6 +135,8 @@ class Constant:
         largest = max(map(abs, (*self.ci95, self.value)))
         of_width, of_value = (math.floor(math.log10(size)) for size in (width, largest))
         decimals = min(1 - of_width, max(2 - of_value, -of_width))
+        if decimals < 0 and value:  # a small number beside a large one keeps two digits
+            decimals = min(max(decimals, 1 - math.floor(math.log10(abs(value)))), 0)
         if not 1e-3 <= largest < 1e5 or decimals > 6:
             return ""
         text = f"{round(value, decimals) + 0.0:.{max(decimals, 0)}f}"
@@ -198,9 +203,9 @@ _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
-    "modulus_factor": ("G/G_0", "modulus over that of the sweep"),
-    "relaxation_time_factor": ("λ/λ_0", "times over those of the sweep"),
-    "eta_s": ("η_s", "solvent viscosity"),
+    "modulus_factor": ("G/G_0", "over the moduli of the sweep; the modes below contain it"),
+    "relaxation_time_factor": ("λ/λ_0", "over the times of the sweep; the modes below contain it"),
+    "eta_s": ("η_s", "Newtonian viscosity"),
     "L2": ("L²", "extensibility"),
     "yield_stress_Pa": ("τ_y", "yield stress"),
     "consistency_Pa_sn": ("K", "consistency"),
@@ -320,7 +325,7 @@ class Discrepancy:
     ci95: Span
     by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
     grows_with_rate: float | None = None
-    unseen: str = ""  # which runs the law had not seen, such as ``left out in turn``; empty: none
+    unseen: str = ""  # which runs the law had not seen, such as ``left-out runs``; empty: none
 
 
 @dataclass(frozen=True)
@@ -333,6 +338,7 @@ class Answer:
         them.
     `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
     `temperature_C`: of its moduli and times; None where unknown.
+    `shift_factors`: of times, by temperature in °C, where runs were shifted to that temperature.
     `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
     `discrepancy`: size of what it leaves besides noise; None where unknown.
     `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
@@ -379,6 +385,7 @@ class Answer:
     instead: str = ""  # first line where there is no law to use, such as for pure noise
     tolerance: float = TOLERANCE  # relative discrepancy that is good enough
     temperature_C: float | None = None
+    shift_factors: Mapping[float, float] = field(default_factory=dict)
 
     @property
     def is_empirical(self) -> bool:
@@ -435,6 +442,7 @@ class Answer:
                 "modes": self.modes,
                 "solvent_viscosity_Pa_s": self.solvent_viscosity_Pa_s,
                 "temperature_C": self.temperature_C,
+                "shift_factors": {f"{at:g}": one for at, one in self.shift_factors.items()},
                 "range": {
                     "weissenberg": flows.weissenberg,
                     "deborah": flows.deborah,

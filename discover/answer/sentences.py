@@ -77,6 +77,35 @@ def constants(several: Sequence[Any]) -> list[str]:
     return [one.with_interval(_LEVEL if one is first else "") for one in several]
 
 
+def shifts(answer: Any) -> list[tuple[str, str]]:
+    """Return temperatures of shifted runs with their factors: of many the first and the last."""
+    found = [(degrees(at), significant(one, 3)) for at, one in answer.shift_factors.items()]
+    return found if len(found) <= _MOST_SHIFTS else [found[0], found[-1]]
+
+
+_MOST_SHIFTS = 3
+
+
+def shifted(answer: Any) -> str:
+    """Return to which temperature times and rates were shifted, and how far; empty if not."""
+    if not answer.shift_factors:
+        return ""
+    where = "one temperature" if answer.temperature_C is None else degrees(answer.temperature_C)
+    said = [f"{factor} at {place}" for place, factor in shifts(answer)]
+    return f"Times and rates as at {where}: a_T = {', '.join(said)}."
+
+
+def is_a_set(answer: Any) -> bool:
+    """Return whether constants go together: one is far from the middle of its interval.
+
+    Intervals are over all laws that fit as well, so that ends of several make no law that does.
+    """
+    fitted = [one for one in answer.constants if one.ci95 is not None]
+    return len(fitted) > 1 and any(
+        one.bound or one.is_skewed or not one.determined for one in fitted
+    )
+
+
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
 
 
@@ -92,19 +121,25 @@ def description(answer: Any) -> str:
     if found is None or not found.size:
         return f"Residual of the fitted runs {residual}." if residual else ""
     low, high = (percent_of(end).removesuffix(" %") for end in found.ci95)
-    ends = f" ({_LEVEL}{low}–{high} %)" if low != high else ""
-    # of fitted runs it is no error that a prediction could have
-    of = "Error on unseen runs" if found.unseen else "Residual of the fitted runs"
-    if noise and found.size < answer.noise:
-        # what fitted runs leave stands for noise, and is more where a model lacks something
-        return f"{of} {percent_of(found.size)}{ends}; fitted runs leave {noise}."
-    besides = f", plus {noise} noise" if noise else ""
-    return f"{of} {percent_of(found.size)}{ends}{besides}."
+    size = f"{percent_of(found.size)}{f' ({_LEVEL}{low}–{high} %)' if low != high else ''}"
+    # an error below the noise is known no better than that
+    besides = f"; noise {noise}" if noise and answer.noise > found.size else ""
+    if not found.unseen:  # of fitted runs it is no error that a prediction could have
+        return f"Residual of the fitted runs {size}{besides}."
+    one = answer.expected("sigma12")
+    faster = ""
+    if one.beyond is not None and one.beyond_at.startswith(MEASURED_AT):
+        faster = f", faster runs {_at_most(one.beyond)}"
+    return f"Error: {found.unseen} {size}{faster}{besides}."
 
 
-def flows(answer: Any) -> str:
-    """Return the kinds of flow, in words."""
-    return listed([str(_FLOWS.get(one, one)) for one in answer.range.flows])
+MEASURED_AT = "measured at"
+"""What stands before the rate at which an error beyond the range was measured."""
+
+
+def flows_of(kinds: Sequence[str]) -> str:
+    """Return kinds of flow, in words."""
+    return listed([str(_FLOWS.get(one, one)) for one in kinds])
 
 
 _FLOWS = {
@@ -127,15 +162,13 @@ def where(answer: Any) -> str:
         found += [] if one.frequency_rad_s is None else [f"{span(one.frequency_rad_s)} rad/s"]
     if not found:
         return ""
-    place = ", ".join([flows(answer), *found])
+    place = ", ".join([flows_of(answer.range.flows), *found])
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
     one = answer.expected("uniaxial")
     missed = (one.inside if one.is_measured else None) or 0.0
     if missed > _USELESS and "uniaxial" not in answer.range.flows:  # else it was fitted
-        place += f", not in {SYMBOLS['uniaxial']} ({_at_most(missed)} error)"
-    if answer.adequate is False:
-        return f"Use in {place}, if {percent_of(answer.size)} error is acceptable."
+        place += f", not in {SYMBOLS['uniaxial']}"
     return f"Use in {place}."
 
 
@@ -173,30 +206,25 @@ def tolerance(answer: Any) -> str:
     """Return whether the tolerance is met, where, and for which quantities."""
     if answer.adequate is None:
         return ""
-    asked = percent_of(answer.tolerance)
-    within = [name for name in SYMBOLS if answer.within_tolerance(name)]
-    met = [SYMBOLS[name] for name in within if answer.expected(name).is_measured]
-    assumed = [SYMBOLS[name] for name in within if not answer.expected(name).is_measured]
-    missed = [SYMBOLS[name] for name in SYMBOLS if answer.within_tolerance(name) is False]
-    over = _over_tolerance(answer)
-    where_over = counted(len(over), "run") if over else ""
-    if where_over and missed[:1] == [SYMBOLS["sigma12"]] and len(missed) > 1:
-        missed[0] += f" ({where_over})"  # the others were measured in none of these
-        where_over = ""
-    if not answer.adequate and not (missed or where_over):
-        said = "not met"
-    elif not answer.adequate or missed:
-        # stress is what it is about, unless others miss it as well
-        of = "" if missed in ([], [SYMBOLS["sigma12"]]) else f" for {listed(missed)}"
-        met_for = f"met for {listed(met)}, " if met and of else ""
-        said = f"{met_for}not met{of}{f' in {where_over}' if where_over else ''}"
-    else:
-        residual = answer.expected("sigma12").is_residual
-        of = " by the fitted runs" if residual else f" for {listed(met)}" if met else ""
-        said = f"met{of}{f', but not in {where_over}' if where_over else ''}"
-    if assumed:
-        said += f"; {'met ' if 'not met' in said else ''}for {listed(assumed)} if this law holds"
-    return f"Tolerance {asked}: {said}."
+    over = len(_over_tolerance(answer))
+    found: dict[str, list[str]] = {}
+    for name, symbol in SYMBOLS.items():
+        one, within = answer.expected(name), answer.within_tolerance(name)
+        if name == "sigma12":
+            within = answer.adequate if within is None else within
+            runs = "" if not over else f" {'except ' * bool(within)}in {counted(over, 'run')}"
+            state = (
+                f"{'met' if within else 'not met'}{' by the fitted runs' * one.is_residual}{runs}"
+            )
+        elif within is None:
+            continue
+        elif one.is_measured:
+            state = "met" if within else "not met"
+        else:
+            state = "met if this law holds" if within else "untested"
+        found.setdefault(state, []).append(symbol)
+    said = [f"{listed(symbols)} {state}" for state, symbols in found.items()]
+    return f"Tolerance {percent_of(answer.tolerance)}: {'; '.join(said)}."
 
 
 def _over_tolerance(answer: Any) -> dict[str, float]:
@@ -278,8 +306,8 @@ def lines(answer: Any) -> list[str]:
                 text += f", beyond the range {_at_most(one.beyond)}{at}"
             parts.append(text)
         if (worst := worst_run(answer)) is not None:
-            parts.append("worst fitted run {}, {}".format(*worst))
+            parts.append("worst run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    found += [suspects(answer), *further(answer)]
+    found += [shifted(answer), suspects(answer), *further(answer)]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

@@ -27,6 +27,9 @@ LARGEST = 0.1
 SLOWEST_RATE = 1e-12  # in 1/s; slower is rest, for any instrument and any experimenter
 # Of the largest value of a flow curve or sweep: below it the noise is no longer in proportion
 _LEAST_STEADY = 1e-4
+TEMPERATURE = ("temperature_C", "temperature_C_measured")
+"""Columns of runs.csv that give the temperature of a run, in °C."""
+
 _NEEDED = ("time", "rate", "stress")
 _COLUMNS = (
     *_NEEDED, "first_normal_stress_difference", "second_normal_stress_difference", "strain",
@@ -259,6 +262,12 @@ class Run(NotebookView):
         if self.strain is None:
             raise InputError(f"The run {self.name!r} has no strain, so no frequency is known.")
         return self.rate / self.strain
+
+    @property
+    def temperature_C(self) -> float | None:
+        """Temperature at which it was measured, in °C, before any shift; None where not told."""
+        told = (self.metadata.get(key) for key in TEMPERATURE)
+        return next((float(one) for one in told if isinstance(one, int | float)), None)
 
     @property
     def source(self) -> str:

@@ -103,7 +103,6 @@ def wave_of(
 
 
 _MATERIAL = ("material", "sample", "sample_label")
-_TEMPERATURE = ("temperature_C", "temperature_C_measured")
 
 
 def temperature_of(runs: Iterable[Run]) -> float | None:
@@ -113,25 +112,22 @@ def temperature_of(runs: Iterable[Run]) -> float | None:
     """
     found = set()
     for run in runs:
-        values = [run.metadata.get(key) for key in _TEMPERATURE]
-        own = [float(round(v, 0)) for v in values if isinstance(v, int | float)][:1]
-        if not own or run.clock_factor != 1.0:
+        if run.temperature_C is None or run.clock_factor != 1.0:
             return None
-        found.update(own)
+        found.add(float(round(run.temperature_C, 0)))
     return found.pop() if len(found) == 1 else None
 
 
 def material_and_temperature(runs: Iterable[Run], material: str = "") -> str:
     """Material (a study's, or of runs.csv) and temperature of runs in words, if told."""
-    names, temperatures = [], []
+    names, temperatures = [], set()
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]
-        values = (run.metadata.get(key) for key in _TEMPERATURE)
-        temperatures += [round(v, 0) for v in values if isinstance(v, int | float)][:1]
+        temperatures |= set() if run.temperature_C is None else {round(run.temperature_C, 0)}
     parts = [material] if material else list(dict.fromkeys(names))
     if len(parts) > 2:  # names of fillings or files, which say nothing in a title
         parts = [f"{len(parts)} samples"]
-    spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(set(temperatures))]
+    spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(temperatures)]
     if len(spelled) > 2:
         spelled = [f"{spelled[0]} to {spelled[-1]}"]
     return ", ".join([*parts, *([f"{' and '.join(spelled)} °C"] if spelled else [])])

@@ -41,6 +41,8 @@ Scale = Literal[
     "stress_rate",
     "rate",
     "inertia",
+    "softening_by_heat",
+    "shift_factor",
 ]
 """What sets the natural size of a parameter: a property of the data, or nothing (``one``)."""
 

@@ -90,17 +90,17 @@ VISCOUS_HEATING = ViscousHeating(
     parameters=(
         EffectParameter(
             "heating", r"b_\mathrm{h}", "1/Pa", meaning="fall of ln λ per unit work", low=0.0,
-            high=1e-6, scale="inverse_stress", first_trial=0.01,
-            range_source="−d ln a_T/dT is 0.01 to 0.1 1/K, and 0.8 at a glass transition (Ferry "
-            "1980, ch. 11: 2.303 · 17.44/51.6 K); the heat capacity per volume of liquids is 1 to "
-            "4 MJ/(m³ K)",
+            high=1.0, scale="inverse_stress", first_trial=0.01, range_scale="softening_by_heat",
+            range_source="work that all becomes heat, with −d ln a_T/dT from the shift factors of "
+            "the runs; without these 0.8 1/K, as at a glass transition (Ferry 1980, ch. 11: 2.303 "
+            "· 17.44/51.6 K), where most liquids have 0.01 to 0.1; the heat capacity per volume of "
+            "liquids is 1 to 4 MJ/(m³ K)",
         ),
         EffectParameter(
-            "heat_loss_time", r"t_\mathrm{h}", "s", low=1e-4, high=1e5, scale="run_time",
-            first_trial=0.3, ends=("high",),
+            "heat_loss_time", r"t_\mathrm{h}", "s", low=1e-4, high=25.0, scale="run_time",
+            first_trial=0.3, range_scale="shift_factor",
             range_source="H²/(π² a) with the diffusivity of heat of liquids, a = 1e-7 m²/s, and a "
-            "gap H from 10 µm on; insulating walls, and times shifted to another temperature, "
-            "lengthen it without limit (Winter 1977)",
+            "gap H of 10 µm to 5 mm between walls of metal (Winter 1977)",
         ),
     ),
     equation=r"\lambda_k \to \lambda_k e^{-\Theta},\quad "

@@ -20,11 +20,11 @@ def reference_page() -> str:
         "",
         "These are the effects that the closed loop may add to a declared law. The first",
         "parameter of an effect is its amplitude: at zero the effect changes nothing. The range",
-        "of a parameter is the range that it can have in a laboratory. If a fit drives a",
-        "parameter to the end of its range, or leaves it open over decades, that is not a",
-        "finding, and the effect is not named. Any term of the tensor library, such as",
-        "`tr(sigma)*sigma`, is a candidate too. An effect of your own is one file: see [adding",
-        "an effect](adding-an-effect.md).",
+        "of a parameter is the range that it can have in a laboratory. A constant at the end of",
+        "its range is given as a bound, one that is open over decades as *not determined*:",
+        "neither is a finding. Any term of the tensor library, such as `tr(sigma)*sigma`, is a",
+        "candidate too. An effect of your own is one file: see [adding an",
+        "effect](adding-an-effect.md).",
         "",
         "This page is written by `python -m discover.effects.reference > docs/effects.md`; a",
         "test checks it against the code.",
@@ -76,6 +76,8 @@ _PROPERTIES = {
     "fluidity": "largest rate/(rms stress)",
     "viscosity": "(rms stress)/(largest rate)",
     "stress_rate": "(rms stress)/(length of a run)",
+    "softening_by_heat": "(−d ln a_T/dT)/(1 MJ/(m³ K))",
+    "shift_factor": "shift factor of times",
 }
 """Properties of the data in which ranges are measured; medians over the fitted runs."""
 

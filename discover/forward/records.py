@@ -7,6 +7,7 @@ values that the mean is over, so that squares add up to a mean squared relative 
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, Literal, TypeVar
 
 import equinox as eqx
@@ -135,10 +136,11 @@ def relative_noise(run: Run, loading: Loading) -> float:
 _SEEN = 0.1
 
 
-def data_scales(runs: Sequence[Run]) -> dict[str, float]:
+def data_scales(runs: Sequence[Run], others: Sequence[Run] = ()) -> dict[str, float]:
     """Return the size of the properties in which effects scale their first trials.
 
-    Times are on the instrument's clock, but for ``run_time``, which is the material's.
+    Times are on the instrument's clock, but for ``run_time``, which is the material's. Of `others`
+    the temperatures count, and the shifts to these.
     """
     sweeps = [run for run in runs if run.protocol.control == "oscillation"]
     timed = [run for run in runs if run.protocol.control != "oscillation"]
@@ -171,7 +173,33 @@ def data_scales(runs: Sequence[Run]) -> dict[str, float]:
         "stress_rate": stress / length,
         "rate": rate,
         "inertia": stress * gap / rate,
+        "softening_by_heat": softening_by_heat([*runs, *others]),
+        "shift_factor": float(np.median([run.clock_factor for run in runs])),
     }
+
+
+_GLASS = 0.8
+"""−d ln a_T/dT at a glass transition, in 1/K   [Ferry 1980, ch. 11: 2.303 · 17.44/51.6 K]."""
+
+_HEAT_CAPACITY = 1e6
+"""Least heat capacity per volume of a liquid, in J/(m³ K)."""
+
+
+def softening_by_heat(runs: Sequence[Run]) -> float:
+    """Return by how much a unit of work can shorten relaxation times by its heat, in 1/Pa.
+
+    −d ln a_T/dT is the steepest between two temperatures to whose shift factors runs were shifted;
+    that of a glass transition where these are not known.
+    """
+    shifts = {
+        round(run.temperature_C): np.log(run.clock_factor)
+        for run in runs
+        if run.temperature_C is not None
+    }
+    at = sorted(shifts)
+    slopes = [(shifts[b] - shifts[a]) / (b - a) for a, b in pairwise(at)]
+    steepest = max(slopes, default=0.0)
+    return (steepest if steepest > 0.0 else _GLASS) / _HEAT_CAPACITY
 
 
 OBSERVED = ("recorded", "first_normal_stress_difference", "second_normal_stress_difference")

@@ -13,11 +13,11 @@ from discover.answer import (
     ExpectedError,
     Mode,
     Suspect,
-    sentences,
 )
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
+from discover.dataset.run import TEMPERATURE
 from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
@@ -103,6 +103,7 @@ def loop_answer(result: Any) -> Answer:
         alternative=_alternative(result),
         tolerance=result.tolerance,
         temperature_C=result.temperature_C,
+        shift_factors=_shift_factors(result.records),
     )
     if equation is None:
         near = result.nearest_law
@@ -111,6 +112,18 @@ def loop_answer(result: Any) -> Answer:
         written = {"formula": rest_of_h(others)} if others else {}
         return replace(answer, shown=shown, classical=classical, written=written)
     return replace(answer, equation=replace(equation, notes=(*equation.notes, *answer.lines)))
+
+
+def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
+    """Return the factors on the times of shifted runs by temperature in °C, the hottest first."""
+    found = {}
+    for record in records:
+        told = (record.conditions.get(key) for key in TEMPERATURE)
+        at = next((one for one in told if one is not None), None)
+        end = len(record.time) - 1
+        if at is not None and record.time[end] != record.instrument_time[end]:
+            found[float(round(at))] = float(record.time[end] / record.instrument_time[end])
+    return dict(sorted(found.items(), reverse=True))
 
 
 def _shown(result: Any) -> tuple[Equation | None, list[str]]:
@@ -172,13 +185,10 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
 
 
 def _failed(result: Any) -> str:
-    """Return what the law was not tested by, or failed."""
+    """Return what the law was not tested by."""
     if untested := untested_by(result):
         held_out = any(record.held_out for record in result.records)
         return _NOT_TESTED["transients" if untested == "states" and held_out else untested]
-    chance = result.remaining.get("probability")
-    if result.verdict == "unexplained" and chance is not None and chance < 0.05:
-        return "Residual systematic."
     return ""
 
 
@@ -197,7 +207,7 @@ def _alternative(result: Any) -> str:
         return ""
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
-    said = [LAWS[near.law].title, *sentences.constants(constants)]
+    said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     return f"Best classical law: {', '.join(said)}, error {percent_of(near.size)}."
 
 
@@ -226,7 +236,7 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             title = LAWS[LAW_OF_EFFECT[core]].title
         elif is_ucm and any(name in STRUCTURES for name in names):
             title, known = "thixotropic Maxwell", [*STRUCTURES]
-        added = [_added_title(name) for name in names if name not in known]
+        added = [effect_title(name) for name in names if name not in known]
         if base is not None:  # constants that were declared
             found = _law_first(base[1], found)
         if added:
@@ -235,19 +245,11 @@ def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple
             title = EMPIRICAL + title
         return None, title, tuple(found)
     name, values = named
-    title = LAWS[name].title + (" with solvent" if solvent else "")
+    title = LAWS[name].title + (" with Newtonian part" if solvent else "")
     if name == "ucm" and not shows_a_derivative(result):
         title = title.replace(LAWS[name].title, "linear viscoelastic")
         title += " (no nonlinear law determined)"
     return name, title, tuple(_law_first(values, found))
-
-
-def _added_title(effect: str) -> str:
-    return _ADDED.get(effect, effect_title(effect))
-
-
-_ADDED = {"solvent_viscosity": "solvent", "relaxation_mode": "added mode"}
-"""What is added to a law by some effects, where the name of the effect says less."""
 
 
 def shows_a_derivative(result: Any) -> bool:

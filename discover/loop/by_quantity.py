@@ -21,10 +21,11 @@ _APART = 0.2
 _WORTH_SAYING = 0.05
 """Relative difference between laws that is told of a quantity that nothing tested."""
 
-_FASTER = 1.01
+FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
-_UNSEEN, _FITTED = "unseen runs", "fitted runs"
+_UNSEEN, _HELD, _FITTED = "unseen runs", "held-out runs", "fitted runs"
+_LEFT_OUT = "left-out runs"
 
 _TWICE = f"predicted at {BEYOND:g}× the rate"
 
@@ -48,7 +49,7 @@ def with_unseen(result: Any) -> Discrepancy | None:
         return None
     found = Discrepancy(**result.discrepancy)
     errors = unseen_errors(result)
-    size, count = _rms(errors), len(errors)
+    size, count = _mean(errors), len(errors)
     if not found.size or size is None:
         return found
     # of few runs the size is uncertain, as that of normal misses is
@@ -60,14 +61,22 @@ def with_unseen(result: Any) -> Discrepancy | None:
         size=size,
         ci95=(float(ends[0]) * size, float(ends[1]) * size),
         by_run={**found.by_run, **left, **held},
-        unseen=_UNSEEN,
+        unseen=_which(result),
     )
+
+
+def _which(result: Any) -> str:
+    """Return which runs of the range no fit saw; empty where there are none."""
+    left_out = result.folds or result.left_out_error is not None
+    if left_out and (result.folds or not _held_inside(result)):
+        return _LEFT_OUT
+    return _UNSEEN if left_out else _HELD if _held_inside(result) else ""
 
 
 def unseen_errors(result: Any) -> list[float]:
     """Return errors without noise of runs that were left out in turn, and of those held out.
 
-    Of runs left out in turn only the root mean square is known, which each has then.
+    Of runs left out in turn only the mean is known, which each has then.
     """
     if result.folds:
         return [beyond_noise(fold.error_after, result.noise_floor) for fold in result.folds]
@@ -87,7 +96,7 @@ def _held_inside(result: Any) -> list[RunRecord]:
         for record in result.records
         if record.held_out
         and (record.flow, record.quantity) in kinds
-        and record.fastest <= _FASTER * fastest
+        and record.fastest <= FASTER * fastest
         and np.isfinite(record.errors[-1])
     ]
 
@@ -174,16 +183,17 @@ def of_stress(result: Any) -> ExpectedError:
     """Return the expected error of σ12: that of unseen runs, as the first line has it."""
     fastest = max((r.fastest for r in result.records if not r.held_out), default=0.0)
     held = [r for r in result.records if r.held_out and _is(r, "sigma12")]
-    fast = [r for r in held if r.fastest > _FASTER * fastest]
+    fast = [r for r in held if r.fastest > FASTER * fastest]
     errors = unseen_errors(result)
-    inside, beyond, at = _rms(errors), _rms([_missed(r, result) for r in fast]), _measured_at(fast)
+    inside, at = _mean(errors), _measured_at(fast)
+    beyond = _mean([_missed(r, result) for r in fast])
     spread = result.spread_of_laws.get("sigma12")
     if beyond is None and spread is not None and spread.beyond is not None:
         beyond, at = max(spread.beyond, inside or 0.0), _TWICE
     if inside is None and result.material is not None:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
         return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
-    return ExpectedError(inside, beyond, at, note=_UNSEEN if errors or fast else "")
+    return ExpectedError(inside, beyond, at, note=_which(result))
 
 
 def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
@@ -196,19 +206,20 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
         return None
     held = [record for record in own if record.held_out]
     fastest = max((r.fastest for r in records if not r.held_out), default=0.0)
-    fast = [r for r in held if r.fastest > _FASTER * fastest]
-    slow = [r for r in (held or own) if r.fastest <= _FASTER * fastest]
+    fast = [r for r in held if r.fastest > FASTER * fastest]
+    slow = [r for r in (held or own) if r.fastest <= FASTER * fastest]
     inside, beyond = (
-        _rms([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
+        _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    note = _UNSEEN if held else _FITTED
+    note = _HELD if held else _FITTED
     return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
 
 
 def _measured_at(fast: Sequence[RunRecord]) -> str:
     """Return at which rate runs beyond the range were measured."""
     rates = [record.fastest for record in fast]
-    return f"measured at {sentences.span((min(rates), max(rates)))} 1/s" if rates else ""
+    ends = sentences.span((min(rates), max(rates))) if rates else ""
+    return f"{sentences.MEASURED_AT} {ends} 1/s" if rates else ""
 
 
 def _is(record: RunRecord, kind: str) -> bool:
@@ -219,8 +230,6 @@ def _is(record: RunRecord, kind: str) -> bool:
     return record.flow == "shear" and record.quantity == kind
 
 
-def _rms(errors: Sequence[float]) -> float | None:
-    """Return a root mean square; None of nothing, or where a law diverges."""
-    if not errors or not np.all(np.isfinite(errors)):
-        return None
-    return float(np.sqrt(np.mean(np.square(errors))))
+def _mean(errors: Sequence[float]) -> float | None:
+    """Return the mean over runs; None of nothing, or where a law diverges."""
+    return float(np.mean(errors)) if errors and np.all(np.isfinite(errors)) else None

@@ -38,7 +38,8 @@ from discover.loop.path import Path
 from discover.loop.run_record import errors_of
 from discover.loop.runs import why_untested
 from discover.loop.step_instants import instants_found
-from discover.statistics.noise.whiteness import SIGNIFICANCE, noise_probability
+from discover.statistics.noise.whiteness import FEWEST_FAST, SIGNIFICANCE, noise_probability
+from discover.statistics.residual import fast_part
 from discover.words import p_value, percent_of
 
 _DRAWS = 2000
@@ -118,16 +119,15 @@ class Ended(Path):
     def discrepancy(self) -> dict[str, Any] | None:
         """Size of what the law leaves; None where no hypothesis can be followed.
 
-        Where runs left out in turn tell it, by how much the law misses these: then their root mean
-        square, and its interval for misses that are normal.
+        Where runs left out in turn tell it, by how much the law misses these: then their mean, and
+        its interval for misses that are normal.
         """
-        size = None if self.without_fluid else self.posterior.discrepancy()
-        if size is None or self.verdict != "unexplained" or self.left_out_error is None:
+        size, missed = None if self.without_fluid else self.posterior.discrepancy(), self._left_out
+        if size is None or self.verdict != "unexplained" or missed is None:
             return None if size is None else asdict(size)
-        assert self.posterior.left is not None
-        missed = self.posterior.missed(self.posterior.left.fit)
         if len(missed) < FEWEST_RUNS:
             return asdict(size)
+        assert self.left_out_error is not None
         ends = np.sqrt(len(missed) / chi2.ppf((0.975, 0.025), len(missed)))
         low, high = (float(end) * self.left_out_error for end in ends)
         names = [run.name for run in self.posterior.problem.fitted.runs]
@@ -136,11 +136,22 @@ class Ended(Path):
 
     @property
     def left_out_error(self) -> float | None:
-        """Relative error of fitted runs left out in turn, rms; None without a hypothesis."""
+        """Mean relative error of fitted runs left out in turn; None without a hypothesis."""
+        return None if self._left_out is None else float(np.mean(self._left_out))
+
+    @cached_property
+    def _left_out(self) -> Float[np.ndarray, " runs"] | None:
+        """Error besides noise of each fitted run that is left out; None of a single one."""
         if self.without_fluid or self.posterior.left is None:
             return None
-        missed = self.posterior.missed(self.posterior.left.fit)
-        return float(np.sqrt(np.mean(missed**2))) if len(missed) > 1 else None
+        fit = self.posterior.left.fit
+        missed = self.posterior.missed(fit)
+        if len(missed) < 2:
+            return None
+        if self.verdict != "unexplained":
+            return missed
+        # what the fit takes for noise is not all noise here
+        return np.sqrt(np.maximum(fit.memory["missed"] ** 2 - self.noise**2, 0.0))
 
     def stages(self) -> tuple[Stage, ...]:
         """Return the effects of the likeliest hypothesis, in order."""
@@ -255,9 +266,18 @@ class Ended(Path):
 
     @property
     def noise(self) -> float:
-        """Relative noise, mean over the fitted runs."""
-        known = self.posterior.problem.noise
-        return float(np.mean(self.fit.noise.sizes)) if known is None else known
+        """Relative noise, mean over the fitted runs.
+
+        Where a residual is left, only what of it changes from sample to sample.
+        """
+        if (known := self.posterior.problem.noise) is not None:
+            return known
+        sizes = self.fit.noise.sizes
+        if self.verdict == "unexplained":
+            left = [r.relative_residual[-1] for r in self.records if not r.held_out]
+            told = [len(values) >= FEWEST_FAST for values in left]
+            sizes = np.where(told, np.minimum([fast_part(values) for values in left], sizes), sizes)
+        return float(np.mean(sizes))
 
     def _in_words(self, probability: float | None) -> str:
         none = percent_of(self.posterior.unexplained)

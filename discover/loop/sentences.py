@@ -128,7 +128,8 @@ def _of_another_stress(result: Any) -> str:
         if kind == "N1":
             in_reach = stress is None or stress >= _LEAST_NORMAL_STRESS
         else:
-            in_reach = rate <= _FASTEST_EXTENSION
+            thick = stress is None or stress >= _LEAST_TENSILE_VISCOSITY * rate
+            in_reach = thick and rate <= _FASTEST_EXTENSION
         if in_reach and measured(result.records, kind, None) is None:
             fastest = significant(rate, 2)
             says = f"laws that fit as well differ by {percent_of(apart)}"
@@ -138,6 +139,10 @@ def _of_another_stress(result: Any) -> str:
 
 _FASTEST_EXTENSION = 30.0
 """Extension rate in 1/s that rheometers do not exceed [Sentmanat 2004, Rheol. Acta 43, 657]."""
+
+_LEAST_TENSILE_VISCOSITY = 1e3
+"""Tensile stress over rate in Pa s below which a strip does not keep its shape until it is drawn:
+instruments for extension at a given rate take melts   [Sentmanat 2004]."""
 
 _LEAST_NORMAL_STRESS = 1.0
 """N1 in Pa below which no rheometer tells it: axial transducers resolve some 1e-3 N, and N1 is

@@ -16,7 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer, Suspect
+from discover.answer import Answer, Constant, ExpectedError, Suspect
 from discover.answer.sentences import (
     NOT_SEPARABLE,
     SUSPECTED,
@@ -24,10 +24,12 @@ from discover.answer.sentences import (
     error_title,
     expected,
     further,
+    is_a_set,
     law,
     linear_part,
     quality,
     separable,
+    shifts,
     worst_run,
 )
 from discover.effects import StateEffect
@@ -116,6 +118,7 @@ def _environment() -> Environment:
         readable=readable,
         subscripts=_subscripts,
         explained=_explained,
+        file_name=_file_name,
         safe_svg=Markup,
         as_link=_as_link,
     )
@@ -178,7 +181,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
-        "expected": (), "modes": (), "linear": "", "solvent": 0.0,
+        "expected": (), "modes": (), "linear": "", "solvent": 0.0, "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -197,22 +200,14 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     return found | {
         "law": _typeset(answer),
         "constants": [
-            (symbol, one.said, _in_cell(one.number), _in_cell(one.interval))
+            (symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
-        ],
-        "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
-        "expected": [
-            {
-                "symbol": symbol,
-                "inside": expected(one, "inside"),
-                "beyond": expected(one, "beyond"),
-                "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
-                "known": one.is_known,
-                "note": _unbroken(one.note),
-            }
-            for symbol, one in rows
         ]
-        + _worst(answer),
+        + [("a_T", f"shift of times at {at}", factor, "–") for at, factor in shifts(answer)],
+        "set": is_a_set(answer),
+        "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
+        "suspected": SUSPECTED.lower() + _clock(answer),
+        "expected": _expected(rows) + _worst(answer),
         "modes": [
             (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
             for mode in answer.modes
@@ -224,13 +219,43 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     }
 
 
+def _clock(answer: Answer) -> str:
+    """Return that times of the instrument are its own where those of the law are shifted."""
+    timed = any(one.unit == "s" for suspect in answer.suspects for one in suspect.constants[:1])
+    return "; times on the instrument's clock" if timed and answer.shift_factors else ""
+
+
+def _said(one: Constant) -> str:
+    """Return what a constant is, and that its value is at an end of what is physical."""
+    return "; ".join(filter(None, [one.said, "at its physical limit" if one.bound else ""]))
+
+
+def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]:
+    """Return the rows of expected errors; quantities that nothing is known of share one."""
+    found: list[dict[str, Any]] = []
+    for symbol, one in rows:
+        row = {
+            "symbol": symbol,
+            "inside": _in_cell(expected(one, "inside")),
+            "beyond": _in_cell(expected(one, "beyond")),
+            "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
+            "known": one.is_known,
+            "note": _unbroken(one.note),
+        }
+        if found and not one.is_known and found[-1] == row | {"symbol": found[-1]["symbol"]}:
+            found[-1]["symbol"] += f", {symbol}"
+        else:
+            found.append(row)
+    return found
+
+
 def _worst(answer: Answer) -> list[dict[str, Any]]:
     """Return the row of the run that is missed most, if by more than the tolerance."""
     worst = worst_run(answer)
     if worst is None:
         return []
     note, error = worst
-    return [{"symbol": "worst fitted run", "inside": error, "beyond": "–", "beyond_at": "",
+    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "–", "beyond_at": "",
              "known": True, "note": note}]  # fmt: skip
 
 
@@ -296,8 +321,14 @@ def _explained(text: str) -> Markup:
 
 
 def _in_cell(text: str) -> str:
-    """Return a number or an interval that breaks before a power of ten at most."""
-    return _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace("\N{NO-BREAK SPACE}×", " ×")
+    """Return a number that breaks between a power of ten and its unit, or an interval before it."""
+    whole = _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace(")\N{NO-BREAK SPACE}", ") ")
+    return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)
+
+
+def _file_name(text: str) -> Markup:
+    """Return a note, escaped, in which a name of a file may break behind an underscore."""
+    return Markup(str(escape(text)).replace("_", "_<wbr>"))
 
 
 def _typeset(answer: Answer) -> str:

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import jax
@@ -109,8 +110,33 @@ def test_every_parameter_of_a_declared_law_has_a_range_with_a_source(law):
 
 def test_no_liquid_is_warmed_by_more_than_its_heat_capacity_allows():
     heating = make_effect("viscous_heating").parameters[0]
+    most = heating.high * data_scales([run()])[heating.range_scale]
     # 0.1 1/K in water, 4.2 MJ/(m³ K), and 0.03 1/K in oil, 1.7 MJ/(m³ K), are possible; 25 is not
-    assert heating.low < 0.1 / 4.2e6 < 0.03 / 1.7e6 * 10 < heating.high < 1e-5
+    assert heating.low < 0.1 / 4.2e6 < 0.03 / 1.7e6 * 10 < most < 1e-5
+
+
+def test_shift_factors_say_how_much_heat_can_shorten_times():
+    def at(celsius, shift):
+        return replace(run(), metadata={"temperature_C": celsius}, clock_factor=shift)
+
+    def most(*runs):
+        return data_scales(*runs)["softening_by_heat"]
+
+    # 0.168 1/K, as of polyisoprene, at no less than 1 J/(cm³ K)
+    melt = [at(-10.0, 131.2), at(-23.0, 14.77)]
+    assert most(melt) == pytest.approx(np.log(131.2 / 14.77) / 13.0 / 1e6)
+    # runs that are only predicted tell temperatures too; several at one temperature tell nothing
+    assert most(melt[:1], melt[1:]) == most(melt)
+    assert most([melt[0], at(-10.2, 131.2)]) == most([run()])
+
+
+def test_heat_leaves_a_gap_on_the_clock_of_the_instrument():
+    loss = make_effect("viscous_heating").parameters[1]
+    assert loss.range_scale == "shift_factor"
+    assert data_scales([replace(run(), clock_factor=131.2)])["shift_factor"] == pytest.approx(131.2)
+    # H²/(π² a) of a gap of 1 mm is a second; of one of 10 cm, which no rheometer has, hours
+    one, large = (h**2 / (np.pi**2 * 1e-7) for h in (1e-3, 0.1))
+    assert loss.low < one < loss.high < large
 
 
 @pytest.mark.parametrize(

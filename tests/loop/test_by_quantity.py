@@ -11,6 +11,7 @@ from discover.loop.answering import shows_a_derivative
 from discover.loop.by_quantity import errors_by_quantity, with_unseen
 from discover.loop.expected_errors import Spread
 from discover.loop.fitted_range import range_of
+from discover.loop.from_posterior import Ended
 from discover.loop.run_record import RunRecord
 from discover.loop.sentences import what_to_measure_next
 
@@ -45,7 +46,7 @@ FITTED = [record("slow", 0.1, 0.02), record("middle", 0.3, 0.03), record("fast",
 def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     held = record("seen not", 0.5, float(np.hypot(0.12, NOISE)), held_out=True)
     found = result([*FITTED, held])
-    size = np.sqrt((3 * 0.06**2 + 0.12**2) / 4)
+    size = (3 * 0.06 + 0.12) / 4  # the mean over runs, as everywhere
     told = with_unseen(found)
     assert told is not None
     assert told.size == pytest.approx(size)
@@ -53,7 +54,40 @@ def test_first_line_and_table_have_one_error_of_all_unseen_runs_without_noise():
     # deviation of four normal draws
     assert told.ci95 == pytest.approx(size * np.sqrt(4 / chi2.ppf((0.975, 0.025), 4)))
     assert told.by_run["seen not"] == pytest.approx(0.12)
-    assert told.unseen
+    assert told.unseen == "unseen runs"
+    assert with_unseen(result(FITTED)).unseen == "left-out runs"
+    assert with_unseen(result([*FITTED, held], left_out_error=None)).unseen == "held-out runs"
+
+
+def ended(verdict, known=None):
+    """A posterior of a run with 1 % noise on a slow residual of 6 %, all taken for noise."""
+    time = np.linspace(0.0, 1.0, 800)
+    left = 0.06 * np.sin(9.0 * time) + 0.01 * np.random.default_rng(0).standard_normal(800)
+    run = SimpleNamespace(held_out=False, relative_residual=np.array([left]))
+    raw = np.array([0.07, 0.08])
+    fit = SimpleNamespace(noise=SimpleNamespace(sizes=np.array([0.06])), memory={"missed": raw})
+    posterior = SimpleNamespace(
+        problem=SimpleNamespace(noise=known), left=SimpleNamespace(fit=fit),
+        missed=lambda fit: np.sqrt(raw**2 - 0.06**2),
+    )  # fmt: skip
+    found = SimpleNamespace(
+        posterior=posterior, fit=fit, verdict=verdict, records=[run], without_fluid=False
+    )
+    found.noise = Ended.noise.fget(found)
+    return found
+
+
+def test_noise_is_what_changes_from_sample_to_sample_where_a_residual_is_left():
+    # the deviation of a median of 800 differences is some 5 %
+    assert ended("unexplained").noise == pytest.approx(0.01, rel=0.2)
+    assert ended("effects_added").noise == pytest.approx(0.06)  # there the fit has its noise
+    assert ended("unexplained", known=0.02).noise == 0.02
+
+
+def test_runs_left_out_are_missed_by_what_is_not_noise():
+    left = Ended._left_out.func
+    assert left(ended("unexplained")) == pytest.approx([0.0693, 0.0794], rel=0.01)
+    assert left(ended("effects_added")) == pytest.approx([0.036, 0.053], rel=0.01)
 
 
 def test_a_run_beyond_the_rates_does_not_count_inside():
@@ -119,6 +153,11 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     for size, asked in ((0.05, "Measure uniaxial extension"), (2.0, "Measure N1")):
         weak = {"N1": Spread(0.6, 0.8, stress=size), "uniaxial": Spread(1.2, 1.3)}
         assert what_to_measure_next(result(FITTED, spread_of_laws=weak)).startswith(asked)
+    # nor is a liquid stretched that does not keep its shape, such as blood of 0.01 Pa s
+    for viscosity, asked in ((0.03, "Repeat fast"), (3e4, "Measure uniaxial extension")):
+        thin = {"N1": Spread(0.6, 0.8, stress=0.05), "uniaxial": Spread(1.2, 1.3, stress=viscosity)}
+        told = what_to_measure_next(result(FITTED, spread_of_laws=thin, discrepancy=None))
+        assert told.startswith(asked)  # at 1 1/s
     same = {"N1": Spread(0.01, 0.01), "uniaxial": Spread(5.0, 5.0)}  # alike, and diverging
     again = what_to_measure_next(result(FITTED, spread_of_laws=same, discrepancy=None))
     assert again.startswith("Repeat fast with another gap")

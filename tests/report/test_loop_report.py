@@ -13,9 +13,13 @@ from discover.loop import CandidateScore, ErrorPair, LoopResult, RunRecord, Stag
 from discover.loop.constants import ConstantByMode, ModeConstant, StageParameter
 from discover.loop.parts import Explanation, Explanations, Fold
 from discover.report.loop.report import write_loop
-from discover.report.loop.tables import loop_verdict, noise_range
+from discover.report.loop.tables import loop_verdict, noise_range, remaining_rows
 from discover.report.page import render
-from discover.report.plots.loop.residual import residual_picture, run_error_picture
+from discover.report.plots.loop.residual import (
+    residual_picture,
+    run_error_picture,
+    waterfall_picture,
+)
 from discover.report.plots.loop.runs import lissajous_picture, rivals_picture, runs_picture
 from discover.report.plots.residual_map import levels, loop_residual_map
 from discover.report.plots.style import in_last_cycle
@@ -282,12 +286,35 @@ def without_stages():
     return replace(found, stages=(), records=records, error_after=found.error_before)
 
 
-def test_nothing_is_called_augmented_where_nothing_was_added():
+def test_the_residual_has_no_row_that_says_nothing_and_no_chance_of_zero():
+    left = {"structured": False, "outliers": 0, "without_fluid": False, "probability": 1e-12}
+    rows = dict(remaining_rows(replace(loop_result(), remaining=left)))
+    assert rows == {"systematic residual": "no", "p-value of the residual, if noise": "< 0.001"}
+    told = {"outliers": 2, "without_fluid": True, "probability": 0.21}
+    assert dict(remaining_rows(replace(loop_result(), remaining=told))) == {
+        "outliers (excluded)": "2",
+        "no signal of the fluid": "yes",
+        "p-value of the residual, if noise": "0.2",
+    }
+
+
+def test_a_mean_of_held_out_runs_says_which_are_in_it_alone():
+    given = loop_result()
+    fitted, *_ = (r for r in given.records if not r.held_out)
+    held = replace(fitted, name="held", held_out=True)
+    assert "runs include" not in waterfall_picture(replace(given, records=(fitted, held))).caption
+    fast = replace(held, rate=3.0 * held.rate)
+    pulled = replace(held, name="pulled", flow="uniaxial", quantity="tensile_stress")
+    both = waterfall_picture(replace(given, records=(fitted, fast, pulled))).caption
+    assert "Held-out runs include faster runs and uniaxial extension." in both
+
+
+def test_effects_are_named_only_where_some_were_added():
     with_stage, without = loop_result(), without_stages()
     for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
-        assert "augmented" in draw(with_stage).svg
+        assert "law with effects" in draw(with_stage).svg
         drawn = draw(without).svg
-        assert "augmented" not in drawn
+        assert "law with effects" not in drawn
         assert "declared" in drawn
         assert "→" not in drawn
 
@@ -353,7 +380,7 @@ def test_a_residual_map_has_a_row_for_every_run_and_its_own_scale():
     assert "strain" in drawn.svg  # start-ups sampled over decades
     two = (oscillating(), oscillating("held.csv", True))
     assert "time (s)" in loop_residual_map(replace(loop_result(), records=two)).svg
-    assert drawn.svg.count("deepest at") == 2
+    assert drawn.svg.count("colour scale ±") == 2
 
 
 def several_explanations():

@@ -105,7 +105,7 @@ class Problem:
         self.declared, self.candidates = declared, tuple(candidates)
         self.noise, self.computed, self.loads_anew = noise, computed, bool(loading)
         self.loading = loading or (0.0 if computed else SCATTER_OF_RUNS)
-        self.scales = data_scales(fitted)
+        self.scales = data_scales(fitted, predicted)
         self.fitted, self.predicted = Rows.of(fitted), Rows.of(predicted) if predicted else None
         # the torque comes first
         read_by = {*map(transducer_of, [*fitted, *predicted])}

@@ -19,6 +19,8 @@ from discover.report.plots.loop.residual import (
     waterfall_picture,
 )
 from discover.report.plots.loop.runs import (
+    AS_DECLARED,
+    WITH_EFFECTS,
     free_form_picture,
     lissajous_picture,
     next_test_picture,
@@ -99,9 +101,9 @@ def write_loop(
         loadings=tables.loadings(result),
         small_faults=SMALL_FAULTS,
         readings=[
-            (f"Of the {name} model", reading.sentences)
-            for name, reading in zip(("declared", "augmented"), result.readings, strict=True)
-            if name == "declared" or result.stages
+            (f"{name[:1].upper()}{name[1:]}", reading.sentences)
+            for name, reading in zip((AS_DECLARED, WITH_EFFECTS), result.readings, strict=True)
+            if name == AS_DECLARED or result.stages
         ],
         pictures=drawn,
         run=run

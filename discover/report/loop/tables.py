@@ -24,6 +24,7 @@ from discover.words import (
     effect_title,
     effects_title,
     listed,
+    p_value,
     readable,
     significant,
 )
@@ -165,7 +166,7 @@ def error_rows(result: LoopResult) -> list[dict[str, Any]]:
     def errors(held_out: bool, model: int) -> list[float]:
         return [float(r.errors[model]) for r in result.records if r.held_out is held_out]
 
-    names = ["declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    names = ["as declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     rows = [
         {
@@ -373,7 +374,13 @@ _REMAINING = {
 def remaining_rows(result: LoopResult) -> list[tuple[str, str]]:
     """Return what is said of the residual, as names and values."""
     # factors of loadings have a table of their own
-    content = {key: value for key, value in result.remaining.items() if key != "loading"}
+    content = {
+        key: value
+        for key, value in result.remaining.items()
+        if key != "loading" and (value or key not in ("outliers", "without_fluid"))
+    }
+    if (chance := content.get("probability")) is not None:
+        content["probability"] = p_value(chance)
     said = {"none", "None", "", "{}"}  # a row that says nothing is none
     return [(_REMAINING.get(k, k), value) for k, value in _flatten(content) if value not in said]
 

@@ -121,7 +121,7 @@ def _draw(
             names = here
             panel.tick_params(axis="y", labelsize=8, length=0)
             panel.set_ylim(-0.6, len(mine) - 0.4)
-            panel.set_title(f"{title}: deepest at {percent(limit)}")
+            panel.set_title(f"{title} (colour scale ±{percent(limit)})")
             panel.set_xlabel(label)
             panel.grid(False)
         drawing.legend(
@@ -134,9 +134,8 @@ def _draw(
             drawing,
             "residual_map",
             f"Residual map: one row for each run, {order}. Prediction minus data over the run's "
-            "root-mean-square stress; the colour deepens as its square root, up to the size above "
-            "each panel. Streaks that stand at the same place in several rows are an effect that "
-            "the model lacks; noise is speckle.",
+            "root-mean-square stress; colour scale: square root of the residual. Vertical streaks "
+            "common to several runs point to a missing effect; noise looks like speckle.",
         )
 
 

@@ -101,8 +101,8 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
             "Left, stresses against time; beyond the times shaded grey the prediction runs past "
             "the length of the training series. Middle and right, the last cycle against strain "
             "and against shear rate. Shaded in orange is the 95 % band of all laws "
-            "that the data allow; what is not determined has no band. Curves of the known part "
-            "alone may leave the frame.",
+            "that the data allow; no band is drawn for undetermined quantities. Some curves of the "
+            "known part alone run off the plot.",
         )
 
 

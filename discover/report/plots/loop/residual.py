@@ -2,11 +2,15 @@
 
 import numpy as np
 
+from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
+from discover.loop.by_quantity import FASTER
 from discover.loop.reading import differences
 from discover.report.plots.loop.runs import (
+    AS_DECLARED,
     FIT_COLOUR,
     HELD_COLOUR,
+    WITH_EFFECTS,
     along_in_common,
     axis_label,
     models_of,
@@ -28,7 +32,7 @@ from discover.report.plots.style import (
     picture,
 )
 from discover.report.wording import percent
-from discover.words import effect_title
+from discover.words import effect_title, listed
 
 _UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
@@ -84,9 +88,9 @@ def residual_picture(result: LoopResult) -> Picture:
 
 def reading_picture(result: LoopResult) -> Picture | None:
     """Return on what the residual depends, before and after."""
-    readings = [(result.readings[0], "declared", BEFORE)]
+    readings = [(result.readings[0], AS_DECLARED, BEFORE)]
     if result.stages:
-        readings.append((result.readings[1], "augmented", FIT_COLOUR))
+        readings.append((result.readings[1], WITH_EFFECTS, FIT_COLOUR))
     if not readings[0][0].collapses:
         return None
     waves = any(reading.waves for reading, _, _ in readings)
@@ -129,7 +133,6 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
     for (model, label), colour in zip(
         models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
     ):
-        label = label.removesuffix(" model")
         errors = [100.0 * float(record.errors[model]) for record in result.records]
         panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
     if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
@@ -156,7 +159,7 @@ MOST_RANKED = 12
 
 def waterfall_picture(result: LoopResult) -> Picture:
     """Return the errors after each stage."""
-    labels = ["declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    labels = ["as declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
     with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
         panel = axes[0, 0]
@@ -185,10 +188,22 @@ def waterfall_picture(result: LoopResult) -> Picture:
             drawing,
             "waterfall",
             "Error after each effect added: root mean square of prediction minus measurement over "
-            "the root-mean-square stress, mean over runs."
-            + " Lines: from the best run to the worst."
-            * (len(result.records) > 1),
+            "the root-mean-square stress, noise included, mean over runs."
+            + _only_held_out(result)
+            + " Lines: from the best run to the worst." * (len(result.records) > 1),
         )
+
+
+def _only_held_out(result: LoopResult) -> str:
+    """Return which flows are in the mean of held-out runs alone, and whether faster runs are."""
+    fitted = [record for record in result.records if not record.held_out]
+    held = [record for record in result.records if record.held_out]
+    known = {record.flow for record in fitted}
+    others = [flows_of([one]) for one in dict.fromkeys(r.flow for r in held) if one not in known]
+    fastest = max((record.fastest for record in fitted), default=0.0)
+    faster = any(record.flow in known and record.fastest > FASTER * fastest for record in held)
+    parts = [*["faster runs"] * faster, *others]
+    return f" Held-out runs include {listed(parts)}." if parts else ""
 
 
 def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> None:
@@ -231,17 +246,18 @@ def ranking_picture(result: LoopResult) -> Picture | None:
 
 
 def run_error_picture(result: LoopResult) -> Picture:
-    """Return the error of every run before and after, or of the declared model alone."""
+    """Return the error of every run before and after, or of the law as declared alone."""
     records = result.records
-    model = "augmented" if any(len(r.errors) > 1 for r in records) else "declared"
+    added = any(len(r.errors) > 1 for r in records)
+    model = WITH_EFFECTS if added else AS_DECLARED
     with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
         panel = axes[0, 0]
         for position, record in enumerate(records[::-1]):
             before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
             colour = HELD_COLOUR if record.held_out else FIT_COLOUR
             panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
-            if model == "augmented":
-                panel.plot(before, position, "o", mfc="none", color=BEFORE, label="declared")
+            if added:
+                panel.plot(before, position, "o", mfc="none", color=BEFORE, label=AS_DECLARED)
             label = f"{model}, {'held out' if record.held_out else 'fitted'}"
             panel.plot(after, position, "o", color=colour, label=label)
         panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
@@ -249,5 +265,5 @@ def run_error_picture(result: LoopResult) -> Picture:
         make_percentage(panel.xaxis)
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
-        told = "before and after" if model == "augmented" else "of the declared model"
-        return picture(drawing, "run_errors", f"Residual by run: error {told}.")
+        told = "without and with effects" if added else "of the law as declared"
+        return picture(drawing, "run_errors", f"Error of each run, {told}.")

@@ -94,7 +94,7 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
 
 
 def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
-    """Return every run: measured, declared model, augmented model, and overlays."""
+    """Return every run: measured, the law as declared, with effects, and overlays."""
     records = result.records
     with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
         for panel, record in zip(panels, records, strict=True):
@@ -122,8 +122,8 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
         return picture(
             drawing,
             "runs",
-            "Every run in the window of the loop."
-            + " Runs in orange were held out: no fit saw them." * any(r.held_out for r in records)
+            "Measured and predicted, run by run."
+            + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
             + _what_is_drawn(records)
             + " Overlaid laws are the study's, fitted to nothing and without effects of the "
             "instrument." * bool(overlays),
@@ -131,7 +131,7 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
 
 
 def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
-    """Draw the measured stress, the declared and the augmented model of one run.
+    """Draw the measured stress, the law as declared and with effects in one run.
 
     `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
     `shown`: which samples are marked as measured, and between which the models are drawn.
@@ -149,14 +149,14 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
     )  # fmt: skip
     panel.plot(
         along[shown], record.predicted[0][shown], "-.", lw=1.1, color=BEFORE,
-        label="declared model",
+        label=AS_DECLARED,
     )  # fmt: skip
     if len(record.predicted) == 1:  # nothing was added
         return
     panel.plot(
         along[shown], record.predicted[-1][shown], lw=1.5,
         color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-        label="augmented, held out" if record.held_out else "augmented, fitted",
+        label=f"{WITH_EFFECTS}, {'held out' if record.held_out else 'fitted'}",
     )  # fmt: skip
 
 
@@ -172,8 +172,12 @@ def draw_overlays(
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
     """Return the models that a picture shows, by their place among the stages."""
-    augmented = [(-1, "augmented model")] * any(len(r.predicted) > 1 for r in records)
-    return [(0, "declared model"), *augmented]
+    augmented = [(-1, WITH_EFFECTS)] * any(len(r.predicted) > 1 for r in records)
+    return [(0, AS_DECLARED), *augmented]
+
+
+AS_DECLARED, WITH_EFFECTS = "law as declared", "law with effects"
+"""The two models of a closed loop, as pictures name them."""
 
 
 def short_title(record: RunRecord) -> str:
@@ -309,8 +313,8 @@ def next_test_picture(result: LoopResult) -> Picture | None:
         return picture(
             drawing,
             "next_test",
-            f"What to measure next: {best.title}. Each explanation as it predicts it, all of which "
-            f"fit these data; noise is {percent(following.noise)}.",
+            f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
+            f"which fit these data. Assumed noise: {percent(following.noise)}.",
         )
 
 
@@ -341,7 +345,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
                     label="held out" if record.held_out else "fitted",
                 )  # fmt: skip
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
-            names = "\n+ ".join(map(effect_title, one.effects)) or "the declared model alone"
+            names = "\n+ ".join(map(effect_title, one.effects)) or "the law as declared"
             found = ", found by the search" if one is chosen else ""
             panel.set_title(f"{names}\n({percent(one.probability)}{found})", fontsize=8)
             panel.axhline(0.0, color=INK, lw=0.6)
@@ -358,7 +362,6 @@ def rivals_picture(result: LoopResult) -> Picture | None:
         return picture(
             drawing,
             "rivals",
-            "Prediction minus measurement of every run by each explanation, over the run's "
-            "root-mean-square, on one scale; over each panel its effects and their probability."
-            + left,
+            "Residual of every run for each explanation, over the run's root-mean-square, on one "
+            "scale. Above each panel: its effects and their probability." + left,
         )
