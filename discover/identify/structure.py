@@ -17,7 +17,12 @@ from jaxtyping import Array, Bool, Float
 
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import in_enough_steps, observed_on_grid
+from discover.forward.fluids import (
+    dynamics_of_fluid,
+    in_enough_steps,
+    observed_of_dynamics,
+)
+from discover.forward.tangents import with_cheap_tangents
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
     Direction,
@@ -29,7 +34,7 @@ from discover.identify.relations import (
 from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
-from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.learners.runs import as_runs
 from discover.programs import compiled, on_device
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
@@ -43,9 +48,21 @@ def with_sensitivities(
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
     """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients."""
 
+    def stress_rate(made, coefficients, *flow):
+        return replace(made, coefficients=coefficients).stress_rate(*flow)
+
+    def one(coefficients, protocol, grid):
+        def dynamics(coefficients):
+            def of_mode(made, *flow):
+                return with_cheap_tangents(stress_rate, made)(coefficients, *flow)
+
+            fluid = replace(known, law=law)
+            return dynamics_of_fluid(fluid, protocol)._replace(slope=over_modes(of_mode, law, -1))
+
+        return observed_of_dynamics(dynamics, coefficients, known, protocol, grid)
+
     def observed(coefficients):
-        moved = replace(law, coefficients=coefficients)
-        found = flows.over(partial(observed_on_grid, replace(known, law=moved)))
+        found = flows.over(partial(one, coefficients))
         return found, found
 
     columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
