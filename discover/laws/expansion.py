@@ -77,7 +77,7 @@ def law_of_terms(
     )
 
 
-# the terms that are searched for by default, so that what is found shares programs with what is known
+# terms searched for by default, so that what is found shares programs with what is known
 _SHARED = build_library(degree=1)
 
 
