@@ -1,6 +1,6 @@
 """Physical soundness of a law: checks that need no data, with where it fails."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -8,12 +8,11 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
-from discover.forward.flow_batch import FlowBatch
-from discover.forward.fluids import in_enough_steps
 from discover.identify import physics_flows
 from discover.laws import Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
+from discover.protocols.protocol import FlowProtocol
 from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly
 
@@ -79,22 +78,47 @@ class PhysicsReport(SentenceAndTable):
         return {"text": self.text, "checks": [asdict(check) for check in self.checks]}
 
 
-def check_physics(
-    fluid: Fluid, flows: FlowBatch, names: Sequence[str], weissenberg: float, deborah: float
-) -> PhysicsReport:
-    """Return the checks of a fluid.
+@dataclass(frozen=True)
+class Seen:
+    """A fluid along flows, and in oscillations up to beyond the box of training.
 
-    `flows`: those along which stresses are looked at. `weissenberg`, `deborah`: largest rate and
-    frequency of training, times the mean relaxation time: the box beyond which the law
-    extrapolates.
+    `weissenberg`, `deborah`: largest rate and frequency of training, times the mean relaxation
+    time: the box beyond which the law extrapolates.
     """
-    fluid = replace(fluid, law=in_shared_form(fluid.law))
-    along = physics_flows.trajectories(fluid, in_enough_steps(fluid, flows))
+
+    fluid: Fluid
+    weissenberg: float
+    deborah: float
+    along: physics_flows.Trajectories  # the flows asked for
+    beyond: physics_flows.Cycles
+    work: Float[np.ndarray, " cycles"]  # of each of these cycles
+
+
+def see(
+    fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]],
+    weissenberg: float, deborah: float,
+) -> Seen:  # fmt: skip
+    """Return what a fluid does along flows, and what its checks need beside, by one program.
+
+    `times`: of samples in s. `weissenberg`, `deborah`: as of `Seen`.
+    """
     beyond = physics_flows.cycles(
-        fluid,
+        physics_flows.time_scale(fluid),
         [weissenberg * factor for factor in _BOX_FACTORS],
         [deborah * factor for factor in _DEBORAH_FACTORS],
     )
+    found = physics_flows.trajectories(
+        fluid, [*protocols, *beyond.protocols], [*times, *beyond.times]
+    )
+    count = len(protocols)
+    work = beyond.work([observed[:, 0] for observed in found.observed[count:]])
+    return Seen(fluid, weissenberg, deborah, found.some(range(count)), beyond, work)
+
+
+def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
+    """Return the checks of a fluid. `names`: of the flows along which stresses are looked at."""
+    fluid = replace(seen.fluid, law=in_shared_form(seen.fluid.law))
+    along, names = seen.along.some(list(names)), list(names.values())
     times = np.asarray(fluid.relaxation_time)
     rates = SHEAR_RATES / physics_flows.time_scale(fluid)
     shear = [
@@ -104,11 +128,11 @@ def check_physics(
     found = {
         "conformation tensor positive definite": _conformation(along, names),
         "dissipation non-negative": _free_energy(along, names),
-        "work over a cycle non-negative": _work(beyond),
-        "flow curve monotonic": _flow_curve(fluid, shear, rates, weissenberg),
+        "work over a cycle non-negative": _work(seen),
+        "flow curve monotonic": _flow_curve(fluid, shear, rates, seen.weissenberg),
         "steady extension bounded": _extension(fluid),
         SMALL_STRAIN: _small_strain(shear),
-        "integrates beyond training": _reach(beyond, weissenberg, deborah),
+        "integrates beyond training": _reach(seen),
     }
     return PhysicsReport(tuple(PhysicsCheck(name, *one) for name, one in found.items()))
 
@@ -140,13 +164,13 @@ def _free_energy(along: physics_flows.Trajectories, names: Sequence[str]) -> _Fo
     return passed, value, where, text
 
 
-def _work(beyond: physics_flows.Cycles) -> _Found:
+def _work(seen: Seen) -> _Found:
     # at the Weissenberg number of training, which is the first
-    usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
+    usable = [(i, w) for i, w in enumerate(seen.work[:_PER_RATE]) if np.isfinite(w)]
     if not usable:
         return None, None, "", "The law diverges in the oscillations tried."
     run, value = min(usable, key=lambda pair: pair[1])
-    where = beyond.names[run]
+    where = seen.beyond.names[run]
     text = (
         f"The work σ:d over the last cycle is at least {plainly(value)} of the product of the "
         f"largest stress and strain rate, in {where}."
@@ -246,8 +270,9 @@ def _small_strain(shear: Sequence[physics_flows.Branch]) -> _Found:
     return worst <= _LINEAR_TOLERANCE, worst, "at rest", text + "."
 
 
-def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> _Found:
-    finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
+def _reach(seen: Seen) -> _Found:
+    weissenberg, deborah = seen.weissenberg, seen.deborah
+    finite = np.isfinite(seen.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)
     reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
     least, most = (plainly(factor * deborah) for factor in _DEBORAH_FACTORS[:: _PER_RATE - 1])
@@ -257,7 +282,7 @@ def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> 
         where = f"Wi up to {plainly(limit)}, {box}"
         text = f"Oscillations stay finite in the whole grid tried, {where}."
         return True, limit, where, text
-    failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
+    failed = [seen.beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
         f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress diverges "

@@ -1,7 +1,7 @@
 """Flows in which laws are checked, many at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import jax
@@ -10,12 +10,13 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from discover.equations.equation import mean_relaxation_time
-from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import at_samples, in_enough_steps, solve_batch
+from discover.forward.flow_batch import lay_out
+from discover.forward.fluids import at_samples, in_enough_steps
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
+from discover.laws.expansion import in_shared_form
 from discover.programs import compiled, on_device
-from discover.protocols.protocol import oscillatory_shear
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear
 from discover.words import plainly
 
 _CYCLES = 3
@@ -24,45 +25,71 @@ _SAMPLES_A_CYCLE = 48
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Conformation and dissipation of each mode along flows, least over modes and samples.
+    """What a fluid does along flows: what is recorded, and what its conformation says.
 
-    `smallest_conformation`: eigenvalue of I + σ/G, shape (runs,); nan where the law diverges.
-    `dissipation`: σ:d − dF/dt over G/λ, with the energy F of Hookean dumbbells; nan if undefined.
+    `observed`: of each flow what is recorded, N1 and N2 in Pa, shape (n, 3); not finite where the
+    law diverges. `smallest_conformation`: eigenvalue of I + σ/G, the least over modes and samples,
+    shape (flows,); nan where the law diverges. `dissipation`: the least σ:d − dF/dt over G/λ, with
+    the energy F of Hookean dumbbells; nan if undefined.
     """
 
-    smallest_conformation: Float[np.ndarray, " runs"]
-    dissipation: Float[np.ndarray, " runs"]
+    observed: tuple[Float[np.ndarray, "_ 3"], ...]
+    smallest_conformation: Float[np.ndarray, " flows"]
+    dissipation: Float[np.ndarray, " flows"]
+
+    def some(self, flows: Sequence[int]) -> "Trajectories":
+        """Return those along some of the flows."""
+        kept = list(flows)
+        observed = tuple(self.observed[i] for i in kept)
+        return Trajectories(observed, self.smallest_conformation[kept], self.dissipation[kept])
 
     @staticmethod
-    def lowest(values: Float[np.ndarray, " runs"]) -> tuple[int | None, float]:
-        """Return the run with the smallest value, and the value; None where there is none."""
+    def lowest(values: Float[np.ndarray, " flows"]) -> tuple[int | None, float]:
+        """Return the flow with the smallest value, and the value; None where there is none."""
         if not np.any(np.isfinite(values)):
             return None, float("nan")
-        run = int(np.nanargmin(values))
-        return run, float(values[run])
+        flow = int(np.nanargmin(values))
+        return flow, float(values[flow])
 
 
-def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
-    """Return conformation and dissipation of a fluid along flows."""
-    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
-    sampled = np.asarray(flows.sample_mask)[..., None]
-    whole = np.all(np.isfinite(states), axis=(1, 2, 3))
-    smallest = np.where(sampled, smallest, np.inf).min(axis=(1, 2))
+# Lengths are rounded up, so that flows share programs
+_SAMPLES, _STEPS = 64, 256
+
+
+def trajectories(
+    fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]]
+) -> Trajectories:
+    """Return what a fluid does along flows from their starts on, all in one program.
+
+    `times`: of samples in s.
+    """
+    fluid = replace(fluid, law=in_shared_form(fluid.law))
+    longest = max(map(len, times))
+    flows = lay_out(
+        protocols, times, longest + -longest % _SAMPLES, fluid.settling_time, strain_step=0.2
+    )
+    flows = in_enough_steps(fluid, flows.with_steps_in(_STEPS))
+    observed, states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
+    sampled = np.asarray(flows.sample_mask)
+    whole = np.all(states | ~sampled, axis=1)
+    smallest = np.where(sampled, smallest, np.inf).min(axis=1)
     # without a positive definite conformation the stored energy is not defined
-    defined = np.where(sampled, dissipation, np.inf).min(axis=(1, 2))
+    defined = np.where(sampled, dissipation, np.inf).min(axis=1)
     return Trajectories(
-        np.where(whole, smallest, np.nan), np.where(whole & (smallest > 0.0), defined, np.nan)
+        tuple(own[: len(each)] for own, each in zip(observed, times, strict=True)),
+        np.where(whole, smallest, np.nan),
+        np.where(whole & (smallest > 0.0), defined, np.nan),
     )
 
 
 @compiled
 def _along(fluid, flows):
     def one(protocol, grid):
-        _, states, rates = at_samples(fluid, protocol, grid)
-        at_mode = over_modes(_energy, fluid.law)
+        observed, states, rates = at_samples(fluid, protocol, grid)
         scaled = rates[:, None] * fluid.relaxation_time
-        smallest, dissipation = jax.vmap(at_mode)(states, scaled)
-        return states, smallest, dissipation
+        smallest, dissipation = jax.vmap(over_modes(_energy, fluid.law))(states, scaled)
+        followed = jnp.all(jnp.isfinite(states), axis=(1, 2))
+        return observed, followed, jnp.min(smallest, axis=1), jnp.min(dissipation, axis=1)
 
     return flows.over(one)
 
@@ -86,14 +113,39 @@ def _energy(law, stress, rate):
 
 @dataclass(frozen=True)
 class Cycles:
-    """Oscillations over a grid of Weissenberg and Deborah numbers.
+    """Three cycles of oscillation from rest, over a grid of Weissenberg and Deborah numbers.
 
-    `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
-    where the law diverges.
+    `weissenberg`, `deborah`: of each, with the mean relaxation time. `protocols`, `times`: the
+    flows, and their samples in s.
     """
 
-    names: tuple[str, ...]  # of the flows, Weissenberg number first
-    work: Float[np.ndarray, " flows"]
+    weissenberg: Float[np.ndarray, " flows"]
+    deborah: Float[np.ndarray, " flows"]
+    protocols: tuple[FlowProtocol, ...]
+    times: tuple[Float[np.ndarray, " n"], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the flows, Weissenberg number first."""
+        pairs = zip(self.weissenberg, self.deborah, strict=True)
+        return tuple(f"oscillation at Wi = {plainly(wi)}, De = {plainly(de)}" for wi, de in pairs)
+
+    def work(self, stress: Sequence[Float[np.ndarray, " n"]]) -> Float[np.ndarray, " flows"]:
+        """Return ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate.
+
+        `stress`: σ12 of each flow in Pa. nan where the law diverges.
+        """
+        work = np.full(len(self.times), np.nan)
+        for i, (values, times) in enumerate(zip(stress, self.times, strict=True)):
+            if not np.all(np.isfinite(values)):
+                continue
+            last = slice(times.size - 1 - _SAMPLES_A_CYCLE, None)
+            phase = np.linspace(0.0, 2.0 * np.pi, _SAMPLES_A_CYCLE + 1)
+            largest = np.max(np.abs(values[last]))
+            # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
+            power = np.mean((values[last] * np.cos(phase))[:-1])
+            work[i] = power / largest if largest > 0 else 0.0
+        return work
 
 
 def time_scale(fluid: Fluid) -> float:
@@ -101,30 +153,14 @@ def time_scale(fluid: Fluid) -> float:
     return mean_relaxation_time(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
 
 
-def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
-    """Return three cycles of every pair of Wi and De (with the mean relaxation time)."""
-    scale = time_scale(fluid)
+def cycles(scale: float, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
+    """Return the cycles of every pair of Wi and De. `scale`: the time, in s, that these are of."""
     pairs = [(wi, de) for wi in weissenberg for de in deborah]
-    flows = [oscillatory_shear(wi / scale, de / scale) for wi, de in pairs]
-    times = [
-        np.linspace(0.0, _CYCLES * 2.0 * np.pi * scale / de, _CYCLES * _SAMPLES_A_CYCLE + 1)
-        for _, de in pairs
-    ]
-    laid_out = in_enough_steps(fluid, lay_out(flows, times, strain_step=0.2))
-    stress = np.asarray(solve_batch(fluid, laid_out))[..., 3]
-    work = np.full(len(pairs), np.nan)
-    for i, ((wi, de), t) in enumerate(zip(pairs, times, strict=True)):
-        values = stress[i, : t.size]
-        if not np.all(np.isfinite(values)):
-            continue
-        last = slice(t.size - 1 - _SAMPLES_A_CYCLE, None)
-        rate = wi / scale * np.cos(de / scale * t[last])
-        largest = np.max(np.abs(values[last])) * wi / scale
-        # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
-        power = np.mean((values[last] * rate)[:-1])
-        work[i] = power / largest if largest > 0 else 0.0
+    samples = np.linspace(0.0, _CYCLES * 2.0 * np.pi, _CYCLES * _SAMPLES_A_CYCLE + 1)
     return Cycles(
-        tuple(f"oscillation at Wi = {plainly(wi)}, De = {plainly(de)}" for wi, de in pairs), work
+        *np.transpose(pairs),
+        tuple(oscillatory_shear(wi / scale, de / scale) for wi, de in pairs),
+        tuple(samples * scale / de for _, de in pairs),
     )
 
 

@@ -6,8 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.forward.flow_batch import lay_out
-from discover.identify.physics import check_physics
+from discover.identify.physics import check_physics, see
 from discover.identify.physics_flows import SHEAR, UNIAXIAL, steady_branch
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
 from discover.protocols import oscillatory_shear
@@ -29,8 +28,8 @@ def expansion(**coefficients):
 def report(law, solvent=0.0):
     flows = list(FLOWS.values())
     fluid = Fluid(law, 1.0, 1.0, solvent)
-    batch = lay_out(flows, [np.linspace(0, 10, 81)] * 2)
-    return check_physics(fluid, batch, list(FLOWS), 2.0, 1.0)
+    seen = see(fluid, flows, [np.linspace(0, 10, 81)] * 2, 2.0, 1.0)
+    return check_physics(seen, dict(enumerate(FLOWS)))
 
 
 @pytest.fixture(scope="module")
