@@ -6,15 +6,13 @@ is solved for has the derivative of the implicit function.
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Inexact
 
-from discover.forward.by_diffrax import solve_in_reverse
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.flow_batch import FlowBatch
 from discover.forward.grid import IntegrationGrid
@@ -66,7 +64,7 @@ def observed_on_grid(
     fluid: Fluid,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+    adjoint: Any = None,
 ) -> Inexact[Array, "n 3"]:
     """Return what `AtSamples.observed` holds, at the samples of one grid."""
     if protocol.control in FOLLOWED:
@@ -100,7 +98,7 @@ def solve_on_grid(
     fluid: Fluid,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+    adjoint: Any = None,
 ) -> Float[Array, "n 4"]:
     """Return σ11, σ22, σ33, σ12 in Pa at the samples of one grid, at a given rate.
 
@@ -111,6 +109,8 @@ def solve_on_grid(
         return _at_given_rate(fluid, protocol, grid, partial(_stress_of_modes, fluid))
     dynamics, fixed = _with_fixed(fluid, protocol)
     start = begun(dynamics, fixed, protocol, grid).T
+    from discover.forward.by_diffrax import solve_in_reverse  # diffrax takes a second to load
+
     return solve_in_reverse(fluid, protocol, grid, start, adjoint)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Array, Bool, Float
 
+from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
 from discover.forward.fluids import (
@@ -218,6 +219,8 @@ def analyse_structure(
     library = joint_library(library, list(laws.values()))
     modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
     runs = as_runs(runs, modes[1], base.linear_relaxation)
+    total = sum(map(len, runs))
+    runs = [thin_run(run, _ROWS) for run in runs]
     known = Fluid(base, *modes, solvent_viscosity)
     flows = in_enough_steps(
         known,
@@ -238,15 +241,15 @@ def analyse_structure(
     samples = np.arange(longest) < np.array([[len(run)] for run in runs])
     found = []
     for name, law in {"the known part alone": LawTerms({}), **laws}.items():
-        one = _at(known, flows, samples, library, name, law, ["sigma12", *also])
+        one = _at(known, flows, samples, total, library, name, law, ["sigma12", *also])
         if one is not None:
             found.append(one)
     return Structure(tuple(found), term_relations(library), len(library))
 
 
 def _at(
-    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], library: TermLibrary,
-    name: str, law: LawTerms, observed: Sequence[str],
+    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], total: int,
+    library: TermLibrary, name: str, law: LawTerms, observed: Sequence[str],
 ) -> LawStructure | None:  # fmt: skip
     """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
@@ -267,17 +270,16 @@ def _at(
     # relative to the root-mean-square of each run; N2 to that of N1
     scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
     scale[:, 2] = scale[:, 1]
-    total = samples.sum()
     blocks: dict[str, Float[np.ndarray, "rows n"]] = {}
     for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
         sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
         block = sensitivity[:, :, kind] / sizes
-        rows = block[samples][:: max(1, total // _ROWS)]
+        rows = block[samples][:: max(1, samples.sum() // _ROWS)]
         blocks[quantity] = rows / np.sqrt(len(rows))
-    exact, weak = _directions(library, blocks, observed, int(total))
+    exact, weak = _directions(library, blocks, observed, total)
     exact = [_finite(d, law, base) for d in exact]
     with_n1 = list(dict.fromkeys([*observed, "N1"]))
-    left, _ = _directions(library, blocks, with_n1, int(total))
+    left, _ = _directions(library, blocks, with_n1, total)
     numbers = range(known.n_modes) if differs_by_mode(base) else [0]
     of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
     hidden = max(of_modes, key=lambda one: len(one.unfelt))
@@ -291,7 +293,7 @@ def _at(
         text = verdicts[1].text + " Measuring N1 as well would not change this."
         verdicts = (verdicts[0], replace(verdicts[1], text=text))
     support = [library.names.index(term) for term in law.coefficients]
-    moved = each_moved(library.names, support, blocks, list(observed), int(total))
+    moved = each_moved(library.names, support, blocks, list(observed), total)
     return LawStructure(
         name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
     )
