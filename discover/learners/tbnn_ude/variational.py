@@ -16,7 +16,7 @@ import numpy as np
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
+from discover.forward.fluids import at_samples, dynamics_of_fluid, solved_on_grid
 from discover.forward.steady_states import steady_state
 from discover.forward.stepping import follow
 from discover.forward.tangents import with_cheap_tangents
@@ -150,12 +150,23 @@ class Along(NamedTuple):
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
     """Return what is recorded of a law at every sample, and its states there.
 
-    Read off the program that also trains the constants: compiling an integration costs a hundred
-    times its run.
+    Of constants it is read off the program that also trains them: compiling an integration costs a
+    hundred times its run.
     """
+    if law.network is not None:
+        return _trajectories(law, problem)
     everything = np.ones(N_COEFFICIENTS)
     rebuild = Rebuild.of_constants(law, everything.astype(bool), everything)
     return side_by_side(rebuild.start, rebuild, problem)[0]
+
+
+@compiled
+def _trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
+    def one(protocol, grid):
+        seen = at_samples(problem.fluid(law), protocol, grid)
+        return Along(seen.observed[:, 0], seen.states[..., :4], seen.rate)
+
+    return problem.flows.over(one)
 
 
 def side_by_side(
