@@ -11,11 +11,11 @@ from discover.comparison.flows import (
     Flow,
     Stresses,
     comparison_flows,
-    predict,
     with_each_run,
 )
 from discover.comparison.outcome import LearnerOutcome
 from discover.comparison.records import InRecord, absorbed, corrected
+from discover.comparison.simulated import simulated
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect
 from discover.errors import InputError
@@ -65,8 +65,8 @@ class Frame:
 
     def alone(self) -> dict[str, Stresses | None]:
         """Return what the known part alone predicts, by the key of the flow."""
-        fluid = self.model.fluid
-        return {flow.key: self.recorded(flow, predict(fluid, flow)) for flow in self.flows}
+        found = simulated(self.model.fluid, self.flows).predictions
+        return {flow.key: self.recorded(flow, found[flow.key]) for flow in self.flows}
 
 
 def known_part(

@@ -7,7 +7,7 @@ from typing import Any
 from discover.comparison.hypotheses import at_once
 from discover.comparison.known_part import Frame
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.rivals import physics_of
+from discover.comparison.simulated import physics_of, simulated
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import Fluid, UpperConvectedMaxwell
@@ -122,9 +122,10 @@ class Learning:
             result, fluid = train(
                 learner, self.study, frame.model, frame.data.fit.runs, self.seed, progress
             )
-        outcome = LearnerOutcome.of(result, fluid, flows)
+        found = simulated(fluid, flows)
+        outcome = LearnerOutcome.of(result, fluid, flows, found.predictions)
         if not part:
-            outcome = replace(outcome, physics=physics_of(fluid, flows))
+            outcome = replace(outcome, physics=physics_of(found, flows))
         if store is not None:
             store.save(name, outcome.to_state())
             # the same route as after an interruption, so that both give the same files

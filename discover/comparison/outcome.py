@@ -1,13 +1,14 @@
 """Outcome of one learner: its law, its predictions, where they lie, and what it leaves."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Real
 
-from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses, predict
+from discover.comparison.flows import DRAWN, QUANTITIES, Flow, Stresses
+from discover.comparison.simulated import simulated
 from discover.dataset.records.repeats import repeats_among
 from discover.laws.multimode import Fluid
 from discover.learners import LearnerResult, RecoveredTerm
@@ -57,12 +58,14 @@ class LearnerOutcome(TermTables):
         return found
 
     @classmethod
-    def of(cls, result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> "LearnerOutcome":
-        """Return the outcome of a fit, with the fluid it found simulated in every flow."""
-        predictions = {flow.key: predict(fluid, flow) for flow in flows}
+    def of(
+        cls, result: LearnerResult, fluid: Fluid, flows: list[Flow],
+        predictions: Mapping[str, Stresses | None],
+    ) -> "LearnerOutcome":  # fmt: skip
+        """Return the outcome of a fit, with what the fluid it found does in every flow."""
         return cls(
             result.learner, result.terms, result.train_seconds, result.loss_history, result.details,
-            result.message, predictions, bands=_bands(result, fluid, flows),
+            result.message, predictions, bands=_bands(result, fluid, flows, predictions),
         )  # fmt: skip
 
     def to_state(self) -> dict[str, Any]:
@@ -92,21 +95,20 @@ class LearnerOutcome(TermTables):
         return cls(**{**state, **read})
 
 
-def _bands(result: LearnerResult, fluid: Fluid, flows: list[Flow]) -> dict[str, Limits | None]:
+def _bands(
+    result: LearnerResult, fluid: Fluid, flows: list[Flow], own: Mapping[str, Stresses | None]
+) -> dict[str, Limits | None]:
     if len(result.members) < 2:
         return {}
-    fluids = [
-        Fluid(law, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity)
-        for law in result.members
-    ]
+    others = [replace(fluid, law=law) for law in result.members if law is not result.law]
+    members = [own, *(simulated(member, flows).predictions for member in others)]
     bands: dict[str, Limits | None] = {}
     for flow in flows:
         if flow.kind not in DRAWN:
             continue
-        predicted = [predict(member, flow) for member in fluids]
-        told = [p for p in predicted if p is not None]
+        told = [p for member in members if (p := member[flow.key]) is not None]
         bands[flow.key] = None
-        if len(told) == len(fluids):
+        if len(told) == len(members):
             rows = {q: np.stack([p[q] for p in told]) for q in QUANTITIES}
             bands[flow.key] = {q: (v.min(axis=0), v.max(axis=0)) for q, v in rows.items()}
     return bands

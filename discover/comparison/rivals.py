@@ -12,8 +12,6 @@ from discover.comparison.flows import QUANTITIES, Flow, Stresses, predict, relat
 from discover.comparison.hypotheses import terms_of
 from discover.dataset.run import Run
 from discover.forward import make_batch
-from discover.forward.flow_batch import lay_out
-from discover.identify.physics_flows import time_scale
 from discover.laws.expansion import law_of_terms
 from discover.laws.multimode import Fluid
 from discover.loop.loop import Found
@@ -35,9 +33,6 @@ _POSSIBLE = 0.01
 
 FOUND = "the law found"
 """Name of the chosen law among those at which the structure is analysed."""
-
-_PHYSICS_SAMPLES = 201
-_PHYSICS_FLOWS = ("training", "held_out", "test")
 
 
 @dataclass(frozen=True)
@@ -209,37 +204,3 @@ def structure_of(
         modulus=model.modulus, relaxation_time=model.relaxation_time,
         solvent_viscosity=model.solvent_viscosity, use_normal_stresses=use_normal_stresses,
     )  # fmt: skip
-
-
-def physics_of(fluid: Fluid, flows: Sequence[Flow]) -> dict[str, Any]:
-    """Return checks of a fluid's physical soundness along the flows, as JSON-able values.
-
-    Training flows set the box beyond which the law extrapolates.
-    """
-    along = [flow for flow in flows if flow.kind in _PHYSICS_FLOWS]
-    training = [flow for flow in along if flow.kind == "training"] or along
-    time = time_scale(fluid)
-    weissenberg = time * max(flow.largest_rate for flow in training)
-    deborah = time * max(_frequency(flow) for flow in training)
-    protocols = [flow.protocol for flow in along]
-    times = [_thinned(flow.times) for flow in along]
-    return identify.check_physics(
-        fluid,
-        lay_out(protocols, times, strain_step=0.2, relaxation_time=fluid.settling_time),
-        [flow.title for flow in along],
-        weissenberg,
-        # a start-up has no frequency; no oscillation tried is larger than a strain of fifty
-        max(deborah, weissenberg / 5.0),
-    ).to_json()
-
-
-def _frequency(flow: Flow) -> float:
-    """Return the angular frequency of a flow, in rad/s; that of its duration if it has none."""
-    if flow.is_of_states:
-        return flow.frequency or 0.0
-    whole = 2.0 * np.pi / max(float(flow.times[-1]), np.finfo(float).tiny)
-    return max(whole, flow.frequency or 0.0)
-
-
-def _thinned(times: np.ndarray) -> np.ndarray:
-    return times[:: max(1, -(-times.size // _PHYSICS_SAMPLES))]

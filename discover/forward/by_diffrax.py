@@ -12,7 +12,35 @@ from jaxtyping import Array, Float
 from discover.forward.exponential_weights import krogstad_weights, turned, with_shares
 from discover.forward.grid import IntegrationGrid
 from discover.laws.multimode import Fluid
+from discover.programs import compiled
 from discover.protocols.protocol import FlowProtocol
+
+MAX_STEPS = 100_000
+
+
+@compiled
+def solve_adaptively(fluid, protocol, times, jumps, stiff, rtol, atol):
+    """Return the stresses in Pa at some times, to a tolerance, and whether steps were enough.
+
+    `jumps`: of the rate, or None. `stiff`: whether relaxation is to be integrated exactly.
+    """
+    controller = diffrax.ClipStepSizeController(
+        diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times, jump_ts=jumps
+    )
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(vector_field),
+        exponential_steps(fluid) if stiff else diffrax.Tsit5(),
+        protocol.begins,
+        times[-1],
+        None,
+        fluid.rest(),
+        args=(fluid, protocol),
+        saveat=diffrax.SaveAt(ts=times, fn=stress_of),
+        stepsize_controller=controller,
+        max_steps=MAX_STEPS,
+        throw=False,
+    )
+    return solution.ys, solution.result == diffrax.RESULTS.successful
 
 
 def solve_in_reverse(

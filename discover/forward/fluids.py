@@ -6,15 +6,13 @@ is solved for has the derivative of the implicit function.
 
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
-import diffrax
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Inexact
 
-from discover.forward.by_diffrax import solve_in_reverse
 from discover.forward.dynamics import Dynamics, Modes
 from discover.forward.flow_batch import FlowBatch
 from discover.forward.grid import IntegrationGrid
@@ -31,6 +29,7 @@ from discover.laws.multimode import Fluid
 from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
+from tensor_library.algebra import VelocityGradient
 
 Numbers = TypeVar("Numbers")
 
@@ -65,7 +64,7 @@ def observed_on_grid(
     fluid: Fluid,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+    adjoint: Any = None,
 ) -> Inexact[Array, "n 3"]:
     """Return what `AtSamples.observed` holds, at the samples of one grid."""
     if protocol.control in FOLLOWED:
@@ -73,11 +72,33 @@ def observed_on_grid(
     return at_samples(fluid, protocol, grid).observed
 
 
+def observed_of_dynamics(
+    make: Callable[[Numbers], Dynamics],
+    numbers: Numbers,
+    fluid: Fluid,
+    protocol: FlowProtocol,
+    grid: IntegrationGrid,
+) -> Inexact[Array, "n 3"]:
+    """Return what `observed_on_grid` does, of the modes that `make` makes of some numbers.
+
+    `numbers`: a tree through which alone derivatives pass. `fluid`: of which these are the modes.
+    """
+    if protocol.control not in FOLLOWED:
+        return solved_on_grid(make, numbers, protocol, grid).observed
+    fixed = make(without_derivatives(numbers))
+    observe = partial(_stress_of_modes, fluid)
+    return _observed(follow(make(numbers), fixed, protocol, grid, observe), protocol)
+
+
+def _stress_of_modes(fluid: Fluid, stress: Float[Array, "s k"], rate: VelocityGradient):
+    return fluid.stress(stress.T, rate)
+
+
 def solve_on_grid(
     fluid: Fluid,
     protocol: FlowProtocol,
     grid: IntegrationGrid,
-    adjoint: diffrax.AbstractAdjoint | None = None,
+    adjoint: Any = None,
 ) -> Float[Array, "n 4"]:
     """Return σ11, σ22, σ33, σ12 in Pa at the samples of one grid, at a given rate.
 
@@ -85,9 +106,11 @@ def solve_on_grid(
     same steps, traced and compiled in a third of the time.
     """
     if adjoint is None or protocol.control == "steady":
-        return _at_given_rate(fluid, protocol, grid, lambda s, rate: fluid.stress(s.T, rate))
+        return _at_given_rate(fluid, protocol, grid, partial(_stress_of_modes, fluid))
     dynamics, fixed = _with_fixed(fluid, protocol)
     start = begun(dynamics, fixed, protocol, grid).T
+    from discover.forward.by_diffrax import solve_in_reverse  # diffrax takes a second to load
+
     return solve_in_reverse(fluid, protocol, grid, start, adjoint)
 
 

@@ -1,21 +1,18 @@
 """Physical soundness of a law: checks that need no data, with where it fails."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
+from jaxtyping import Float
 
-from discover.forward.flow_batch import FlowBatch
-from discover.forward.fluids import in_enough_steps
 from discover.identify import physics_flows
-from discover.laws import AbstractConstitutiveLaw, Fluid
+from discover.laws import Fluid
 from discover.laws.each_mode import differs_by_mode, law_of_mode
 from discover.laws.expansion import in_shared_form
-from discover.programs import compiled, on_device
+from discover.protocols.protocol import FlowProtocol
 from discover.summary_view import SentenceAndTable, table_of
 from discover.words import percent_of, plainly
 
@@ -81,30 +78,61 @@ class PhysicsReport(SentenceAndTable):
         return {"text": self.text, "checks": [asdict(check) for check in self.checks]}
 
 
-def check_physics(
-    fluid: Fluid, flows: FlowBatch, names: Sequence[str], weissenberg: float, deborah: float
-) -> PhysicsReport:
-    """Return the checks of a fluid.
+@dataclass(frozen=True)
+class Seen:
+    """A fluid along flows, and in oscillations up to beyond the box of training.
 
-    `flows`: those along which stresses are looked at. `weissenberg`, `deborah`: largest rate and
-    frequency of training, times the mean relaxation time: the box beyond which the law
-    extrapolates.
+    `weissenberg`, `deborah`: largest rate and frequency of training, times the mean relaxation
+    time: the box beyond which the law extrapolates.
     """
-    fluid = replace(fluid, law=in_shared_form(fluid.law))
-    along = physics_flows.trajectories(fluid, in_enough_steps(fluid, flows))
+
+    fluid: Fluid
+    weissenberg: float
+    deborah: float
+    along: physics_flows.Trajectories  # the flows asked for
+    beyond: physics_flows.Cycles
+    work: Float[np.ndarray, " cycles"]  # of each of these cycles
+
+
+def see(
+    fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]],
+    weissenberg: float, deborah: float,
+) -> Seen:  # fmt: skip
+    """Return what a fluid does along flows, and what its checks need beside, by one program.
+
+    `times`: of samples in s. `weissenberg`, `deborah`: as of `Seen`.
+    """
     beyond = physics_flows.cycles(
-        fluid,
+        physics_flows.time_scale(fluid),
         [weissenberg * factor for factor in _BOX_FACTORS],
         [deborah * factor for factor in _DEBORAH_FACTORS],
     )
+    found = physics_flows.trajectories(
+        fluid, [*protocols, *beyond.protocols], [*times, *beyond.times]
+    )
+    count = len(protocols)
+    work = beyond.work([observed[:, 0] for observed in found.observed[count:]])
+    return Seen(fluid, weissenberg, deborah, found.some(range(count)), beyond, work)
+
+
+def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
+    """Return the checks of a fluid. `names`: of the flows along which stresses are looked at."""
+    fluid = replace(seen.fluid, law=in_shared_form(seen.fluid.law))
+    along, names = seen.along.some(list(names)), list(names.values())
+    times = np.asarray(fluid.relaxation_time)
+    rates = SHEAR_RATES / physics_flows.time_scale(fluid)
+    shear = [
+        physics_flows.steady_branch(law_of_mode(fluid.law, number), physics_flows.SHEAR, own)
+        for number, own in enumerate(np.outer(times, rates))
+    ]
     found = {
         "conformation tensor positive definite": _conformation(along, names),
         "dissipation non-negative": _free_energy(along, names),
-        "work over a cycle non-negative": _work(beyond),
-        "flow curve monotonic": _flow_curve(fluid, weissenberg),
+        "work over a cycle non-negative": _work(seen),
+        "flow curve monotonic": _flow_curve(fluid, shear, rates, seen.weissenberg),
         "steady extension bounded": _extension(fluid),
-        SMALL_STRAIN: _small_strain(fluid),
-        "integrates beyond training": _reach(beyond, weissenberg, deborah),
+        SMALL_STRAIN: _small_strain(shear),
+        "integrates beyond training": _reach(seen),
     }
     return PhysicsReport(tuple(PhysicsCheck(name, *one) for name, one in found.items()))
 
@@ -136,13 +164,13 @@ def _free_energy(along: physics_flows.Trajectories, names: Sequence[str]) -> _Fo
     return passed, value, where, text
 
 
-def _work(beyond: physics_flows.Cycles) -> _Found:
+def _work(seen: Seen) -> _Found:
     # at the Weissenberg number of training, which is the first
-    usable = [(i, w) for i, w in enumerate(beyond.work[:_PER_RATE]) if np.isfinite(w)]
+    usable = [(i, w) for i, w in enumerate(seen.work[:_PER_RATE]) if np.isfinite(w)]
     if not usable:
         return None, None, "", "The law diverges in the oscillations tried."
     run, value = min(usable, key=lambda pair: pair[1])
-    where = beyond.names[run]
+    where = seen.beyond.names[run]
     text = (
         f"The work σ:d over the last cycle is at least {plainly(value)} of the product of the "
         f"largest stress and strain rate, in {where}."
@@ -150,17 +178,17 @@ def _work(beyond: physics_flows.Cycles) -> _Found:
     return bool(value >= -_ROUNDING), float(value), where, text
 
 
-def _flow_curve(fluid: Fluid, weissenberg: float) -> _Found:
+def _flow_curve(
+    fluid: Fluid,
+    shear: Sequence[physics_flows.Branch],
+    rates: Float[np.ndarray, " n"],
+    weissenberg: float,
+) -> _Found:
     slowest = physics_flows.time_scale(fluid)
-    rates = SHEAR_RATES / slowest
-    stress = np.asarray(fluid.solvent_viscosity) * rates
-    steady = np.ones(rates.size, dtype=bool)
-    modes = zip(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time), strict=True)
-    for number, (modulus, time) in enumerate(modes):
-        law = law_of_mode(fluid.law, number)
-        found, _, residual = physics_flows.steady_shear(law, on_device(time * rates))
-        stress = stress + modulus * np.asarray(found)[:, 3]
-        steady &= physics_flows.is_steady(np.asarray(residual))
+    modes = zip(np.asarray(fluid.modulus), shear, strict=True)
+    stress = sum(modulus * branch.stress[:, 3] for modulus, branch in modes)
+    stress = stress + np.asarray(fluid.solvent_viscosity) * rates
+    steady = np.all([branch.is_steady for branch in shear], axis=0)
     last = rates.size if steady.all() else int(np.argmin(steady))
     falling = np.flatnonzero(np.diff(stress[:last]) <= 0.0)
     if falling.size:
@@ -195,7 +223,6 @@ def _extension(fluid: Fluid) -> _Found:
     fine = np.concatenate(
         [EXTENSION_RATES[: max(reached - 1, 0)], np.linspace(low, high, _REFINED)]
     )
-    fine = np.concatenate([fine, np.full(EXTENSION_RATES.size + _REFINED - fine.size, high)])
     limit = float(fine[max(_last_stable(fluid, fine) - 1, 0)] / longest)
     text = (
         f"In uniaxial extension at rates beyond {limit:.4g} 1/s ({limit * longest:.3g} over the "
@@ -209,47 +236,29 @@ def _last_stable(fluid: Fluid, rates: np.ndarray) -> int:
     slowest = int(np.argmax(times))
     # of one law for all modes the slowest gives way first
     numbers = range(len(times)) if differs_by_mode(fluid.law) else [slowest]
-    # as many rates at first as later on a finer grid, for which one program serves
-    same = np.pad(rates, (0, EXTENSION_RATES.size + _REFINED - rates.size), mode="edge")
     good = np.ones(rates.size, dtype=bool)
     for number in numbers:
+        scaled = rates * (times[number] / times[slowest])
         law = law_of_mode(fluid.law, number)
-        scaled = on_device(same * (times[number] / times[slowest]))
-        _, jacobian, residual = physics_flows.steady_uniaxial_extension(law, scaled)
-        found = physics_flows.is_steady(np.asarray(residual)) & physics_flows.is_stable(
-            np.asarray(jacobian)
-        )
-        good &= found[: rates.size]
+        branch = physics_flows.steady_branch(law, physics_flows.UNIAXIAL, scaled)
+        good &= branch.is_steady & branch.is_stable
     return rates.size if good.all() else int(np.argmin(good))
 
 
-@compiled
-def _linearised_at_rest(law: AbstractConstitutiveLaw):
-    """Return dσ/dt at rest, and its derivatives with respect to stress and to shear rate."""
-    rest, still = law.rest(), jnp.asarray(0.0)
-    by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
-    return law.stress_rate(rest, still), by_stress, by_rate
-
-
-def _off_at_rest(law: AbstractConstitutiveLaw) -> tuple[float, float]:
+def _off_at_rest(branch: physics_flows.Branch) -> tuple[float, float]:
     """Return dσ/dt at rest, and by how much G′ + iG″ is off that of a Maxwell mode."""
-    drift, relaxation, source = (np.asarray(part) for part in _linearised_at_rest(law))
-    frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(source))
+    frequency, one = np.geomspace(0.01, 100.0, 41), np.eye(len(branch.source))
+    source = branch.source.astype(complex)
     response = np.array(
-        [
-            1j * w * np.linalg.solve(1j * w * one - relaxation, source.astype(complex))[3]
-            for w in frequency
-        ]
+        [1j * w * np.linalg.solve(1j * w * one - branch.relaxation, source)[3] for w in frequency]
     )
     maxwell = 1j * frequency / (1.0 + 1j * frequency)
     off = float(np.max(np.abs(response - maxwell) / np.abs(maxwell)))
-    return float(np.max(np.abs(drift))), off
+    return float(np.max(np.abs(branch.drift))), off
 
 
-def _small_strain(fluid: Fluid) -> _Found:
-    numbers = range(fluid.n_modes) if differs_by_mode(fluid.law) else [0]
-    of_modes = [_off_at_rest(law_of_mode(fluid.law, number)) for number in numbers]
-    offset, value = (max(column) for column in zip(*of_modes, strict=True))
+def _small_strain(shear: Sequence[physics_flows.Branch]) -> _Found:
+    offset, value = (max(column) for column in zip(*map(_off_at_rest, shear), strict=True))
     text = (
         f"G′ and G″ at vanishing strain differ from those of the Maxwell modes by at most "
         f"{percent_of(max(value, 1e-5))} (the law linearised at rest, frequencies times "
@@ -261,8 +270,9 @@ def _small_strain(fluid: Fluid) -> _Found:
     return worst <= _LINEAR_TOLERANCE, worst, "at rest", text + "."
 
 
-def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> _Found:
-    finite = np.isfinite(beyond.work).reshape(len(_BOX_FACTORS), _PER_RATE)
+def _reach(seen: Seen) -> _Found:
+    weissenberg, deborah = seen.weissenberg, seen.deborah
+    finite = np.isfinite(seen.work).reshape(len(_BOX_FACTORS), _PER_RATE)
     whole = np.all(finite, axis=1)
     reached = len(_BOX_FACTORS) if whole.all() else int(np.argmin(whole))
     least, most = (plainly(factor * deborah) for factor in _DEBORAH_FACTORS[:: _PER_RATE - 1])
@@ -272,7 +282,7 @@ def _reach(beyond: physics_flows.Cycles, weissenberg: float, deborah: float) -> 
         where = f"Wi up to {plainly(limit)}, {box}"
         text = f"Oscillations stay finite in the whole grid tried, {where}."
         return True, limit, where, text
-    failed = [beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
+    failed = [seen.beyond.names[_PER_RATE * i + j] for i, j in np.argwhere(~finite)]
     limit = weissenberg * _BOX_FACTORS[reached - 1] if reached else 0.0
     text = (
         f"Oscillations stay finite up to Wi = {plainly(limit)} for {box}; the stress diverges "

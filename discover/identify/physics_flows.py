@@ -1,22 +1,23 @@
 """Flows in which laws are checked, many at once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Bool, Float
 
 from discover.equations.equation import mean_relaxation_time
-from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import at_samples, in_enough_steps, solve_batch
+from discover.forward.flow_batch import lay_out
+from discover.forward.fluids import at_samples, in_enough_steps
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
-from discover.programs import compiled
-from discover.protocols.protocol import oscillatory_shear
+from discover.laws.expansion import in_shared_form
+from discover.programs import compiled, on_device
+from discover.protocols.protocol import FlowProtocol, oscillatory_shear
 from discover.words import plainly
-from tensor_library import to_shear, uniaxial_extension
 
 _CYCLES = 3
 _SAMPLES_A_CYCLE = 48
@@ -24,45 +25,78 @@ _SAMPLES_A_CYCLE = 48
 
 @dataclass(frozen=True)
 class Trajectories:
-    """Conformation and dissipation of each mode along flows, least over modes and samples.
+    """What a fluid does along flows: what is recorded, and what its conformation says.
 
-    `smallest_conformation`: eigenvalue of I + σ/G, shape (runs,); nan where the law diverges.
-    `dissipation`: σ:d − dF/dt over G/λ, with the energy F of Hookean dumbbells; nan if undefined.
+    `observed`: of each flow what is recorded, N1 and N2 in Pa, shape (n, 3); not finite where the
+    law diverges. `smallest_conformation`: eigenvalue of I + σ/G, the least over modes and samples,
+    shape (flows,); nan where the law diverges. `dissipation`: the least σ:d − dF/dt over G/λ, with
+    the energy F of Hookean dumbbells; nan if undefined.
     """
 
-    smallest_conformation: Float[np.ndarray, " runs"]
-    dissipation: Float[np.ndarray, " runs"]
+    observed: tuple[Float[np.ndarray, "_ 3"], ...]
+    smallest_conformation: Float[np.ndarray, " flows"]
+    dissipation: Float[np.ndarray, " flows"]
+
+    def some(self, flows: Sequence[int]) -> "Trajectories":
+        """Return those along some of the flows."""
+        kept = list(flows)
+        observed = tuple(self.observed[i] for i in kept)
+        return Trajectories(observed, self.smallest_conformation[kept], self.dissipation[kept])
 
     @staticmethod
-    def lowest(values: Float[np.ndarray, " runs"]) -> tuple[int | None, float]:
-        """Return the run with the smallest value, and the value; None where there is none."""
+    def lowest(values: Float[np.ndarray, " flows"]) -> tuple[int | None, float]:
+        """Return the flow with the smallest value, and the value; None where there is none."""
         if not np.any(np.isfinite(values)):
             return None, float("nan")
-        run = int(np.nanargmin(values))
-        return run, float(values[run])
+        flow = int(np.nanargmin(values))
+        return flow, float(values[flow])
 
 
-def trajectories(fluid: Fluid, flows: FlowBatch) -> Trajectories:
-    """Return conformation and dissipation of a fluid along flows."""
-    states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
-    sampled = np.asarray(flows.sample_mask)[..., None]
-    whole = np.all(np.isfinite(states), axis=(1, 2, 3))
-    smallest = np.where(sampled, smallest, np.inf).min(axis=(1, 2))
+_STRAIN_STEP = 0.15
+"""Largest strain of a step: the stress of a Giesekus fluid is then off by less than 1e-6."""
+
+# Lengths are rounded up, so that flows share programs
+_SAMPLES, _STEPS = 64, 256
+
+
+def trajectories(
+    fluid: Fluid, protocols: Sequence[FlowProtocol], times: Sequence[Float[np.ndarray, " _"]]
+) -> Trajectories:
+    """Return what a fluid does along flows from their starts on, all in one program.
+
+    `times`: of samples in s.
+    """
+    fluid = replace(fluid, law=in_shared_form(fluid.law))
+    longest = max(map(len, times))
+    flows = lay_out(
+        protocols,
+        times,
+        longest + -longest % _SAMPLES,
+        fluid.settling_time,
+        strain_step=_STRAIN_STEP,
+    )
+    flows = in_enough_steps(fluid, flows.with_steps_in(_STEPS))
+    observed, states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
+    sampled = np.asarray(flows.sample_mask)
+    whole = np.all(states | ~sampled, axis=1)
+    smallest = np.where(sampled, smallest, np.inf).min(axis=1)
     # without a positive definite conformation the stored energy is not defined
-    defined = np.where(sampled, dissipation, np.inf).min(axis=(1, 2))
+    defined = np.where(sampled, dissipation, np.inf).min(axis=1)
     return Trajectories(
-        np.where(whole, smallest, np.nan), np.where(whole & (smallest > 0.0), defined, np.nan)
+        tuple(own[: len(each)] for own, each in zip(observed, times, strict=True)),
+        np.where(whole, smallest, np.nan),
+        np.where(whole & (smallest > 0.0), defined, np.nan),
     )
 
 
 @compiled
 def _along(fluid, flows):
     def one(protocol, grid):
-        _, states, rates = at_samples(fluid, protocol, grid)
-        at_mode = over_modes(_energy, fluid.law)
+        observed, states, rates = at_samples(fluid, protocol, grid)
         scaled = rates[:, None] * fluid.relaxation_time
-        smallest, dissipation = jax.vmap(at_mode)(states, scaled)
-        return states, smallest, dissipation
+        smallest, dissipation = jax.vmap(over_modes(_energy, fluid.law))(states, scaled)
+        followed = jnp.all(jnp.isfinite(states), axis=(1, 2))
+        return observed, followed, jnp.min(smallest, axis=1), jnp.min(dissipation, axis=1)
 
     return flows.over(one)
 
@@ -86,14 +120,39 @@ def _energy(law, stress, rate):
 
 @dataclass(frozen=True)
 class Cycles:
-    """Oscillations over a grid of Weissenberg and Deborah numbers.
+    """Three cycles of oscillation from rest, over a grid of Weissenberg and Deborah numbers.
 
-    `work`: ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate; nan
-    where the law diverges.
+    `weissenberg`, `deborah`: of each, with the mean relaxation time. `protocols`, `times`: the
+    flows, and their samples in s.
     """
 
-    names: tuple[str, ...]  # of the flows, Weissenberg number first
-    work: Float[np.ndarray, " flows"]
+    weissenberg: Float[np.ndarray, " flows"]
+    deborah: Float[np.ndarray, " flows"]
+    protocols: tuple[FlowProtocol, ...]
+    times: tuple[Float[np.ndarray, " n"], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the flows, Weissenberg number first."""
+        pairs = zip(self.weissenberg, self.deborah, strict=True)
+        return tuple(f"oscillation at Wi = {plainly(wi)}, De = {plainly(de)}" for wi, de in pairs)
+
+    def work(self, stress: Sequence[Float[np.ndarray, " n"]]) -> Float[np.ndarray, " flows"]:
+        """Return ∫ σ12 γ̇ dt over the last cycle, over its length and the largest stress and rate.
+
+        `stress`: σ12 of each flow in Pa. nan where the law diverges.
+        """
+        work = np.full(len(self.times), np.nan)
+        for i, (values, times) in enumerate(zip(stress, self.times, strict=True)):
+            if not np.all(np.isfinite(values)):
+                continue
+            last = slice(times.size - 1 - _SAMPLES_A_CYCLE, None)
+            phase = np.linspace(0.0, 2.0 * np.pi, _SAMPLES_A_CYCLE + 1)
+            largest = np.max(np.abs(values[last]))
+            # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
+            power = np.mean((values[last] * np.cos(phase))[:-1])
+            work[i] = power / largest if largest > 0 else 0.0
+        return work
 
 
 def time_scale(fluid: Fluid) -> float:
@@ -101,91 +160,99 @@ def time_scale(fluid: Fluid) -> float:
     return mean_relaxation_time(np.asarray(fluid.modulus), np.asarray(fluid.relaxation_time))
 
 
-def cycles(fluid: Fluid, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
-    """Return three cycles of every pair of Wi and De (with the mean relaxation time)."""
-    scale = time_scale(fluid)
+def cycles(scale: float, weissenberg: Sequence[float], deborah: Sequence[float]) -> Cycles:
+    """Return the cycles of every pair of Wi and De. `scale`: the time, in s, that these are of."""
     pairs = [(wi, de) for wi in weissenberg for de in deborah]
-    flows = [oscillatory_shear(wi / scale, de / scale) for wi, de in pairs]
-    times = [
-        np.linspace(0.0, _CYCLES * 2.0 * np.pi * scale / de, _CYCLES * _SAMPLES_A_CYCLE + 1)
-        for _, de in pairs
-    ]
-    laid_out = in_enough_steps(fluid, lay_out(flows, times, strain_step=0.2))
-    stress = np.asarray(solve_batch(fluid, laid_out))[..., 3]
-    work = np.full(len(pairs), np.nan)
-    for i, ((wi, de), t) in enumerate(zip(pairs, times, strict=True)):
-        values = stress[i, : t.size]
-        if not np.all(np.isfinite(values)):
-            continue
-        last = slice(t.size - 1 - _SAMPLES_A_CYCLE, None)
-        rate = wi / scale * np.cos(de / scale * t[last])
-        largest = np.max(np.abs(values[last])) * wi / scale
-        # equally spaced samples over a whole period: the trapezoidal rule is exact to rounding
-        power = np.mean((values[last] * rate)[:-1])
-        work[i] = power / largest if largest > 0 else 0.0
+    samples = np.linspace(0.0, _CYCLES * 2.0 * np.pi, _CYCLES * _SAMPLES_A_CYCLE + 1)
     return Cycles(
-        tuple(f"oscillation at Wi = {plainly(wi)}, De = {plainly(de)}" for wi, de in pairs), work
+        *np.transpose(pairs),
+        tuple(oscillatory_shear(wi / scale, de / scale) for wi, de in pairs),
+        tuple(samples * scale / de for _, de in pairs),
     )
 
 
 _NEWTON_STEPS = 25
 _CONVERGED = 1e-9
 
+SHEAR = np.array([0.0, 0.0, 0.0, 1.0])
+"""Velocity gradient (L11, L22, L33, L12) of simple shear at unit rate."""
 
-@compiled
-def steady_shear(
-    law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
-) -> tuple[Float[Array, "n s"], Float[Array, "n s s"], Float[Array, " n"]]:
-    """Return the steady dimensionless stresses in shear, their Jacobians and residuals.
+UNIAXIAL = np.array([1.0, -0.5, -0.5, 0.0])
+"""Velocity gradient of uniaxial extension at unit rate."""
 
-    Newton's method at each of the increasing rates from the one before, starting at rest: the
-    branch that a slow rise of the rate follows. Stresses (11, 22, 33, 12) with the structure
-    variables behind, ∂(dσ/dt)/∂σ, and the size of dσ/dt over that of the stress.
-    """
-    return _follow(law.stress_rate, law.rest(), rates)
+_RATES = 302
+"""Rates of one branch: fewer are padded, so that every branch of a law shares one program."""
 
 
-@compiled
-def steady_uniaxial_extension(
-    law: AbstractConstitutiveLaw, rates: Float[Array, " n"]
-) -> tuple[Float[Array, "n d"], Float[Array, "n d d"], Float[Array, " n"]]:
-    """Return the steady (σ11, σ22 = σ33) in uniaxial extension, Jacobians and residuals.
+class Branch(NamedTuple):
+    """Steady states of a law along rising rates, each from the one before, the first from rest.
 
-    Structure variables stand behind these two.
+    The branch that a slow rise of the rate follows. `stress`: (11, 22, 33, 12) with the structure
+    variables behind, dimensionless. `jacobian`: ∂(dσ/dt)/∂σ; in extension of σ11, σ22 = σ33 and the
+    variables. `residual`: size of dσ/dt over that of the stress. `drift`, `relaxation`, `source`:
+    at rest dσ/dt, and its derivatives by the stress and by the shear rate.
     """
 
-    def slope(state, rate):
-        stress = jnp.stack([state[0], state[1], state[1], jnp.zeros(())])
-        gradient = to_shear(uniaxial_extension(rate))
-        change = law.stress_rate(jnp.concatenate([stress, state[2:]]), gradient)
-        return jnp.concatenate([change[:2], change[4:]])
+    stress: Float[np.ndarray, "n s"]
+    jacobian: Float[np.ndarray, "n d d"]
+    residual: Float[np.ndarray, " n"]
+    drift: Float[np.ndarray, " s"]
+    relaxation: Float[np.ndarray, "s s"]
+    source: Float[np.ndarray, " s"]
 
-    return _follow(slope, law.rest()[2:], rates)
+    @property
+    def is_steady(self) -> Bool[np.ndarray, " n"]:
+        """Where Newton's method converged."""
+        return np.isfinite(self.residual) & (self.residual < _CONVERGED)
+
+    @property
+    def is_stable(self) -> Bool[np.ndarray, " n"]:
+        """Where every small homogeneous disturbance decays: no eigenvalue with Re ≥ 0."""
+        finite = np.all(np.isfinite(self.jacobian), axis=(1, 2))
+        safe = np.where(finite[:, None, None], self.jacobian, np.eye(self.jacobian.shape[-1]))
+        return finite & (np.max(np.linalg.eigvals(safe).real, axis=1) < 0.0)
 
 
-def _follow(slope, start, rates):
-    def at(stress, rate):
+def steady_branch(
+    law: AbstractConstitutiveLaw, flow: Float[np.ndarray, "4"], rates: Float[np.ndarray, " n"]
+) -> Branch:
+    """Return the steady states of a law in `SHEAR` or `UNIAXIAL` flow at increasing rates.
+
+    `rates`: at most 302, times λ.
+    """
+    padded = np.pad(rates, (0, _RATES - rates.size), mode="edge")
+    in_shear = bool(flow[3])
+    # where no shear drives it σ12 is zero, and may be free to be anything: it is not solved for
+    moves = np.append([1.0, 1.0, 1.0, float(in_shear)], np.ones(law.variables))
+    given = (padded[:, None] * flow, moves)
+    stress, jacobian, residual, *at_rest = map(np.asarray, _followed(law, *map(on_device, given)))
+    if not in_shear:
+        kept = np.delete(np.arange(moves.size), [2, 3])
+        beside = jacobian[:, kept, 2]
+        jacobian = jacobian[:, kept][:, :, kept]
+        jacobian[:, :, 1] += beside
+    n = rates.size
+    return Branch(stress[:n], jacobian[:n], residual[:n], *at_rest)
+
+
+@compiled
+def _followed(law, gradients, moves):
+    def slope(state, gradient):
+        return moves * law.stress_rate(state, gradient)
+
+    def at(stress, gradient):
         def improve(state, _):
-            jacobian = jax.jacfwd(slope)(state, rate)
-            return state - jnp.linalg.solve(jacobian, slope(state, rate)), None
+            matrix = jax.jacfwd(slope)(state, gradient) + jnp.diag(1.0 - moves)
+            return state - jnp.linalg.solve(matrix, slope(state, gradient)), None
 
         found, _ = jax.lax.scan(improve, stress, None, length=_NEWTON_STEPS)
-        residual = jnp.linalg.norm(slope(found, rate)) / (1.0 + jnp.linalg.norm(found))
+        residual = jnp.linalg.norm(slope(found, gradient)) / (1.0 + jnp.linalg.norm(found))
         # what did not converge does not lead the next rate astray
         good = jnp.isfinite(residual) & (residual < _CONVERGED)
         following = jnp.where(good, found, stress)
-        return following, (found, jax.jacfwd(slope)(found, rate), residual)
+        return following, (found, jax.jacfwd(slope)(found, gradient), residual)
 
-    return jax.lax.scan(at, start, rates)[1]
-
-
-def is_steady(residual: Float[np.ndarray, " n"]) -> np.ndarray:
-    """Return where Newton's method converged."""
-    return np.isfinite(residual) & (residual < _CONVERGED)
-
-
-def is_stable(jacobian: Float[np.ndarray, "n d d"]) -> np.ndarray:
-    """Return where every small homogeneous disturbance decays: no eigenvalue with Re ≥ 0."""
-    finite = np.all(np.isfinite(jacobian), axis=(1, 2))
-    safe = np.where(finite[:, None, None], jacobian, np.eye(jacobian.shape[-1]))
-    return finite & (np.max(np.linalg.eigvals(safe).real, axis=1) < 0.0)
+    rest, still = law.rest(), jnp.zeros(())
+    by_stress, by_rate = jax.jacfwd(law.stress_rate, argnums=(0, 1))(rest, still)
+    found = jax.lax.scan(at, rest, gradients)[1]
+    return (*found, law.stress_rate(rest, still), by_stress, by_rate)

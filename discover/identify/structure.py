@@ -15,9 +15,15 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Array, Bool, Float
 
+from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import in_enough_steps, observed_on_grid
+from discover.forward.fluids import (
+    dynamics_of_fluid,
+    in_enough_steps,
+    observed_of_dynamics,
+)
+from discover.forward.tangents import with_cheap_tangents
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
     Direction,
@@ -29,7 +35,7 @@ from discover.identify.relations import (
 from discover.identify.side_by_side import joint_library
 from discover.identify.twins import HiddenStresses, OneTermMore, each_moved, hidden_stresses
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
-from discover.laws.each_mode import differs_by_mode, law_of_mode
+from discover.laws.each_mode import differs_by_mode, law_of_mode, over_modes
 from discover.learners.runs import as_runs
 from discover.programs import compiled, on_device
 from discover.summary_view import NotebookView, SentenceAndTable, table_of
@@ -43,9 +49,21 @@ def with_sensitivities(
 ) -> tuple[Float[Array, "runs n 3"], Float[Array, "runs n 3 terms"]]:
     """Return what is recorded, N1 and N2 in Pa, and their derivatives by the coefficients."""
 
+    def stress_rate(made, coefficients, *flow):
+        return replace(made, coefficients=coefficients).stress_rate(*flow)
+
+    def one(coefficients, protocol, grid):
+        def dynamics(coefficients):
+            def of_mode(made, *flow):
+                return with_cheap_tangents(stress_rate, made)(coefficients, *flow)
+
+            fluid = replace(known, law=law)
+            return dynamics_of_fluid(fluid, protocol)._replace(slope=over_modes(of_mode, law, -1))
+
+        return observed_of_dynamics(dynamics, coefficients, known, protocol, grid)
+
     def observed(coefficients):
-        moved = replace(law, coefficients=coefficients)
-        found = flows.over(partial(observed_on_grid, replace(known, law=moved)))
+        found = flows.over(partial(one, coefficients))
         return found, found
 
     columns, value = jax.jacfwd(observed, has_aux=True)(law.coefficients)
@@ -201,6 +219,8 @@ def analyse_structure(
     library = joint_library(library, list(laws.values()))
     modes = np.atleast_1d(modulus), np.atleast_1d(relaxation_time)
     runs = as_runs(runs, modes[1], base.linear_relaxation)
+    total = sum(map(len, runs))
+    runs = [thin_run(run, _ROWS) for run in runs]
     known = Fluid(base, *modes, solvent_viscosity)
     flows = in_enough_steps(
         known,
@@ -221,15 +241,15 @@ def analyse_structure(
     samples = np.arange(longest) < np.array([[len(run)] for run in runs])
     found = []
     for name, law in {"the known part alone": LawTerms({}), **laws}.items():
-        one = _at(known, flows, samples, library, name, law, ["sigma12", *also])
+        one = _at(known, flows, samples, total, library, name, law, ["sigma12", *also])
         if one is not None:
             found.append(one)
     return Structure(tuple(found), term_relations(library), len(library))
 
 
 def _at(
-    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], library: TermLibrary,
-    name: str, law: LawTerms, observed: Sequence[str],
+    known: Fluid, flows: FlowBatch, samples: Bool[np.ndarray, "runs n"], total: int,
+    library: TermLibrary, name: str, law: LawTerms, observed: Sequence[str],
 ) -> LawStructure | None:  # fmt: skip
     """Return the structure at one law, or None where it diverges in these flows."""
     base = known.law
@@ -250,17 +270,16 @@ def _at(
     # relative to the root-mean-square of each run; N2 to that of N1
     scale = np.sqrt(np.sum(stresses**2, axis=1) / samples.sum(axis=1)[:, None])
     scale[:, 2] = scale[:, 1]
-    total = samples.sum()
     blocks: dict[str, Float[np.ndarray, "rows n"]] = {}
     for kind, quantity in enumerate(("sigma12", *_NORMAL_STRESSES)):
         sizes = np.where(scale[:, kind] > 0, scale[:, kind], 1.0)[:, None, None]
         block = sensitivity[:, :, kind] / sizes
-        rows = block[samples][:: max(1, total // _ROWS)]
+        rows = block[samples][:: max(1, samples.sum() // _ROWS)]
         blocks[quantity] = rows / np.sqrt(len(rows))
-    exact, weak = _directions(library, blocks, observed, int(total))
+    exact, weak = _directions(library, blocks, observed, total)
     exact = [_finite(d, law, base) for d in exact]
     with_n1 = list(dict.fromkeys([*observed, "N1"]))
-    left, _ = _directions(library, blocks, with_n1, int(total))
+    left, _ = _directions(library, blocks, with_n1, total)
     numbers = range(known.n_modes) if differs_by_mode(base) else [0]
     of_modes = [hidden_stresses(law_of_mode(whole, number)) for number in numbers]
     hidden = max(of_modes, key=lambda one: len(one.unfelt))
@@ -274,7 +293,7 @@ def _at(
         text = verdicts[1].text + " Measuring N1 as well would not change this."
         verdicts = (verdicts[0], replace(verdicts[1], text=text))
     support = [library.names.index(term) for term in law.coefficients]
-    moved = each_moved(library.names, support, blocks, list(observed), int(total))
+    moved = each_moved(library.names, support, blocks, list(observed), total)
     return LawStructure(
         name, law, hidden, tuple(exact), tuple(weak), verdicts, len(left), n2_with_n1, moved
     )

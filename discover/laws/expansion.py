@@ -77,12 +77,12 @@ def law_of_terms(
     )
 
 
-# in simple shear that last one and two tensors are the same: laws that agree there differ by it
-_TENSORS = build_library(degree=0, extra=["tr(gammadot.gammadot)*I"])
+# terms searched for by default, so that what is found shares programs with what is known
+_SHARED = build_library(degree=1)
 
 
 def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
-    """Return a law of constant coefficients on the basis tensors as an expansion on all of them.
+    """Return a law as an expansion on all terms of degree one, if it is a sum of some of them.
 
     Such laws then share every program. Any other law is returned as it is, and so is a user's own,
     which may write out another h than it computes.
@@ -92,15 +92,15 @@ def in_shared_form(law: AbstractConstitutiveLaw) -> AbstractConstitutiveLaw:
     if isinstance(law, TensorBasisNetwork) and np.any(np.asarray(law.network_mask) != 0):
         return law
     terms = law.as_terms()
-    if terms is None or any(term.term not in _TENSORS.names for term in terms):
+    if terms is None or any(term.term not in _SHARED.names for term in terms):
         return law
-    coefficients = np.zeros(len(_TENSORS))
+    coefficients = np.zeros(len(_SHARED))
     for term in terms:
-        coefficients[_TENSORS.names.index(term.term)] += term.coefficient
+        coefficients[_SHARED.names.index(term.term)] += term.coefficient
     return LibraryExpansion(
         coefficients=on_device(coefficients),
         inner=on_device(np.zeros(0)),
-        library=_TENSORS,
+        library=_SHARED,
         linear_relaxation=law.linear_relaxation,
     )
 

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
+from numpy.typing import ArrayLike
 
 from discover.errors import InputError
 from discover.plain_numbers import as_numbers, short
@@ -307,33 +308,45 @@ def recorded_at(
 
 def shear_rates(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return γ̇ in 1/s at many times in s, shape (n,)."""
-    return _at_many(FlowProtocol.rate, protocol, times)
+    amplitudes, frequencies, phases = (
+        np.asarray(of) for of in (protocol.amplitudes, protocol.frequencies, protocol.phases)
+    )
+    waves = np.cos(np.outer(times, frequencies) + phases) @ amplitudes
+    return _in_table(times, protocol.table_times, protocol.table_rates) + waves
 
 
 def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
     """Return the strain since t = 0 at many times in s, shape (n,)."""
-    return _at_many(FlowProtocol.strain, protocol, times)
+    # lengths rounded up, so that runs of all lengths share a few programs
+    n = len(times)
+    entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
+    padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
+    times = on_device(np.pad(times, (0, size - n), mode="edge"))
+    return np.asarray(_strains(padded, times))[:n]
+
+
+@compiled
+def _strains(protocol: FlowProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
+    return jax.vmap(protocol.strain)(times)
 
 
 def strains_in_table(
     protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """Return the strains of the table at many times, such as amplitudes, shape (n,)."""
-    return _at_many(FlowProtocol.strain_in_table, protocol, times)
+    return _in_table(times, protocol.table_times, protocol.table_strains)
 
 
-def _at_many(function, protocol, times):
-    # lengths rounded up, so that runs of all lengths share a few programs
-    n = len(times)
-    entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
-    padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
-    times = on_device(np.pad(times, (0, size - n), mode="edge"))
-    return np.asarray(_mapped(function, padded, times))[:n]
-
-
-@compiled
-def _mapped(function, protocol: FlowProtocol, times: Float[Array, " n"]) -> Float[Array, " n"]:
-    return jax.vmap(lambda time: function(protocol, time))(times)
+def _in_table(times: ArrayLike, knots: ArrayLike, values: ArrayLike) -> Float[np.ndarray, " n"]:
+    """Return `_interpolate` at many times, in numpy: without a program for each length."""
+    times, knots, values = map(np.asarray, (times, knots, values))
+    if knots.size == 1:
+        return np.full(times.shape, values[0])
+    left = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, knots.size - 2)
+    width = knots[left + 1] - knots[left]
+    after = times - knots[left]
+    share = np.where(width > 0.0, after / np.where(width > 0.0, width, 1.0), after >= 0.0)
+    return values[left] + np.clip(share, 0.0, 1.0) * (values[left + 1] - values[left])
 
 
 TRAINING_DURATION = 20.0

@@ -2,23 +2,19 @@
 
 from dataclasses import dataclass, replace
 
-import diffrax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from discover.errors import InputError
-from discover.forward.by_diffrax import exponential_steps, stress_of, vector_field
 from discover.forward.flow_batch import lay_out
 from discover.forward.fluids import observed_in_batch, solve_batch
 from discover.forward.grid import had_gone_on
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
-from discover.programs import compiled, on_device
+from discover.programs import on_device
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol, recorded_at, shear_rates
-
-MAX_STEPS = 100_000
 
 # Lengths rounded up, so that flows share programs
 _SAMPLES, _STEPS = 64, 256
@@ -52,27 +48,6 @@ class ShearStress:
     def second_normal_stress_difference(self) -> Float[np.ndarray, " n"]:
         """N2 = σ22 − σ33 in Pa."""
         return self.components[:, 1] - self.components[:, 2]
-
-
-@compiled
-def _solve_adaptively(fluid, protocol, times, jumps, solver, rtol, atol):
-    controller = diffrax.ClipStepSizeController(
-        diffrax.PIDController(rtol=rtol, atol=atol), step_ts=times, jump_ts=jumps
-    )
-    solution = diffrax.diffeqsolve(
-        diffrax.ODETerm(vector_field),
-        solver,
-        protocol.begins,
-        times[-1],
-        None,
-        fluid.rest(),
-        args=(fluid, protocol),
-        saveat=diffrax.SaveAt(ts=times, fn=stress_of),
-        stepsize_controller=controller,
-        max_steps=MAX_STEPS,
-        throw=False,
-    )
-    return solution.ys, solution.result == diffrax.RESULTS.successful
 
 
 def simulate(
@@ -120,18 +95,19 @@ def simulate(
     if end == float(protocol.begins):
         gradient = protocol.velocity_gradient(jnp.asarray(end))
         return ShearStress(times, np.asarray(fluid.stress(fluid.rest(), gradient))[None])
+    from discover.forward.by_diffrax import MAX_STEPS, solve_adaptively  # diffrax takes a second
+
     shortest = float(np.min(np.asarray(fluid.relaxation_time)))
     stiff = fluid.n_modes > 1 and end / shortest > 1e3
     fluid = replace(fluid, law=in_shared_form(fluid.law))
-    solver = exponential_steps(fluid) if stiff else diffrax.Tsit5()
     knots = np.asarray(protocol.table_times)
     jumps = np.unique(knots[1:][np.diff(knots) <= 0.0])
-    components, successful = _solve_adaptively(
+    components, successful = solve_adaptively(
         fluid,
         protocol,
         on_device(_padded(times)),
         on_device(jumps) if jumps.size else None,
-        solver,
+        stiff,
         rtol,
         atol,
     )

@@ -6,14 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from discover.forward.flow_batch import lay_out
-from discover.identify.physics import check_physics
-from discover.identify.physics_flows import (
-    is_stable,
-    is_steady,
-    steady_shear,
-    steady_uniaxial_extension,
-)
+from discover.identify.physics import check_physics, see
+from discover.identify.physics_flows import SHEAR, UNIAXIAL, steady_branch
 from discover.laws import Fluid, Giesekus, JohnsonSegalman, LibraryExpansion, UpperConvectedMaxwell
 from discover.protocols import oscillatory_shear
 from tensor_library import TermLibrary, parse_term
@@ -34,8 +28,8 @@ def expansion(**coefficients):
 def report(law, solvent=0.0):
     flows = list(FLOWS.values())
     fluid = Fluid(law, 1.0, 1.0, solvent)
-    batch = lay_out(flows, [np.linspace(0, 10, 81)] * 2)
-    return check_physics(fluid, batch, list(FLOWS), 2.0, 1.0)
+    seen = see(fluid, flows, [np.linspace(0, 10, 81)] * 2, 2.0, 1.0)
+    return check_physics(seen, dict(enumerate(FLOWS)))
 
 
 @pytest.fixture(scope="module")
@@ -86,20 +80,18 @@ def test_giesekus_is_monotonic_up_to_a_mobility_of_one_half(mobility, monotonic)
 
 def test_steady_slip_is_the_analytic_one():
     rates = np.geomspace(0.01, 10, 121)
-    stress, jacobian, residual = (
-        np.asarray(part) for part in steady_shear(JohnsonSegalman(0.4), jnp.asarray(rates))
-    )
-    assert is_steady(residual).all()
-    np.testing.assert_allclose(stress[:, 3], rates / (1 + 0.64 * rates**2), rtol=1e-9)
+    branch = steady_branch(JohnsonSegalman(0.4), SHEAR, rates)
+    assert branch.is_steady.all()
+    np.testing.assert_allclose(branch.stress[:, 3], rates / (1 + 0.64 * rates**2), rtol=1e-9)
     # homogeneous shear itself is stable even where the curve falls
-    assert is_stable(jacobian).all()
+    assert branch.is_stable.all()
 
 
 def test_steady_maxwell_extension_is_analytic_until_it_is_unstable():
     rates = np.array([0.1, 0.3, 0.45, 0.55])
-    stress, jacobian, _ = steady_uniaxial_extension(UpperConvectedMaxwell(), jnp.asarray(rates))
-    np.testing.assert_allclose(np.asarray(stress)[:, 0], 2 * rates / (1 - 2 * rates), rtol=1e-9)
-    assert is_stable(np.asarray(jacobian)).tolist() == [True, True, True, False]
+    branch = steady_branch(UpperConvectedMaxwell(), UNIAXIAL, rates)
+    np.testing.assert_allclose(branch.stress[:, 0], 2 * rates / (1 - 2 * rates), rtol=1e-9)
+    assert branch.is_stable.tolist() == [True, True, True, False]
 
 
 @pytest.mark.slow

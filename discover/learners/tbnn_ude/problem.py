@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import diffrax
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
@@ -21,8 +20,6 @@ from discover.statistics.noise.noise_model import rms
 
 STRAIN_STEP = 0.2
 """Largest strain of a step of the integration."""
-
-_IN_REVERSE = diffrax.RecursiveCheckpointAdjoint()
 
 
 class TrainingProblem(eqx.Module):
@@ -44,7 +41,7 @@ class TrainingProblem(eqx.Module):
         return Fluid(law, self.modulus, self.relaxation_time, self.solvent_viscosity)
 
     def predicted(
-        self, law: AbstractConstitutiveLaw, adjoint: diffrax.AbstractAdjoint | None = None
+        self, law: AbstractConstitutiveLaw, adjoint: Any = None
     ) -> Float[Array, "runs n"]:
         """Return what is recorded of a trial law."""
         fluid = self.fluid(law)
@@ -58,10 +55,13 @@ class TrainingProblem(eqx.Module):
         In reverse mode with recursive checkpoints at half the cost of storing every step and a
         ninth of the continuous adjoint (51, 94 and 481 ms for the paper's network).
         """
+        import diffrax  # a second, of which no other recipe has any use
+
+        in_reverse = diffrax.RecursiveCheckpointAdjoint()
         weight, total = self.records.weight, jnp.sum(self.modulus)
         unit = self.flows.over(lambda p, _: jnp.where(p.control == "stress", 1.0, total))
         scale = jnp.where(weight > 0, weight * unit[:, None], 1.0)
-        errors = self.records.residual(self.predicted(law, _IN_REVERSE)) / scale
+        errors = self.records.residual(self.predicted(law, in_reverse)) / scale
         return jnp.sum(errors**2, axis=1) / jnp.sum(weight > 0, axis=1)
 
 

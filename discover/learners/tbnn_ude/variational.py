@@ -5,7 +5,6 @@ state. J is 4 × 4, so that four reverse passes give it and ∂f/∂θ, where fo
 per weight.
 """
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, NamedTuple
@@ -14,19 +13,19 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.custom_derivatives import SymbolicZero
 from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, ArrayLike, Bool, Float, Int
 
-from discover.forward.fluids import dynamics_of_fluid, solved_on_grid
+from discover.forward.fluids import at_samples, dynamics_of_fluid, solved_on_grid
 from discover.forward.steady_states import steady_state
 from discover.forward.stepping import follow
+from discover.forward.tangents import with_cheap_tangents
 from discover.laws.each_mode import over_modes
 from discover.laws.tensor_basis_network import N_COEFFICIENTS, TensorBasisNetwork
 from discover.learners.tbnn_ude.problem import TrainingProblem
 from discover.programs import compiled, on_device
 from discover.protocols.kinematics import FOLLOWED
-from tensor_library.algebra import VelocityGradient, contracted
+from tensor_library.algebra import contracted
 
 
 def split_law(law: TensorBasisNetwork) -> tuple[TensorBasisNetwork, TensorBasisNetwork]:
@@ -137,47 +136,6 @@ def rebuilt(rebuild: Rebuild, weights: Float[Array, " q"]) -> TensorBasisNetwork
     return rebuild(weights)
 
 
-def with_cheap_tangents(
-    stress_rate: Callable[[Any, Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]],
-    given: Any,
-) -> Callable[[Any, Float[Array, " s"], VelocityGradient], Float[Array, " s"]]:
-    """Return the rate of a law whose tangents cost little, however many there are.
-
-    Four pullbacks give the derivatives by stress, rate and every number of the law at once; each
-    tangent is then a small matrix product. `stress_rate`: of `given` (not differentiated), of a
-    tree of numbers, of σ and of λL.
-    """
-    # what is traced has to be handed in: a rule for derivatives must not close over it
-    arrays, rest = eqx.partition(given, eqx.is_array)
-
-    def of_all(arrays, numbers, stress, gradient):
-        return stress_rate(eqx.combine(arrays, rest), numbers, stress, gradient)
-
-    rate = jax.custom_jvp(of_all)
-
-    def tangent(primals, tangents):
-        arrays, *moving = primals
-        still = [isinstance(leaf, SymbolicZero) for leaf in jax.tree.leaves(tangents[1])]
-        if all(still):
-            # few tangents, of the state or of the rate, are carried through the law
-            flow = [
-                jnp.zeros_like(value) if isinstance(moved, SymbolicZero) else moved
-                for value, moved in zip(moving[1:], tangents[2:], strict=True)
-            ]
-            return jax.jvp(partial(of_all, arrays, moving[0]), tuple(moving[1:]), tuple(flow))
-        value, pull = jax.vjp(partial(of_all, arrays), *moving)
-        rows = jax.vmap(pull)(jnp.eye(value.shape[0]))
-        total = jnp.zeros_like(value)
-        pairs = zip(*map(jax.tree.leaves, (rows, tuple(tangents[1:]))), strict=True)
-        for row, moved in pairs:
-            if not isinstance(moved, SymbolicZero):
-                total = total + jnp.tensordot(row, moved, axes=moved.ndim)
-        return value, total
-
-    rate.defjvp(tangent, symbolic_zeros=True)
-    return partial(rate, arrays)
-
-
 class Along(NamedTuple):
     """Records of a law in the runs, at their samples, and its states there.
 
@@ -192,12 +150,23 @@ class Along(NamedTuple):
 def trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
     """Return what is recorded of a law at every sample, and its states there.
 
-    Read off the program that also trains the constants: compiling an integration costs a hundred
-    times its run.
+    Of constants it is read off the program that also trains them: compiling an integration costs a
+    hundred times its run.
     """
+    if law.network is not None:
+        return _trajectories(law, problem)
     everything = np.ones(N_COEFFICIENTS)
     rebuild = Rebuild.of_constants(law, everything.astype(bool), everything)
     return side_by_side(rebuild.start, rebuild, problem)[0]
+
+
+@compiled
+def _trajectories(law: TensorBasisNetwork, problem: TrainingProblem) -> Along:
+    def one(protocol, grid):
+        seen = at_samples(problem.fluid(law), protocol, grid)
+        return Along(seen.observed[:, 0], seen.states[..., :4], seen.rate)
+
+    return problem.flows.over(one)
 
 
 def side_by_side(
@@ -209,9 +178,10 @@ def side_by_side(
     from outside of any transformation.
     """
     n = len(problem.flows)
-    # halves of one size share a program; of an odd number of runs the middle one is in both
+    # halves of one size share a program; of an odd number of runs the middle one is in both, which
+    # of three is a third more work
     half = -(-n // 2)
-    if n < 2 or not problem.flows.is_uniform:
+    if n in (1, 3) or not problem.flows.is_uniform:
         return states_and_jacobian(weights, rebuild, problem)
     with ThreadPoolExecutor(1) as pool:
         last = pool.submit(states_and_jacobian, weights, rebuild, problem, half, np.int32(n - half))
