@@ -16,7 +16,7 @@
 # The data are start-ups of a polyisoprene melt at two temperatures, with a linear sweep of its own.
 # Three runs at −10 °C are fitted; two at −23 °C are held out as a test. At small strain a loop asks
 # what the *instrument* does. With that known, a comparison asks which *law* the melt has. Since no
-# law describes it, a second loop says what is missing from the best one.
+# law describes it, a second loop asks what is missing from the best one.
 #
 # The data are not part of this project: without `DISCOVER_DATA` every part is skipped. These are
 # five of eleven runs, thinned, so that the notebook takes a minute; `docs/findings.md` has the
@@ -161,9 +161,9 @@ if found is not None:
 #   runs to better than 15 % of their stress; Giesekus's mobility comes near the end of its range.
 #   The laws that fit about as well differ in runs that they did not see, and neither N1 nor N2
 #   follows from σ12.
-# - **What is missing** is a loss of network with strain: the second loop removes most of the error
-#   on the fitted runs and on the slower held-out run, makes the faster one worse, and so ends in
-#   *unexplained*. An effect that fits but does not carry over describes these runs; it is not a
-#   mechanism.
+# - **What is missing** is none of the candidates of the second loop: with each of them, runs that
+#   are left out are missed no less than by Giesekus's law alone. So it ends in *unexplained*, with
+#   16 % on left-out runs and half of the stress on the faster ones. All eleven runs, with more
+#   effects at once, tell more: see `docs/findings.md`.
 # - **What would settle it**: runs at −10 °C as fast, on the chains' own time, as those at −23 °C,
 #   and N1 from an instrument stiff enough to measure it.
