@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from sklearn.utils.validation import check_is_fitted
 
-from discover.dataset.records.thinning import thin_run
+from discover.dataset.records.thinning import evenly_chosen
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.laws import AbstractConstitutiveLaw, Fluid, TensorBasisNetwork
@@ -273,7 +273,7 @@ def _rougher(
     problem: TrainingProblem, runs: Sequence[Run], known: KnownPart, samples: int
 ) -> tuple[TrainingProblem, str]:
     """Return a problem of fewer samples and longer steps, and what was left out in words."""
-    fewer = [thin_run(run, samples) for run in runs]
+    fewer = [run.window(evenly_chosen(len(run), samples)) for run in runs]
     said = []
     if any(len(few) < len(run) for few, run in zip(fewer, runs, strict=True)):
         problem = _problem(fewer, known)
