@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.flatten_util import ravel_pytree
 from jaxtyping import Array, Float
 
 from discover.effects import (
@@ -93,7 +95,10 @@ class AugmentedFluid:
         self.slices: dict[str, slice] = {}
         # first the logarithms of the factors on moduli and times, then the law's free parameters
         position = max(
-            [2 + len(structure.free_parameters), *(end for *_, end in structure.by_mode)]
+            [
+                2 + len(structure.free_parameters) + structure.law_numbers,
+                *(end for *_, end in structure.by_mode),
+            ]
         )
         first = position
         for effect in effects:
@@ -155,7 +160,10 @@ class AugmentedFluid:
 
     def _law(self, theta, numbers, places):
         """Return the law with its free parameters, by mode where these differ."""
-        free = self.structure.free_parameters
+        free, own = self.structure.free_parameters, self.structure.law_numbers
+        if own:
+            moving, rest = eqx.partition(numbers.law, eqx.is_inexact_array)
+            return eqx.combine(ravel_pytree(moving)[1](theta[2 : 2 + own]), rest)
         if not free:
             return numbers.law
         named = LAWS[self.structure.law_name]

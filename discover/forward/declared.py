@@ -280,6 +280,8 @@ class Structure(NamedTuple):
     """How many instants of steps of the rate are fitted, each as a share of its interval."""
     added_modes: int = 0
     """How many modes that effects add have constants by mode of their own."""
+    law_numbers: int = 0
+    """How many numbers of the law stand in the vector, where it is no law with a name."""
 
     def with_every_effect(self) -> "Structure":
         """Return the structure that all sets share: built-in effects, then a user's, by name."""

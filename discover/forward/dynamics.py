@@ -93,18 +93,15 @@ class Dynamics(NamedTuple):
         """Return the modes after a step: three rates in 1/s, a width in s."""
         return self.stepped(self.weights(width[None])[0], stress, rates, flow)
 
-    def stepped(self, weights, stress, rates, flow: Kinematics | None, at_once: int = 1):
+    def stepped(self, weights, stress, rates, flow: Kinematics | None):
         """Return the modes after a step of known weights; see `StressWeights.step`."""
         w = self.of_step(weights)
         stage = self.stage(w, flow)
         first, middle, last = rates
         felt = jnp.stack([first, middle, middle, last])
-        return w.step(stress, lambda state, rate: (stage(state, rate), ()), felt, at_once)[0]
-
-    def summed(self, of_modes: Float[Array, "*c k"]) -> Float[Array, " *c"]:
-        """Return a stress in Pa of that of each mode over its modulus."""
-        return contracted(of_modes, self.modes.modulus)
+        return w.step(stress, lambda state, rate: (stage(state, rate), ()), felt)[0]
 
     def recorded(self, stress, flow: Kinematics | None) -> Float[Array, ""]:
         """Return the recorded stress of the modes in Pa."""
-        return self.summed(stress[3] if flow is None else flow.stress(stress[:4]))
+        of_modes = stress[3] if flow is None else flow.stress(stress[:4])
+        return contracted(of_modes, self.modes.modulus)

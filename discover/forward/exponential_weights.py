@@ -158,13 +158,11 @@ class StressWeights(NamedTuple):
         stress: Float[Array, "s *c k"],
         stage: Callable[[Float[Array, "s *c k"], Any], tuple[Float[Array, "s *c k"], Any]],
         inputs: Any,
-        at_once: int = 1,
     ) -> tuple[Float[Array, "s *c k"], Any]:
         """Return the stress after a step, and what else each stage says.
 
         A scan, so that what a stage does is compiled once and not four times. `stage`: from stress
-        and its share of `inputs` to `remainder` and more. `at_once`: stages compiled one after
-        another.
+        and its share of `inputs` to `remainder` and more.
         """
         if self.beside:
             return self._step_by_step(stress, stage, inputs)
@@ -187,7 +185,7 @@ class StressWeights(NamedTuple):
             return remainders.at[number].set(found), more
 
         start = jnp.zeros((4, *stress.shape), stress.dtype)
-        remainders, more = jax.lax.scan(one, start, (jnp.arange(4), rows, inputs), unroll=at_once)
+        remainders, more = jax.lax.scan(one, start, (jnp.arange(4), rows, inputs))
         return self.end(stress, *remainders), more
 
     def _step_by_step(self, stress, stage, inputs):
@@ -273,22 +271,3 @@ def relax(
     """Return s after a step of ds/dt = source − decay · s with both of them constant, exactly."""
     z = -decay * width
     return state * jnp.exp(z) + source * width * phi_functions(z)[0]
-
-
-_NORMAL = np.array([1.0 - 3.0**0.5, 1.0, 1.0])
-_TURN = np.eye(3) - 2.0 * np.outer(_NORMAL, _NORMAL) / np.sum(_NORMAL**2)
-"""The reflection that takes (1, 1, 1) to the first axis; it is its own inverse."""
-
-
-def turned(state: Float[Array, "k s *columns"], tensors: int = 1) -> Float[Array, "k s *columns"]:
-    """Return states whose normal stresses are told as their sum over √3 and two of a deviator.
-
-    Done twice it changes nothing.
-
-    `state`: of each mode. `tensors`: how many stand first in it, four components each.
-    """
-    for first in range(0, 4 * tensors, 4):
-        normals = slice(first, first + 3)
-        normal = jnp.tensordot(jnp.asarray(_TURN, state.dtype), state[:, normals], axes=(1, 1))
-        state = state.at[:, normals].set(jnp.moveaxis(normal, 0, 1))
-    return state

@@ -99,27 +99,6 @@ class FlowBatch(eqx.Module):
             parts.append((protocols, eqx.tree_at(lambda grid: grid.times, grids, longer)))
         return FlowBatch(tuple(parts), self.shown)
 
-    def in_pieces(self, count: int) -> "FlowBatch":
-        """Return the flows with every step cut into so many of one length."""
-        if count == 1:
-            return self
-        parts = []
-        for protocols, grids in self.parts:
-            if protocols.control != "steady":  # of steady states nothing is stepped
-                times, share = np.asarray(grids.times), np.arange(count) / count
-                cut = times[:, :-1, None] + np.diff(times, axis=1)[..., None] * share
-                cut = np.concatenate([cut.reshape(len(times), -1), times[:, -1:]], axis=1)
-                cycle = None if grids.cycle is None else count * grids.cycle
-                grids = replace(
-                    grids,
-                    times=on_device(cut),
-                    sample_index=count * grids.sample_index,
-                    cycle=cycle,
-                    cycle_steps=count * grids.cycle_steps,
-                )
-            parts.append((protocols, grids))
-        return FlowBatch(tuple(parts), self.shown)
-
     def faster(self, factor: Float[Array, " runs"]) -> "FlowBatch":
         """Return the flows with the rate of each multiplied; their grids stay.
 

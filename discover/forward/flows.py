@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import equinox as eqx
 import jax
@@ -12,7 +12,7 @@ from jax.typing import ArrayLike
 from jaxtyping import Array, Float, Int
 
 from discover.dataset import Run
-from discover.forward.grid import make_grid, steps_of_half_cycle, stress_grid
+from discover.forward.grid import cut, make_grid, steps_of_half_cycle, stress_grid
 from discover.forward.records import Records, make_records
 from discover.programs import on_device
 from discover.protocols.kinematics import MODULI, Kinematics, stack_kinematics
@@ -126,6 +126,8 @@ class TransientFlows(eqx.Module):
     kinematics: Kinematics | None = None  # which flow each run is; None where all are simple shear
     steps: RateSteps | None = None
     cycle_steps: int = eqx.field(static=True, default=0)  # the most steps that such a cycle has
+    # whether vectors may choose their steps while the rate is a straight line
+    own_widths: bool = eqx.field(static=True, default=True)
 
     @property
     def longest(self) -> float:
@@ -177,18 +179,39 @@ def _more_runs(values: ArrayLike, runs: int) -> Array:
     return on_device(np.pad(values, more, "edge"))
 
 
-def transients(runs: Sequence[Run], strain_step: float = 0.25) -> TransientFlows:
+class Steps(NamedTuple):
+    """How runs are stepped through.
+
+    `strain`, `phase`: the most of a step. `pieces`: into how many each is then cut, of all runs or,
+    at a given rate in time, of each. `longest`: in s. `relaxation_time`: longest of the fluid, in
+    s; see `make_grid`. `own`: whether vectors may choose steps of their own, which err by 1e-6 of
+    the stress.
+    """
+
+    strain: float = 0.25
+    pieces: Any = 1
+    phase: float = 0.15
+    longest: float = np.inf
+    relaxation_time: float | None = None
+    own: bool = True
+
+
+def transients(runs: Sequence[Run], steps: Steps | None = None) -> TransientFlows:
     """Return the flows of runs at a given rate."""
-    grids = []
-    for run in runs:
+    steps = Steps() if steps is None else steps
+    limits: Any = {
+        "strain_step": steps.strain, "phase_step": steps.phase, "max_step": steps.longest
+    }  # fmt: skip
+    settles, grids = steps.relaxation_time, []
+    for run, pieces in zip(runs, np.broadcast_to(steps.pieces, len(runs)), strict=True):
         # a window may have cut the first samples off, but not what the instrument did by then
         gap = min([run.time[0], *np.diff(run.time)] if run.time[0] > 0 else np.diff(run.time))
         early = gap * _EARLY_STEPS
         anchors = np.unique(np.concatenate([run.time, early[early < run.time[-1]]]))
-        grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step)
-        if len(grid) > max(_LONG, 2 * len(anchors)):
-            grid, _ = make_grid(run.protocol, anchors, strain_step=strain_step, growth=_GROWTH)
-        grids.append((grid, np.searchsorted(grid, run.time)))
+        grid, _ = make_grid(run.protocol, anchors, relaxation_time=settles, **limits)
+        if settles is None and len(grid) > max(_LONG, 2 * len(anchors)):
+            grid, _ = make_grid(run.protocol, anchors, growth=_GROWTH, **limits)
+        grids.append(cut(grid, np.searchsorted(grid, run.time), int(pieces)))
     n_steps = max(2, *(len(g) for g, _ in grids)) if len(grids) > 1 else max(2, len(grids[0][0]))
     n_samples = max(len(run) for run in runs)
     cycles = [
@@ -226,6 +249,7 @@ def transients(runs: Sequence[Run], strain_step: float = 0.25) -> TransientFlows
         kinematics=stack_kinematics([run.protocol.kinematics for run in runs]),
         steps=rate_steps(runs),
         cycle_steps=cycle_steps,
+        own_widths=steps.own,
     )
 
 
@@ -248,9 +272,12 @@ class StressFlows(eqx.Module):
         return float(np.max(ends))
 
 
-def at_given_stress(runs: Sequence[Run], strain_step: float) -> StressFlows:
+def at_given_stress(runs: Sequence[Run], steps: Steps) -> StressFlows:
     """Return the flows of runs at a given stress."""
-    grids = [stress_grid(run.protocol, run.time, strain_step) for run in runs]
+    grids = [
+        cut(stress_grid(run.protocol, run.time, steps.strain), np.zeros(1, int), steps.pieces)[0]
+        for run in runs
+    ]
     n_steps, n_samples = max(map(len, grids)), max(len(run) for run in runs)
     rows = []
     for run, grid in zip(runs, grids, strict=True):
@@ -310,9 +337,7 @@ class PeriodicFlows(eqx.Module):
         return 0.0
 
 
-def oscillations(
-    runs: Sequence[Run], strain_step: float
-) -> tuple[PeriodicFlows, tuple[Places, ...]]:
+def oscillations(runs: Sequence[Run], each: Steps) -> tuple[PeriodicFlows, tuple[Places, ...]]:
     """Return the states of sweeps, and of each run which of them are its own."""
     # G′ and G″ of one sweep are computed together
     of_runs = [
@@ -326,7 +351,8 @@ def oscillations(
         for run, own in zip(runs, np.split(number.ravel(), ends), strict=True)
     )
     strain, frequency = states.T
-    steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), strain_step) for one in strain]
+    most = each.strain / each.pieces
+    steps = [steps_of_half_cycle(max(float(one), _FEWEST / 2.0), most) for one in strain]
     return PeriodicFlows(*map(on_device, (strain, frequency, np.array(steps)))), places
 
 
@@ -366,11 +392,12 @@ class Batch(eqx.Module):
         return replace(self, records=self.records.without_factors())
 
 
-def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
+def make_batch(runs: Sequence[Run], strain_step: float = 0.25, **how: Any) -> Batch:
     """Return runs as a batch.
 
-    `runs`: of each record one. `strain_step`: largest strain of a step.
+    `runs`: of each record one. `strain_step`: largest strain of a step. `**how`: see `Steps`.
     """
+    steps = Steps(strain_step, **how)
     # simple shear apart from other flows, for it costs less
     kinds = [
         (flow.control, flow.control == "rate" and flow.kinematics is not None)
@@ -385,13 +412,13 @@ def make_batch(runs: Sequence[Run], strain_step: float = 0.25) -> Batch:
         own = [runs[i] for i in at]
         control = own[0].protocol.control
         if control == "oscillation":
-            part, moduli = oscillations(own, strain_step)
+            part, moduli = oscillations(own, steps)
         elif control == "steady":
             part = steady_states(own)
         elif control == "stress":
-            part = at_given_stress(own, strain_step)
+            part = at_given_stress(own, steps)
         else:
-            part = transients(own, strain_step)
+            part = transients(own, steps)
         parts.append(part)
     records = make_records(runs, max(map(len, runs)), "run").of_one_kind()
     return Batch(tuple(parts), rows, moduli, records)

@@ -1,4 +1,4 @@
-"""Fluids without instrument in flows of any control: what is recorded at the samples.
+"""Fluids in flows of any control for what needs derivatives by JAX; else there is `of_fluids`.
 
 Every function here is made to be transformed: `jax.vmap`, `jax.jvp`, and reverse mode; a state that
 is solved for has the derivative of the implicit function.
@@ -10,11 +10,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float, Inexact
 
 from discover.forward.dynamics import Dynamics, Modes
-from discover.forward.flow_batch import FlowBatch
 from discover.forward.grid import IntegrationGrid
 from discover.forward.periodic_states import periodic_state
 from discover.forward.stepping import (
@@ -26,7 +24,6 @@ from discover.forward.stepping import (
 )
 from discover.laws.each_mode import of_each_mode, over_modes
 from discover.laws.multimode import Fluid
-from discover.programs import compiled
 from discover.protocols.kinematics import FOLLOWED
 from discover.protocols.protocol import FlowProtocol
 from tensor_library.algebra import VelocityGradient
@@ -107,11 +104,12 @@ def solve_on_grid(
     """
     if adjoint is None or protocol.control == "steady":
         return _at_given_rate(fluid, protocol, grid, partial(_stress_of_modes, fluid))
-    dynamics, fixed = _with_fixed(fluid, protocol)
-    start = begun(dynamics, fixed, protocol, grid).T
-    from discover.forward.by_diffrax import solve_in_reverse  # diffrax takes a second to load
+    start = begun(*_with_fixed(fluid, protocol), protocol, grid)
+    from discover.forward.by_diffrax import followed_in_reverse  # diffrax takes a second to load
 
-    return solve_in_reverse(fluid, protocol, grid, start, adjoint)
+    modes = followed_in_reverse(dynamics_of_fluid, fluid, protocol, grid, start, adjoint)
+    gradient = jax.vmap(protocol.velocity_gradient)(grid.sample_times)
+    return jax.vmap(fluid.stress)(jnp.swapaxes(modes, 1, 2), gradient)
 
 
 def _at_given_rate(fluid: Fluid, protocol: FlowProtocol, grid: IntegrationGrid, observe: Observe):
@@ -123,18 +121,6 @@ def _with_fixed(fluid: Fluid, protocol: FlowProtocol) -> tuple[Dynamics, Dynamic
     return dynamics_of_fluid(fluid, protocol), dynamics_of_fluid(
         without_derivatives(fluid), protocol
     )
-
-
-@compiled
-def solve_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 4"]:
-    """Return the stresses of one fluid in a batch of runs, on fixed grids."""
-    return flows.over(partial(solve_on_grid, fluid))
-
-
-@compiled
-def observed_in_batch(fluid: Fluid, flows: FlowBatch) -> Float[Array, "runs n 3"]:
-    """Return what is recorded of one fluid in a batch of runs, and N1 and N2."""
-    return flows.over(partial(observed_on_grid, fluid))
 
 
 def solved_on_grid(
@@ -203,34 +189,3 @@ def dynamics_of_fluid(fluid: Fluid, protocol: FlowProtocol) -> Dynamics:
         variables=law.variables,
         shares=of_modes("shares") if law.tensors else None,
     )
-
-
-_TOLERANCE = 1e-4
-"""Change of the recorded stress on halving every step, relative to its size in the run."""
-
-_MOST_PIECES = 8
-"""What is observed of every step is kept, and more would not fit into memory."""
-
-
-def in_enough_steps(fluid: Fluid, flows: FlowBatch) -> FlowBatch:
-    """Return flows in steps short enough for a fluid's chains as they retract.
-
-    Of another law, or one that diverges, they are returned as they are.
-    """
-    followed = all(protocols.control in FOLLOWED for protocols, _ in flows.parts)
-    if not fluid.law.retracts or not followed:
-        return flows
-    pieces, coarse = 1, np.asarray(solve_batch(fluid, flows))
-    while pieces < _MOST_PIECES:
-        finer = flows.in_pieces(2 * pieces)
-        fine = np.asarray(solve_batch(fluid, finer))
-        size = np.sqrt(np.mean(fine**2, axis=(1, 2)))
-        apart = np.sqrt(np.mean((fine - coarse) ** 2, axis=(1, 2)))
-        # not a number where the shorter steps run away too
-        if not np.any(apart > _TOLERANCE * size) and np.all(np.isfinite(apart)):
-            break
-        pieces, coarse = 2 * pieces, fine
-    else:
-        if not np.all(np.isfinite(coarse)):
-            return flows
-    return flows.in_pieces(pieces)

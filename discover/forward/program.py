@@ -39,7 +39,7 @@ from discover.forward.side_by_side import (
 )
 from discover.laws import LAWS
 from discover.programs.threads import on_device
-from discover.protocols.kinematics import Kinematics
+from discover.protocols.kinematics import Kinematics, normal_stress_differences
 
 # Runs of which it is known whether vectors choose their steps in them
 _KEPT = 8
@@ -369,14 +369,26 @@ class Predictor:
         self, trials: Trials, batch: Batch, number: int, normal: bool = False
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records of a part, and if `normal` N1 and N2: NaN where a test has none."""
+        found, part = self.whole(trials, batch, number, normal), batch.parts[number]
+        if not normal:
+            return found
+        if isinstance(part, PeriodicFlows):
+            return np.pad(found, [*[(0, 0)] * 3, (0, 2)], constant_values=np.nan)
+        with np.errstate(invalid="ignore", over="ignore"):  # what ran away
+            both = normal_stress_differences(part.kinematics, found[..., 1], found[..., 2:6])
+        return np.concatenate([found[..., :1], both], axis=-1)
+
+    def whole(
+        self, trials: Trials, batch: Batch, number: int, whole: bool = True
+    ) -> Float[np.ndarray, "trials rows n kinds"]:
+        """Return the records of a part, and if `whole` what `Asked` says; sweeps have no more."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
             found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)
-            found = found[..., None]
-            return np.pad(found, [*[(0, 0)] * 3, (0, 2 * normal)], constant_values=np.nan)
+            return found[..., None]
         if not isinstance(part, TransientFlows):
-            return self._of_piece(trials, (part, None, 0), normal)
-        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), normal)
+            return self._of_piece(trials, (part, None, 0), whole)
+        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), whole)
         runs, samples = part.sample_index.shape
         return found[:, :runs, :samples]
 
@@ -385,7 +397,7 @@ class Predictor:
         return self.of_every_effect.side_by_side(self._numbers, part)
 
     def _of_piece(
-        self, trials: Trials, piece: _Piece, normal: bool
+        self, trials: Trials, piece: _Piece, whole: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
         program, (part, judging, runs) = self.program, piece
         judged = program.are_judged_by_modes(trials.thetas)
@@ -394,7 +406,7 @@ class Predictor:
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
         beside = trials._replace(thetas=vectors)
-        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, normal=normal)
+        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, whole=whole)
         return self.side_by_side(part).predict(asked)
 
     def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:

@@ -127,6 +127,10 @@ _BACK, _MOST_AGAIN = 3.0, 80
 # would move every number, of itself. Where nothing is left, no step needs to be possible
 _STILL, _NOTHING, _SMALL = 1e-3, 1e-9, 1e-3
 
+# Of the stress over its modulus and the square of one plus the Weissenberg number, what no state
+# reaches that is steady: 2 of a Maxwell fluid in shear. Where nothing relaxes steps end beyond 1e8
+_GROWN = 1e6
+
 # By how much a step may move a structure variable. Of chains it is a logarithm, which runs away
 # where it has turned nearly all to zero that should hold it
 _MOST_MOVED = 1.0
@@ -220,7 +224,9 @@ def arrived(
     # a stress that is small beside N1 may be far from steady where all is still by that measure
     moved = jnp.abs(_solved(-jacobian, now)) <= _STILL * (_SMALL + jnp.abs(stress))
     still = (left <= _STILL * most) & (jnp.all(moved, axis=0) | (left <= _NOTHING * most))
-    return jnp.where(still & _is_of_chains(stress), stress, jnp.nan)
+    # of what grows for ever a change is nothing beside what has grown
+    size = jnp.max(jnp.abs(stress[:4]), axis=0) / (1.0 + weissenberg_number) ** 2
+    return jnp.where(still & _is_of_chains(stress) & (size < _GROWN), stress, jnp.nan)
 
 
 def _is_of_chains(stress):

@@ -11,7 +11,8 @@ from jaxtyping import Bool, Float
 
 from discover.equations.equation import mean_relaxation_time
 from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import at_samples, in_enough_steps
+from discover.forward.fluids import at_samples
+from discover.forward.of_fluids import bare_run, pieces_in_time
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.each_mode import over_modes
 from discover.laws.expansion import in_shared_form
@@ -68,14 +69,15 @@ def trajectories(
     """
     fluid = replace(fluid, law=in_shared_form(fluid.law))
     longest = max(map(len, times))
+    runs = [bare_run(*pair) for pair in zip(protocols, times, strict=True)]
     flows = lay_out(
         protocols,
         times,
         longest + -longest % _SAMPLES,
         fluid.settling_time,
         strain_step=_STRAIN_STEP,
-    )
-    flows = in_enough_steps(fluid, flows.with_steps_in(_STEPS))
+        pieces=pieces_in_time(fluid, runs, _STRAIN_STEP),
+    ).with_steps_in(_STEPS)
     observed, states, smallest, dissipation = (np.asarray(part) for part in _along(fluid, flows))
     sampled = np.asarray(flows.sample_mask)
     whole = np.all(states | ~sampled, axis=1)

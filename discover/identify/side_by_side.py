@@ -2,31 +2,30 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from discover.dataset.run import Run
 from discover.errors import InputError
-from discover.forward.fluids import solve_on_grid
-from discover.forward.grid import IntegrationGrid, make_grids
+from discover.forward import make_batch
+from discover.forward.of_fluids import bare_run, observed
 from discover.laws import AbstractConstitutiveLaw, Fluid, LibraryExpansion, UpperConvectedMaxwell
-from discover.programs import compiled, on_device
+from discover.programs import on_device
 from discover.protocols.protocol import (
     FlowProtocol,
     in_flow,
     oscillatory_shear,
-    stack_protocols,
     start_up,
 )
 from discover.statistics.noise.noise_model import rms
 from discover.words import percent_of
 from tensor_library import LawTerms, TermLibrary, parse_term
 
-LAWS_AT_ONCE = 8
-"""Laws simulated side by side; fewer are padded, so that any number shares one program."""
+STRAIN_STEP = 0.1
+"""Largest strain of a step."""
 
 
 def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary:
@@ -39,47 +38,35 @@ def joint_library(library: TermLibrary, laws: Sequence[LawTerms]) -> TermLibrary
     return library.extended(terms)
 
 
-def _batches(library: TermLibrary, laws: Sequence[LawTerms]):
-    for first in range(0, len(laws), LAWS_AT_ONCE):
-        some = [law.over(library) for law in laws[first : first + LAWS_AT_ONCE]]
-        count = len(some)
-        some += some[-1:] * (LAWS_AT_ONCE - count)
-        coefficients, inner = (on_device(np.stack(part)) for part in zip(*some, strict=True))
-        yield count, coefficients, inner
-
-
 def stresses_of_laws(
     library: TermLibrary,
     laws: Sequence[LawTerms],
-    protocols: FlowProtocol,
-    grids: IntegrationGrid,
+    runs: Sequence[Run],
     base: AbstractConstitutiveLaw | None = None,
-) -> Float[np.ndarray, "laws runs n 4"]:
-    """Return the dimensionless σ11, σ22, σ33, σ12 of several laws in a batch of flows.
+    strain_step: float = STRAIN_STEP,
+) -> Float[np.ndarray, "laws runs n 3"]:
+    """Return what is recorded of several laws in a batch of flows, N1 and N2, dimensionless.
 
     `library`: holds every term of the laws. `base`: the known part; by default UCM. Not finite
     where a law diverges.
     """
     base = UpperConvectedMaxwell() if base is None else base
-    parts = [
-        np.asarray(_march(library, base, c, inner, protocols, grids))[:count]
-        for count, c, inner in _batches(library, laws)
-    ]
-    return np.concatenate(parts)
-
-
-def _law(library, base, coefficients, inner) -> LibraryExpansion:
-    return LibraryExpansion(coefficients, inner, library, base.linear_relaxation, base)
-
-
-@compiled
-def _march(library, base, coefficients, inner, protocols, grids):
-    def one(c, i, protocol, grid):
-        law = _law(library, base, c, i)
-        return solve_on_grid(Fluid.dimensionless(law), protocol, grid)
-
-    over_runs = jax.vmap(one, in_axes=(None, None, 0, 0))
-    return jax.vmap(over_runs, in_axes=(0, 0, None, None))(coefficients, inner, protocols, grids)
+    names = {name for law in laws for name in law.coefficients}
+    used = [term for term in library.terms if term.name in names] or library.terms[:1]
+    used = TermLibrary(tuple(used))
+    fluids = []
+    for law in laws:
+        coefficients, inner = law.over(used)
+        whole = LibraryExpansion(
+            coefficients=on_device(coefficients),
+            inner=on_device(inner),
+            library=used,
+            linear_relaxation=base.linear_relaxation,
+            base=base,
+        )
+        fluids.append(Fluid.dimensionless(whole))
+    batch = make_batch(runs, strain_step, longest=longest_step(base), own=False)
+    return observed(fluids, batch)
 
 
 SAME = 1e-5
@@ -90,7 +77,6 @@ _DURATION = 8.0
 _SAMPLES = 65
 _AMPLITUDES = (0.3, 1.0, 2.0, 3.0)
 _EACH = 3  # histories at each
-_STRAIN_STEP = 0.1
 _OSCILLATIONS = ((1.0, 1.0), (3.0, 1.0), (3.0, 0.25), (5.0, 1.0))
 _START_UPS = (1.0, 3.0)
 
@@ -100,11 +86,10 @@ class Histories:
     """Shear flows with the times at which they are looked at.
 
     `amplitude`: rms shear rate of each random history, shape (r,); these come first. `names`: of
-    the ordinary flows that follow in the same batch.
+    the ordinary flows that follow.
     """
 
-    protocols: FlowProtocol
-    grids: IntegrationGrid
+    runs: tuple[Run, ...]
     amplitude: Float[np.ndarray, " r"]
     names: tuple[str, ...] = ()
 
@@ -121,12 +106,12 @@ def longest_step(law: AbstractConstitutiveLaw) -> float:
     return 1.0 / (1.0 + float(jnp.max(jnp.sum(law.relaxations(), axis=1))))
 
 
-@lru_cache(maxsize=4)
-def random_histories(max_step: float = np.inf) -> Histories:
+@cache
+def random_histories() -> Histories:
     """Return band-limited random shear rates at several amplitudes, then ordinary flows.
 
     Sums of six cosines with frequencies from 0.1 to 3 over eight relaxation times, at rms rates of
-    0.3, 1, 2 and 3. `max_step`: in relaxation times, from `longest_step`.
+    0.3, 1, 2 and 3.
     """
     generator = np.random.default_rng(0)
     protocols, amplitudes = [], []
@@ -151,14 +136,8 @@ def random_histories(max_step: float = np.inf) -> Histories:
     ordinary |= {f"start-up of shear at Wi = {wi:g}": start_up(wi) for wi in _START_UPS}
     protocols += ordinary.values()
     times = np.linspace(0.0, _DURATION, _SAMPLES)
-    every = [times] * len(protocols)
-    grids = make_grids(protocols, every, strain_step=_STRAIN_STEP, max_step=max_step)
-    return Histories(stack_protocols(protocols), grids, np.asarray(amplitudes), tuple(ordinary))
-
-
-def histories_for(law: AbstractConstitutiveLaw | None) -> Histories:
-    """Return `random_histories()` in steps that a law allows; none is UCM."""
-    return random_histories() if law is None else random_histories(longest_step(law))
+    runs = tuple(bare_run(protocol, times) for protocol in protocols)
+    return Histories(runs, np.asarray(amplitudes), tuple(ordinary))
 
 
 @dataclass(frozen=True)
@@ -175,22 +154,15 @@ class Difference:
 
 def stresses_in_histories(
     library: TermLibrary, laws: Sequence[LawTerms], base: AbstractConstitutiveLaw | None = None
-) -> Float[np.ndarray, "laws runs n 4"]:
-    """Return the stresses of laws in `histories_for` a known part, by default UCM."""
-    flows = histories_for(base)
-    return stresses_of_laws(library, laws, flows.protocols, flows.grids, base)
+) -> Float[np.ndarray, "laws runs n 3"]:
+    """Return σ12, N1 and N2 of laws in `random_histories`, beyond a known part, by default UCM."""
+    return stresses_of_laws(library, laws, random_histories().runs, base)
 
 
-def differences(stresses: Float[np.ndarray, "laws runs n 4"]) -> list[Difference]:
+def differences(stresses: Float[np.ndarray, "laws runs n 3"]) -> list[Difference]:
     """Return how far each law is from the first in the random histories that the first survives."""
-    observed = observe_differences(stresses[:, : _EACH * len(_AMPLITUDES)])
-    return [difference(observed[0], other) for other in observed[1:]]
-
-
-def observe_differences(stresses: Float[np.ndarray, "*batch 4"]) -> Float[np.ndarray, "*batch 3"]:
-    """Return σ12, N1 and N2 from the components 11, 22, 33, 12."""
-    s11, s22, s33, s12 = np.moveaxis(stresses, -1, 0)
-    return np.stack([s12, s11 - s22, s22 - s33], axis=-1)
+    in_histories = stresses[:, : _EACH * len(_AMPLITUDES)]
+    return [difference(in_histories[0], other) for other in in_histories[1:]]
 
 
 def difference(
@@ -242,7 +214,7 @@ class Separation:
 def separations(
     library: TermLibrary,
     laws: Sequence[LawTerms],
-    stresses: Float[np.ndarray, "laws runs n 4"],
+    stresses: Float[np.ndarray, "laws runs n 3"],
     base: AbstractConstitutiveLaw | None = None,
 ) -> list[tuple[Separation, ...]]:
     """Return for each law the flows that distinguish it from the first, best in each quantity.
@@ -250,14 +222,12 @@ def separations(
     Oscillations and start-ups of shear, which need the fewest new instruments, then start-ups of
     uniaxial and planar extension. `stresses`: from `stresses_in_histories`.
     """
-    flows = histories_for(base)
-    names, shear = flows.names, observe_differences(stresses[:, flows.n_random :])
+    flows = random_histories()
+    names, shear = flows.names, stresses[:, flows.n_random :]
     times = np.linspace(0.0, _DURATION, 161)
     starts = [(kind, rate) for kind in _EXTENSION_QUANTITY for rate in _EXTENSION_RATES]
-    protocols = [in_flow(start_up(rate), kind) for kind, rate in starts]
-    step = np.inf if base is None else longest_step(base)
-    grids = make_grids(protocols, [times] * len(protocols), strain_step=np.inf, max_step=step)
-    extension = stresses_of_laws(library, laws, stack_protocols(protocols), grids, base)
+    runs = [bare_run(in_flow(start_up(rate), kind), times) for kind, rate in starts]
+    extension = stresses_of_laws(library, laws, runs, base, strain_step=np.inf)
     return [
         _best(
             [
@@ -288,9 +258,8 @@ def _in_shear(names, reference, other):
 
 def _in_extension(starts, reference, other):
     for (kind, rate), a, b in zip(starts, reference, other, strict=True):
-        scale = rms(a[:, 0] - a[:, 1])
-        first, second = (0, 1) if kind == "uniaxial" else (1, 2)
-        value = _relative(a[:, first] - a[:, second], b[:, first] - b[:, second], scale)
+        scale, which = rms(a[:, 1]), 1 if kind == "uniaxial" else 2
+        value = _relative(a[:, which], b[:, which], scale)
         if value is not None:
             flow = f"{kind} extension at a rate of {rate:g}"
             yield Separation(flow, _EXTENSION_QUANTITY[kind], value)

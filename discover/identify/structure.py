@@ -18,11 +18,8 @@ from jaxtyping import Array, Bool, Float
 from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import (
-    dynamics_of_fluid,
-    in_enough_steps,
-    observed_of_dynamics,
-)
+from discover.forward.fluids import dynamics_of_fluid, observed_of_dynamics
+from discover.forward.of_fluids import pieces_in_time
 from discover.forward.tangents import with_cheap_tangents
 from discover.identify.exact_series import compare_series
 from discover.identify.relations import (
@@ -222,14 +219,12 @@ def analyse_structure(
     total = sum(map(len, runs))
     runs = [thin_run(run, _ROWS) for run in runs]
     known = Fluid(base, *modes, solvent_viscosity)
-    flows = in_enough_steps(
-        known,
-        lay_out(
-            [run.protocol for run in runs],
-            [run.time for run in runs],
-            strain_step=_STRAIN_STEP,
-            relaxation_time=known.settling_time,
-        ),
+    flows = lay_out(
+        [run.protocol for run in runs],
+        [run.time for run in runs],
+        strain_step=_STRAIN_STEP,
+        relaxation_time=known.settling_time,
+        pieces=pieces_in_time(known, runs, _STRAIN_STEP),
     )
     normal = {"N1": "first_normal_stress_difference", "N2": "second_normal_stress_difference"}
     also = [

@@ -16,12 +16,14 @@ import numpy as np
 from jaxtyping import Float
 
 from discover.forward.fluids import dynamics_of_fluid
+from discover.forward.grid import make_grids
 from discover.forward.stepping import follow
 from discover.identify import side_by_side
 from discover.identify.exact_series import DEFAULT_ORDER, hidden_change, solve_for_coefficient
 from discover.identify.relations import feels_33, term_relations
 from discover.laws import AbstractConstitutiveLaw, Fluid, UpperConvectedMaxwell
 from discover.programs import compiled
+from discover.protocols.protocol import stack_protocols
 from discover.statistics import HALF_BAND
 from discover.summary_view import NotebookView
 from discover.words import percent_of
@@ -266,8 +268,11 @@ class HiddenStresses:
 
 def hidden_stresses(law: AbstractConstitutiveLaw) -> HiddenStresses:
     """Return which normal stresses σ12 feels in a law, over random histories that it survives."""
-    flows = side_by_side.histories_for(law)
-    arrived = np.asarray(_arrivals(law, flows.protocols, flows.grids))
+    runs = side_by_side.random_histories().runs
+    protocols, times = [run.protocol for run in runs], [run.time for run in runs]
+    step, longest = side_by_side.STRAIN_STEP, side_by_side.longest_step(law)
+    grids = make_grids(protocols, times, strain_step=step, max_step=longest)
+    arrived = np.asarray(_arrivals(law, stack_protocols(protocols), grids))
     usable = np.all(np.isfinite(arrived), axis=(1, 2))
     rows = arrived[usable].reshape(-1, 3)
     triangular = np.linalg.qr(rows, mode="r") if len(rows) else np.zeros((3, 3))

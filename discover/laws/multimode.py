@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 
 from discover.errors import InputError
 from discover.laws.base import AbstractConstitutiveLaw, as_parameter
-from discover.laws.each_mode import of_each_mode, over_modes, require_modes
+from discover.laws.each_mode import over_modes, require_modes
 from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.plain_numbers import as_numbers
 from discover.words import counted
@@ -198,24 +198,6 @@ class Fluid(eqx.Module):
     def rest(self) -> Float[Array, "k s"]:
         """Return the state at rest."""
         return jnp.tile(self.law.rest(), (self.n_modes, 1))
-
-    def decay_rate(self) -> Float[Array, "k _"]:
-        """Return the rate of linear relaxation of each mode in 1/s, shape (k, 1).
-
-        Where chains retract that of each component, (k, s), with the trace's in the place of the
-        first normal stress of each tensor, as `ExponentialRungeKutta4` takes it.
-        """
-        rate = jnp.where(self.law.linear_relaxation, 1.0, 0.0) / self.relaxation_time[:, None]
-        if not self.law.retracts:
-            return rate
-
-        def beside(law: AbstractConstitutiveLaw) -> Float[Array, " s"]:
-            faster = law.relaxations()
-            of_each = jnp.repeat(faster[:, :1], 4, axis=1).at[:, 0].add(faster[:, 1]).ravel()
-            return jnp.zeros_like(law.rest()).at[: len(of_each)].set(of_each)
-
-        of_modes = of_each_mode(beside, self.law, self.n_modes)
-        return rate + of_modes / self.relaxation_time[:, None]
 
     def state_rate(
         self, state: Float[Array, "k s"], velocity_gradient: VelocityGradient

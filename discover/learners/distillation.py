@@ -1,26 +1,24 @@
 """Distillation: the parameters of one law that best imitate another   [Rodrigues et al., §6]."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
-from functools import cache, partial
+from dataclasses import dataclass, fields, replace
+from functools import cache
 from typing import Any
 
 import equinox as eqx
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 from scipy.optimize import least_squares
+from scipy.special import expit, logit
 from scipy.stats import qmc
 
 from discover.errors import InputError
-from discover.forward.fluids import solve_on_grid
-from discover.forward.grid import IntegrationGrid, make_grids
+from discover.forward import Batch, make_batch
+from discover.forward.of_fluids import bare_run, observed
 from discover.laws import AbstractConstitutiveLaw, Fluid
 from discover.laws.base import as_parameter
 from discover.laws.registry import LAWS, starting_values
 from discover.linear_algebra_threads import in_one_thread
-from discover.programs import compiled
 from discover.protocols.protocol import (
     TEST_DURATION,
     TRAINING_DURATION,
@@ -28,7 +26,6 @@ from discover.protocols.protocol import (
     in_flow,
     paper_test_protocols,
     paper_training_protocols,
-    stack_protocols,
     start_up,
 )
 from discover.simulate.solve import SimulationError, simulate
@@ -37,6 +34,7 @@ from tensor_library.algebra import Symmetric
 
 _TOLERANCE, _MOST_STEPS = 1e-10, 200
 _RUNAWAY = 1e3  # misfit of a trial that has no finite trajectory: it is always rejected
+_WIDTH = 1e-4  # of an unbounded parameter, by which it is moved for a derivative
 _INSIDE = 1e-9  # parameters stay this fraction of their range away from its ends
 
 _POINTS = 5
@@ -171,81 +169,79 @@ class Distillation:
         return {one.name: getattr(self, one.name) for one in fields(self) if one.name != "law"}
 
 
-class _Lesson(eqx.Module):
+@dataclass(frozen=True)
+class _Lesson:
     """Training problem: target σ12 over the modulus, shape (flows, n), and how to predict it."""
 
-    build: Callable[..., AbstractConstitutiveLaw] = eqx.field(static=True)
-    low: Float[Array, " p"]
-    high: Float[Array, " p"]
-    geometric: Bool[Array, " p"]
-    modulus: Float[Array, " k"]
-    relaxation_time: Float[Array, " k"]
-    solvent_viscosity: Float[Array, ""]
-    protocols: FlowProtocol
-    grids: IntegrationGrid
-    target: Float[Array, "flows n"]
+    build: Callable[..., AbstractConstitutiveLaw]
+    low: Float[np.ndarray, " p"]
+    high: Float[np.ndarray, " p"]
+    geometric: Bool[np.ndarray, " p"]
+    teacher: Fluid
+    batch: Batch
+    target: Float[np.ndarray, "flows n"]
 
-    def parameters(self, free: Float[Array, " p"]) -> Float[Array, " p"]:
+    def parameters(self, free: Float[np.ndarray, "*m p"]) -> Float[np.ndarray, "*m p"]:
         """Return parameters inside their bounds from unbounded ones."""
-        share = jax.nn.sigmoid(free)
+        share = expit(free)
         linear = self.low + (self.high - self.low) * share
-        positive = jnp.where(self.geometric, self.low, 1.0)
-        return jnp.where(self.geometric, positive * (self.high / positive) ** share, linear)
+        positive = np.where(self.geometric, self.low, 1.0)
+        return np.where(self.geometric, positive * (self.high / positive) ** share, linear)
 
-    def free(self, values: Float[np.ndarray, " p"]) -> Float[Array, " p"]:
+    def free(self, values: Float[np.ndarray, " p"]) -> Float[np.ndarray, " p"]:
         """Return the unbounded parameters of values inside their bounds."""
-        low, high, geometric = map(np.asarray, (self.low, self.high, self.geometric))
+        low, high = self.low, self.high
         with np.errstate(divide="ignore", invalid="ignore"):
             share = np.where(
-                geometric, np.log(values / low) / np.log(high / low), (values - low) / (high - low)
+                self.geometric,
+                np.log(values / low) / np.log(high / low),
+                (values - low) / (high - low),
             )
-        share = np.clip(share, _INSIDE, 1.0 - _INSIDE)
-        return jnp.asarray(np.log(share / (1.0 - share)))
+        return logit(np.clip(share, _INSIDE, 1.0 - _INSIDE))
 
-    def residual(self, free: Float[Array, " p"], kappa: Float[Array, ""]):
+    def taught(self, parameters: Float[np.ndarray, " p"]) -> Fluid:
+        """Return the teacher with the student's law."""
+        return replace(self.teacher, law=self.build(*parameters))
+
+    def rows(self, free: Float[np.ndarray, "m p"], kappa: float) -> Float[np.ndarray, "m rows"]:
         """Return residuals whose squares add up to the objective."""
         parameters = self.parameters(free)
-        taught = Fluid(
-            self.build(*parameters), self.modulus, self.relaxation_time, self.solvent_viscosity
-        )
-        solve = partial(solve_on_grid, taught)
-        stress = jax.vmap(solve)(self.protocols, self.grids)[..., 3] / jnp.sum(self.modulus)
-        difference = (stress - self.target) / jnp.sqrt(1.0 * self.target.shape[1])
+        with np.errstate(all="ignore"):  # a trial that ran away
+            found = observed([self.taught(values) for values in parameters], self.batch)
+            stress = found[..., 0] / np.sum(self.teacher.modulus)
+            difference = (stress - self.target) / np.sqrt(self.target.shape[1])
         # a trial that diverges is an increase, which the solver rejects
-        difference = jnp.where(jnp.all(jnp.isfinite(difference)), difference, _RUNAWAY)
-        return difference, jnp.sqrt(kappa) * jnp.sqrt(jnp.abs(parameters))
+        whole = np.all(np.isfinite(difference), axis=(1, 2), keepdims=True)
+        difference = np.where(whole, difference, _RUNAWAY).reshape(len(free), -1)
+        return np.concatenate([difference, np.sqrt(kappa * np.abs(parameters))], axis=1)
+
+    def linearised(
+        self, free: Float[np.ndarray, " p"], kappa: float
+    ) -> tuple[Float[np.ndarray, " rows"], Float[np.ndarray, "rows p"]]:
+        """Return the residuals and their central differences, from one call."""
+        moves = _WIDTH * np.eye(len(free))
+        found = self.rows(free + np.concatenate([np.zeros((1, len(free))), moves, -moves]), kappa)
+        base, up, down = np.split(found, [1, 1 + len(free)])
+        return base[0], (0.5 / _WIDTH * (up - down)).T
 
 
-@compiled
-def _linearised(lesson: _Lesson, free: Float[Array, " p"], kappa: Float[Array, ""]):
-    """Return all residuals and their derivatives, shape (p, rows)."""
-
-    def rows(moved):
-        difference, penalty = lesson.residual(moved, kappa)
-        return jnp.concatenate([difference.reshape(-1), penalty])
-
-    found, change = jax.linearize(rows, free)
-    return found, jax.vmap(change)(jnp.eye(free.size))
-
-
-def _teach(lesson: _Lesson, free: Float[Array, " p"], kappa: float):
+def _teach(lesson: _Lesson, free: Float[np.ndarray, " p"], kappa: float):
     """Return the unbounded parameters of least squares, and the sum of squares there."""
 
     @cache
     def at(values: tuple[float, ...]):
-        found, columns = _linearised(lesson, jnp.asarray(values), jnp.asarray(kappa))
-        return np.asarray(found), np.asarray(columns).T
+        return lesson.linearised(np.array(values), kappa)
 
     ended = least_squares(
         lambda moved: at(tuple(moved))[0],
-        np.asarray(free),
+        free,
         jac=lambda moved: at(tuple(moved))[1],  # pyright: ignore[reportArgumentType]
         ftol=_TOLERANCE,
         xtol=_TOLERANCE,
         gtol=_TOLERANCE,
         max_nfev=_MOST_STEPS,
     )
-    return jnp.asarray(ended.x), 2.0 * ended.cost
+    return ended.x, 2.0 * ended.cost
 
 
 @in_one_thread
@@ -283,35 +279,31 @@ def distil(
     if not flows:
         raise InputError("A distillation needs at least one flow; got none.")
     times = np.linspace(0.0, duration, n_samples)
-    modulus = float(jnp.sum(fluid.modulus))
+    modulus = float(np.sum(fluid.modulus))
     target = np.stack([simulate(fluid, p, times).shear_stress for p in flows.values()]) / modulus
-    stacked = stack_protocols(list(flows.values()))
-    grids = make_grids(list(flows.values()), [times] * len(flows), strain_step=0.2)
+    runs = [bare_run(flow, times) for flow in flows.values()]
     low, high = (np.array(b) for b in zip(*pupil.bounds.values(), strict=True))
 
     lesson = _Lesson(
         pupil.build,
-        jnp.asarray(low),
-        jnp.asarray(high),
+        low,
+        high,
         # those of the paper's students go in straight lines
-        jnp.asarray((low > 0.0) & (pupil.name not in STUDENTS)),
-        fluid.modulus,
-        fluid.relaxation_time,
-        fluid.solvent_viscosity,
-        stacked,
-        grids,
-        jnp.asarray(target),
+        (low > 0.0) & (pupil.name not in STUDENTS),
+        fluid,
+        make_batch(runs, strain_step=0.2, own=False),
+        target,
     )
     starts = (lesson.free(np.array(values)) for values in (pupil.start, *pupil.more_starts))
     taught_from = [_teach(lesson, start, 0.0) for start in starts]
     debiased_free, squares = min(taught_from, key=lambda one: one[1])
     penalised_free, _ = _teach(lesson, debiased_free, float(penalty))
-    debiased = np.asarray(lesson.parameters(debiased_free))
-    penalised = np.asarray(lesson.parameters(penalised_free))
-    law = pupil.build(*debiased)
+    debiased = lesson.parameters(debiased_free)
+    penalised = lesson.parameters(penalised_free)
+    taught = lesson.taught(debiased)
+    law = taught.law
     scale = np.sqrt(np.sum(np.mean(target**2, axis=1)))
     maxwell = isinstance(law, MaxwellSurrogate)
-    taught = Fluid(law, fluid.modulus, fluid.relaxation_time, fluid.solvent_viscosity)
     test_flows = {**paper_test_protocols(), **_EXTENSION} if tests is None else tests
     return Distillation(
         student=pupil.name,

@@ -13,8 +13,8 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted
 
 from discover.dataset.run import Run
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import in_enough_steps, observed_in_batch
+from discover.forward import make_batch
+from discover.forward.of_fluids import followed, observed, pieces_in_time
 from discover.learners.files import EstimatorFile, Provenance, provenance_of, write_estimator
 from discover.learners.results import estimates_of
 from discover.learners.runs import as_runs, require_signal
@@ -297,11 +297,7 @@ class RunPrediction(SummaryView, RegressorMixin, BaseEstimator):
     def _predict_runs(self, runs: list[Run]) -> list[Float[np.ndarray, " n"]]:
         """Return what is recorded of each run."""
         fluid = self.fluid_
-        flows = lay_out(
-            [run.protocol for run in runs],
-            [run.time for run in runs],
-            strain_step=_STRAIN_STEP,
-            relaxation_time=fluid.settling_time,
-        )
-        observed = np.asarray(observed_in_batch(fluid, in_enough_steps(fluid, flows)))
-        return [observed[i, : len(run), 0] for i, run in enumerate(runs)]
+        runs = [followed(fluid, run) for run in runs]
+        pieces = pieces_in_time(fluid, runs, _STRAIN_STEP)
+        found = observed([fluid], make_batch(runs, _STRAIN_STEP, pieces=pieces))[0]
+        return [rows[: len(run), 0] for run, rows in zip(runs, found, strict=True)]

@@ -15,7 +15,8 @@ from discover.errors import InputError
 from discover.first_use import require_double
 from discover.forward import Records, make_records
 from discover.forward.flow_batch import FlowBatch, lay_out
-from discover.forward.fluids import in_enough_steps
+from discover.forward.grid import STRAIN_STEP
+from discover.forward.of_fluids import pieces_in_time
 from discover.forward.records import Mean
 from discover.laws.multimode import Fluid
 from discover.learners.settings import PerMode
@@ -87,10 +88,10 @@ def laid_out(
         [run.time for run in runs],
         n,
         relaxation_time=known.settling_time,
+        pieces=pieces_in_time(known, runs, limits.get("strain_step", STRAIN_STEP)),
         **limits,
     )
-    records = make_records(runs, n, mean, 1)
-    return in_enough_steps(known, flows), jax.tree.map(on_device, records)
+    return flows, jax.tree.map(on_device, make_records(runs, n, mean, 1))
 
 
 AFFORDABLE = 6000.0

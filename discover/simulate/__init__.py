@@ -9,7 +9,7 @@ Examples
 [0.632 1.   ]
 """
 
-from discover import first_use as first_use  # what it sets for equinox counts only before diffrax
+from discover import first_use as first_use  # what it sets counts only before equinox is imported
 from discover.callable_package import answer_calls
 from discover.simulate.solve import SimulationError, observe, simulate
 from discover.simulate.synthetic import synthetic_dataset

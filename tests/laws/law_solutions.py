@@ -12,8 +12,8 @@ from independent.homogeneous import UNIT
 from independent.named import CONSTANTS, material
 from scipy.integrate import solve_ivp
 
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import observed_in_batch
+from discover.forward.grid import STRAIN_STEP
+from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, make_law
 from discover.protocols import FlowProtocol, imposed_stress, in_flow, oscillatory_shear, start_up
 
@@ -85,9 +85,9 @@ def observed(law: str, flow: str, pieces: int = 1, coarser: float = 1.0) -> np.n
     """Return what the software says is observed, with steps cut in pieces, or longer ones."""
     made = make_law(law, CONSTANTS[law])
     solvent = SOLVENT if flow == "imposed stress" else 0.0
-    limits = {} if coarser == 1.0 else {"strain_step": 0.1 * coarser, "phase_step": 0.15 * coarser}
-    flows = lay_out([FLOWS[flow]], [TIMES[flow]], **limits).in_pieces(pieces)
-    found = np.asarray(observed_in_batch(Fluid(made, 1.0, 1.0, solvent), flows))[0]
+    how = {"pieces": pieces, "phase": 0.15 * coarser, "own": False}
+    fluid = Fluid(made, 1.0, 1.0, solvent)
+    found = observed_in(fluid, FLOWS[flow], TIMES[flow], STRAIN_STEP * coarser, **how)
     return found if flow in ("start-up", "oscillation") else found[:, :1]
 
 

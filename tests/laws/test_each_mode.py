@@ -13,8 +13,7 @@ from discover.effects import make_effect
 from discover.equations import AugmentedLaw, law_parts
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import at_samples
+from discover.forward.of_fluids import observed_in
 from discover.identify.physics import _extension
 from discover.laws import Fluid, make_law
 from discover.laws.each_mode import differs_by_mode, law_of_each_mode, law_of_mode, with_modes
@@ -87,12 +86,13 @@ def test_the_model_of_the_loop_gives_an_added_mode_constants_between_its_neighbo
 
 def test_steady_states_and_linear_sweeps_are_those_of_each_mode():
     fluid = Fluid(giesekus(), MODULI, TIMES)
-    flows = lay_out([steady_rates(np.array([RATE]))], [np.array([1.0])])
-    solved = jax.jit(lambda fluid: flows.over(lambda *flow: at_samples(fluid, *flow).states)[0, 0])
-    states = np.asarray(solved(fluid))
-    for number, (alpha, time) in enumerate(zip(MOBILITIES, TIMES, strict=True)):
-        alone = Fluid(make_law("giesekus", {"alpha": alpha}), 1.0, time)
-        assert states[number] == pytest.approx(np.asarray(solved(alone))[0])
+    curve = steady_rates(np.array([RATE])), np.array([1.0])
+    of_modes = (
+        Fluid(make_law("giesekus", {"alpha": alpha}), modulus, time)
+        for alpha, modulus, time in zip(MOBILITIES, MODULI, TIMES, strict=True)
+    )
+    alone = sum(observed_in(one, *curve) for one in of_modes)
+    assert observed_in(fluid, *curve) == pytest.approx(alone)
     sweep, omega = linear_sweep(fluid), linear_sweep(fluid).angular_frequency
     x = np.multiply.outer(omega, TIMES)
     assert sweep.storage_modulus == pytest.approx((x**2 / (1 + x**2)) @ np.array(MODULI))

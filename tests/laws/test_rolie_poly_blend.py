@@ -14,8 +14,9 @@ from scipy.integrate import solve_ivp
 import discover as dc
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import at_samples, dynamics_of_fluid, solve_batch
+from discover.forward.fluids import dynamics_of_fluid
+from discover.forward.grid import STRAIN_STEP
+from discover.forward.of_fluids import bare_run, components
 from discover.forward.periodic_states import first_harmonic, half_cycle
 from discover.laws import Fluid, make_law
 from discover.protocols import in_flow, oscillations, start_up
@@ -54,9 +55,9 @@ def fluid(modulus=1.0, time=1.0, **changed):
 
 
 def solved(law, rate, strain_step, kind="shear", times=TIMES):
-    """Return σ in a start-up, (n, 4), in as many steps as others take, in one program with them."""
-    flows = lay_out([in_flow(start_up(rate), kind)], [times], strain_step=strain_step)
-    return np.asarray(solve_batch(law, flows.with_steps_in(512)))[0]
+    """Return σ in a start-up, (n, 4)."""
+    run = bare_run(in_flow(start_up(rate), kind), times)
+    return components([law], make_batch([run], strain_step, own=False))[0, 0, :, :4]
 
 
 def by_the_loop(protocol, rate, modulus=(1.0,), time=(1.0,), times=TIMES, **columns):
@@ -175,9 +176,8 @@ def test_an_oscillation_gone_on_for_ever_is_one_that_was_waited_for():
 
 def test_no_flow_takes_a_conformation_away():
     """Of any pair, in a reversal at Wi 20."""
-    flows = lay_out([dc.step_rates([0.0, 1.0], [20.0, -20.0])], [np.linspace(0.0, 2.0, 81)])
-    protocol, grid = jax.tree.map(lambda leaf: leaf[0], flows.parts[0])
-    states = np.asarray(jax.jit(at_samples)(fluid(), protocol, grid).states)[:, 0]
+    run = bare_run(dc.step_rates([0.0, 1.0], [20.0, -20.0]), np.linspace(0.0, 2.0, 81))
+    states = components([fluid()], make_batch([run], STRAIN_STEP))[0, 0]
     for first in range(0, 20, 4):
         s11, s22, s33, s12 = states[:, first : first + 4].T + np.array([[1], [1], [1], [0]])
         assert np.min((s11 + s22) / 2 - np.hypot((s11 - s22) / 2, s12)) > 0.0

@@ -5,8 +5,9 @@ import pytest
 from independent import Giesekus, steps
 
 import discover as dc
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import observed_in_batch
+from discover.forward import make_batch
+from discover.forward.grid import STRAIN_STEP
+from discover.forward.of_fluids import observed
 from discover.learners.runs import with_shorter_holds
 from discover.protocols import measured_rate, oscillatory_shear, shear_rates, step_rates
 from tensor_library.library import build_library
@@ -30,11 +31,9 @@ def records(noise=0.01, seed=0):
 
 
 def predicted(runs, law):
-    flows = lay_out(
-        [run.protocol for run in runs], [run.time for run in runs], relaxation_time=TIME
-    )
+    batch = make_batch(runs, STRAIN_STEP, relaxation_time=TIME, own=False)
     fluid = dc.Fluid(dc.make_law(*law), MODULUS, TIME)
-    return np.asarray(observed_in_batch(fluid, flows))[..., 0], flows.n_steps
+    return observed([fluid], batch)[0, :, :, 0], batch.parts[0].times.shape[1]
 
 
 @pytest.mark.parametrize(

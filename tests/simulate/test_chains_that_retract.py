@@ -1,21 +1,19 @@
 """Chains that retract within a fraction of λ, in steps of any length, against scipy."""
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from independent import RoliePoly
 from independent.homogeneous import UNIT
 from scipy.integrate import solve_ivp
 
-from discover.forward.exponential_weights import turned
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import in_enough_steps, solve_batch
+from discover.forward.of_fluids import bare_run, observed_in, pieces_in_time
 from discover.laws import Fluid, make_law
 from discover.protocols import start_up
 from discover.simulate import simulate
 
 MODULUS, TIMES = (1000.0, 300.0, 100.0), (1e-3, 0.1, 10.0)
 SAMPLES = np.linspace(0.5, 30.0, 60)
+RUN = bare_run(start_up(0.3), SAMPLES)
 
 
 def exact(ratio, rate):
@@ -40,8 +38,7 @@ def fluid(ratio):
 def test_steps_much_longer_than_a_mode_and_its_retraction_follow_both():
     """The fastest mode relaxes in 1/500 of a step, and retracts in 1/5,000; it ran away."""
     wanted = exact(0.1, 0.3)
-    flows = lay_out([start_up(0.3)], [SAMPLES])
-    found = np.asarray(solve_batch(fluid(0.1), flows))[0, :, 3]
+    found = observed_in(fluid(0.1), start_up(0.3), SAMPLES, own=False)[:, 0]
     np.testing.assert_allclose(found, wanted, atol=1e-3 * np.max(wanted))
 
 
@@ -54,23 +51,13 @@ def test_steps_that_adapt_follow_them_to_the_tolerance():
 
 @pytest.mark.parametrize("ratio", [0.01, 0.5])
 def test_steps_are_cut_until_cutting_them_changes_nothing(ratio):
-    flows = lay_out([start_up(0.3)], [SAMPLES], strain_step=0.2)
-    cut = in_enough_steps(fluid(ratio), flows)
-    found = np.asarray(solve_batch(fluid(ratio), cut))[0, :, 3]
+    pieces = pieces_in_time(fluid(ratio), [RUN], 0.2, own=False)
+    found = observed_in(fluid(ratio), start_up(0.3), SAMPLES, 0.2, pieces=pieces, own=False)[:, 0]
     wanted = exact(ratio, 0.3)
     # a change of 1e-4 on halving bounds the error of a method that converges
     assert np.linalg.norm(found - wanted) < 2e-4 * np.linalg.norm(wanted)
-    assert cut.n_steps < 10 * flows.n_steps
+    assert pieces < 10
 
 
 def test_a_law_that_does_not_retract_keeps_its_steps():
-    flows = lay_out([start_up(1.0)], [SAMPLES])
-    assert in_enough_steps(Fluid(make_law("giesekus", {"alpha": 0.3}), 1.0, 1.0), flows) is flows
-
-
-def test_a_state_turned_twice_is_itself_and_once_has_its_trace_first():
-    state = jnp.arange(1.0, 11.0).reshape(2, 5)
-    once = turned(state)
-    np.testing.assert_allclose(once[:, 0], np.sum(state[:, :3], axis=1) / np.sqrt(3.0), rtol=1e-14)
-    np.testing.assert_array_equal(once[:, 3:], state[:, 3:])
-    np.testing.assert_allclose(turned(once), state, rtol=1e-14)
+    assert pieces_in_time(Fluid(make_law("giesekus", {"alpha": 0.3}), 1.0, 1.0), [RUN], 0.2) == 1

@@ -9,8 +9,7 @@ from discover.dataset.records.thinning import thin_run
 from discover.dataset.run import Run
 from discover.errors import InputError
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import solve_batch
+from discover.forward.of_fluids import observed_in
 from discover.laws import Fluid, make_law
 from discover.protocols import (
     after_alternation,
@@ -58,10 +57,10 @@ def test_the_start_of_an_extension_is_that_of_scipy_by_every_path(kind):
     protocol = in_flow(start_up(0.6), kind)
     exact = BY_SCIPY.recorded(kind, lambda _: 0.6, TIMES)
     adaptive = recorded_at(protocol, simulate(fluid(), protocol, TIMES).components)
-    fixed = np.asarray(solve_batch(fluid(), lay_out([protocol], [TIMES])))[0]
+    fixed = observed_in(fluid(), protocol, TIMES)[:, 0]
     # rtol 1e-8 of a mode; the fixed grid is good to 1e-6 in shear and the loop's steps to 1e-5
     np.testing.assert_allclose(adaptive, exact, rtol=1e-6)
-    np.testing.assert_allclose(recorded_at(protocol, fixed), exact, rtol=1e-5)
+    np.testing.assert_allclose(fixed, exact, rtol=1e-5)
     np.testing.assert_allclose(in_the_loop([protocol])[0], exact, rtol=1e-4)
 
 
@@ -103,9 +102,9 @@ def test_what_follows_a_steady_flow_is_that_of_scipy_on_the_grids_of_the_learner
     exact = BY_SCIPY.recorded(
         "shear", lambda t: 2.0 if t < 0.0 else 0.2, TIMES, begins=-40.0, jumps=[0.0]
     )
-    found = np.asarray(solve_batch(fluid(), lay_out([run.protocol], [TIMES])))[0]
+    found = observed_in(fluid(), run.protocol, TIMES)[:, 0]
     # the flow before is followed for 80 s, 27 relaxation times; the grid is good to 1e-5
-    np.testing.assert_allclose(recorded_at(run.protocol, found), exact, rtol=2e-5)
+    np.testing.assert_allclose(found, exact, rtol=2e-5)
 
 
 @pytest.mark.parametrize("sampled", [pytest.param(False, marks=pytest.mark.slow), True])

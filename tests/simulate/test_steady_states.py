@@ -12,8 +12,9 @@ from scipy.optimize import brentq
 from discover.dataset.run import Run
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.forward.flow_batch import lay_out
-from discover.forward.fluids import solve_batch, solve_on_grid
+from discover.forward.fluids import observed_on_grid
 from discover.forward.grid import make_grid
+from discover.forward.of_fluids import bare_run, observed, observed_in
 from discover.laws import Fluid, make_law
 from discover.laws.expansion import law_of_terms
 from discover.laws.textbook.classical import Giesekus
@@ -51,7 +52,7 @@ def test_a_steady_state_follows_the_mobility_as_its_differences_do():
     @jax.jit
     def stress(mobility):
         fluid = Fluid(Giesekus(mobility), MODULUS, TIME)
-        return solve_on_grid(fluid, flow, grid)[0]
+        return observed_on_grid(fluid, flow, grid)[0]
 
     step = 1e-4  # the difference errs by its square
     expected = (stress(MOBILITY + step) - stress(MOBILITY - step)) / (2.0 * step)
@@ -62,7 +63,8 @@ def test_a_steady_state_follows_the_mobility_as_its_differences_do():
 def test_a_batch_holds_what_goes_on_in_time_and_what_is_steady_in_the_order_of_its_runs():
     times = np.linspace(0.0, 40.0, 5)
     flows = [start_up(1.0), steady_rates(RATES), start_up(30.0)]
-    found = solve_batch(giesekus(), lay_out(flows, [times, COUNTED, times]))
+    runs = [bare_run(*pair) for pair in zip(flows, (times, COUNTED, times), strict=True)]
+    (found,) = observed([giesekus()], make_batch(runs))
     # every start-up ends in the steady state of its rate, exp(−40) away
     np.testing.assert_allclose(found[0, 4], found[1, 1], rtol=1e-6)
     np.testing.assert_allclose(found[2, 4], found[1, 2], rtol=1e-6)
@@ -109,7 +111,7 @@ def test_chains_that_end_have_the_steady_state_of_their_start_up_however_fast(na
     else:
         law, wanted = make_law(name, CHAINS), [followed_until_steady(r, CHAINS) for r in FAST]
     flow, times = steady_rates(FAST), np.arange(1.0, 5.0)
-    found = np.asarray(solve_batch(Fluid.dimensionless(law), lay_out([flow], [times])))[0, :, 3]
+    found = observed_in(Fluid.dimensionless(law), flow, times)[:, 0]
     np.testing.assert_allclose(found, wanted, rtol=1e-6)
     constants = {"L2": 50.0} if name == "fene_p" else CHAINS
     model = AugmentedModel(DeclaredModel.named(name, constants, np.ones(1), np.ones(1)), [])
@@ -122,8 +124,8 @@ def test_chains_with_few_arms_are_not_steady_beyond_their_end(ratio):
     """q = 1.5: where a backbone is drawn to q its stress is 3 q² Wi/(3 + 2 Wi²), and no more."""
     rates = np.array([3.0, 10.0, 100.0, 1e4])
     law = make_law("pom_pom", {"q": 1.5, "stretch_time_ratio": ratio})
-    flows = lay_out([steady_rates(rates)], [np.arange(1.0, 5.0)])
-    found = np.asarray(solve_batch(Fluid.dimensionless(law), flows))[0, :, 3]
+    curve = steady_rates(rates)
+    found = observed_in(Fluid.dimensionless(law), curve, np.arange(1.0, 5.0))[:, 0]
     ends = 3.0 * 1.5**2 * rates / (3.0 + 2.0 * rates**2)
     # growth stops at q only if it is faster than retraction there: Wi²/(3 + 2 Wi²) > (1 − 1/q)/θ
     drawn_to_the_end = rates**2 / (3.0 + 2.0 * rates**2) > (1.0 - 1.0 / 1.5) / ratio
@@ -134,8 +136,7 @@ def test_chains_with_few_arms_are_not_steady_beyond_their_end(ratio):
 def test_where_no_steady_state_of_chains_is_reached_none_is_told():
     """At a Weissenberg number of 1e5 the steps end at springs of no strength: that is no answer."""
     fluid = Fluid.dimensionless(make_law("fene_p", {"L2": 50.0}))
-    flows = lay_out([steady_rates([1.0, 1e5])], [np.array([1.0, 2.0])])
-    found = np.asarray(solve_batch(fluid, flows))[0, :, 3]
+    found = observed_in(fluid, steady_rates([1.0, 1e5]), np.array([1.0, 2.0]))[:, 0]
     assert found[0] == pytest.approx(fene_p_shear_stress(50.0, 1.0), rel=1e-6)
     assert np.isnan(found[1]) or found[1] == pytest.approx(fene_p_shear_stress(50.0, 1e5))
 
@@ -151,7 +152,7 @@ TIMES = np.geomspace(1e-3, 60.0, 60)
 def test_the_stress_before_a_step_is_that_of_the_steady_flow(time, epsilon):
     fluid = Fluid(make_law("ptt_linear", {"epsilon": epsilon}), 1.0, time)
     flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
-    found = np.asarray(solve_batch(fluid, lay_out([flow], [TIMES], relaxation_time=time)))[0, :, 3]
+    found = observed_in(fluid, flow, TIMES, relaxation_time=time)[:, 0]
     law = PhanThienTanner(extensibility=epsilon, relaxation_time=time)
     held = 200.0 * time
     exact = law.respond(steps([0.0, held], [BEFORE, AFTER]), held + TIMES).sigma12
@@ -164,7 +165,7 @@ def test_a_law_that_thins_is_followed_through_the_flow_before_whatever_its_time(
     """In steps of a strain of one it ran away where it relaxes in 0.1 s or less."""
     law = make_law("ptt_linear", {"epsilon": 10.0})
     flow = after_steady_flow(start_up(AFTER), BEFORE, end=float(TIMES[-1]))
-    found = np.asarray(solve_batch(Fluid(law, 1.0, time), lay_out([flow], [TIMES])))[0, :, 3]
+    found = observed_in(Fluid(law, 1.0, time), flow, TIMES)[:, 0]
     law = PhanThienTanner(extensibility=10.0, relaxation_time=time)
     held = 200.0 * time
     exact = law.respond(steps([0.0, held], [BEFORE, AFTER]), held + TIMES).sigma12

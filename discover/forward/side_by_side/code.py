@@ -57,6 +57,9 @@ class Layout:
         return jax.tree.unflatten(self._structure, leaves)
 
 
+# From so many products of matrices on code is large; those of a law are some dozens
+_MANY_PRODUCTS = 1000
+
 _MADE: dict[tuple, "Code"] = {}
 _KEPT = 16
 
@@ -129,7 +132,7 @@ class Code:
         self._arithmetic = Arithmetic(self._w.builder)
         self._write = Translation(self._arithmetic)
         self._body()
-        code, calls = self._w.compiled(), self._write.calls
+        code, calls = self._w.compiled(self._write.products > _MANY_PRODUCTS), self._write.calls
         # what was written is large, and the code is made
         for name in set(vars(self)) - known:
             delattr(self, name)
@@ -159,14 +162,14 @@ class Code:
         return layout.tree([self._w.load(name, place) for place in places])
 
     def _record_modes(self, at: Any, factor: Any, first: int, stride: int) -> None:
-        """Write down σ11, σ22, σ33 and σ12 of all modes."""
+        """Write down the sum of all modes: σ11, σ22, σ33, σ12, and structure variables."""
         w, a = self._w, self._arithmetic
-        places = [w.at((at, 4), (i, 1)) for i in range(4)]
+        places = [w.at((at, self._size), (i, 1)) for i in range(self._size)]
         for place in places:
             w.store(a.lanes(0.0), "of_modes", place)
         with w.loop(w.counts["modes"]) as number, a.apart():
             own = a.multiply(factor, self._tree("mode", self._of_mode, number).modulus[()])
-            stress = self._kept(w.at((number, stride), (first, 1)), 4)
+            stress = self._kept(w.at((number, stride), (first, 1)), self._size)
             for value, place in zip(stress, places, strict=True):
                 more = a.multiply(own, value)
                 w.store(a.add(w.load("of_modes", place), more), "of_modes", place)

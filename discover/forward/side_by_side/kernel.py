@@ -73,14 +73,14 @@ class Kernel(Code):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
         """Return stress and felt rate at step ends, the modes', and whether any vector is of use.
 
-        Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12,
-        (runs, ends, 4, lanes), empty unless `normal`. `tabled`: modes whose weights stand in the
-        table. `used`: parts that a vector needs; see `Flags`.
+        Shapes (runs, ends, lanes), NaN where none was computed; of the modes σ11, σ22, σ33, σ12
+        and their structure variables, (runs, ends, s, lanes), empty unless `normal`. `tabled`:
+        modes whose weights stand in the table. `used`: parts that a vector needs; see `Flags`.
         """
         steps, modes = given["width"].shape[1], len(given["mode"])
         stress = np.full((len(given["width"]), steps + 1, LANES), np.nan)
         felt, goes_on = np.zeros_like(stress), np.zeros(2, np.int64)
-        of_modes = np.full((*stress.shape[:2], 4 if normal else 0, LANES), np.nan)
+        of_modes = np.full((*stress.shape[:2], self._size if normal else 0, LANES), np.nan)
         of_modes[:, 0] = 0.0
         flags = used.astype(np.int64)
         flags[-1] = used[self._times_at]

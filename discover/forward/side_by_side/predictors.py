@@ -22,8 +22,8 @@ class Asked(NamedTuple):
 
     `moduli`: of the declared modes in Pa, the solvent's viscosity in Pa s last. `limits`: sums of
     squared residuals from which on a vector is of no use. `part`, `judging`: runs of one control,
-    and what was recorded. `runs`: how many are no padding. `normal`: whether N1 and N2 are asked
-    for.
+    and what was recorded. `runs`: how many are no padding. `whole`: whether behind what is recorded
+    the stress without what distorts a signal is asked for, and the components of the modes.
     """
 
     numbers: Numbers
@@ -33,7 +33,7 @@ class Asked(NamedTuple):
     part: Any
     judging: Records | None
     runs: int
-    normal: bool
+    whole: bool
 
     def taken(self, which: np.ndarray) -> "Asked":
         """Return what is asked of some of the vectors."""

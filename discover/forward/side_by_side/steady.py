@@ -28,7 +28,7 @@ from discover.forward.steady_states import (
 )
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
-from discover.protocols.kinematics import Kinematics, normal_stress_differences
+from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 
 _COUNTS = ("groups", "modes")
@@ -236,14 +236,12 @@ class SteadySideBySide(StatePredictor):
         self._recorded = self._program("steady records", recorded, *axes)
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded, and N1 and N2 if asked for; limits say nothing here."""
+        """Return what is recorded, see `Asked.whole`; limits say nothing here."""
         thetas, part, eights = asked.thetas, asked.part, self._eights(asked)
         rate = self._felt(asked, eights, np.asarray(part.rate))
         found = self._states(thetas, eights, len(asked.numbers.modulus), rate, part)
         stress, felt, of_modes = found[..., 0], found[..., 1], found[..., 2:]
-        beside = []
-        if asked.normal:
-            beside = [normal_stress_differences(part.kinematics, stress, of_modes)]
+        beside = [stress[..., None], of_modes] if asked.whole else []
         if np.any(thetas[:, self._distorting]):
             present = self._fluid.present(thetas)
             stress = np.concatenate(

@@ -16,7 +16,7 @@ from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows
 from discover.forward.side_by_side.step import Mode, Shared, Step, _if
 from discover.programs.lanes import LANES
 from discover.programs.lanes.arithmetic import INTEGER
-from discover.protocols.kinematics import Kinematics, normal_stress_differences
+from discover.protocols.kinematics import Kinematics
 from tensor_library.algebra import contracted
 
 _COUNTS = ("runs", "steps", "modes", "normal")
@@ -125,11 +125,11 @@ class StressCode(Code):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the strain of the fluid, and the stress of the modes if `normal`.
 
-        Shapes (runs, ends, lanes), and (runs, ends, 4, lanes) of σ11, σ22, σ33, σ12.
+        Shapes (runs, ends, lanes), and (runs, ends, s, lanes); see `Kernel.__call__`.
         """
         (runs, steps), modes = given["width"].shape, len(given["mode"])
         strain = np.full((runs, steps + 1, LANES), np.nan)
-        of_modes = np.full((runs, steps + 1, 4 if normal else 0, LANES), np.nan)
+        of_modes = np.full((runs, steps + 1, self._size if normal else 0, LANES), np.nan)
         strain[:, 0], of_modes[:, 0] = 0.0, 0.0
         arrays = given | {
             "flags": used.astype(np.int64), "strain": strain, "of_modes": of_modes,
@@ -251,7 +251,7 @@ class StressSideBySide(LanePredictor):
         self._driven = self._program("driven", driven, (None, 0), (0, None))
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return strains, and N1 and N2 behind them if asked for; limits say nothing here."""
+        """Return strains, see `Asked.whole`; limits say nothing here."""
         return self._by_eights(
             asked.thetas, (), lambda lanes, _, used: self._eight(asked, lanes, used)
         )
@@ -273,11 +273,11 @@ class StressSideBySide(LanePredictor):
             "shared": shared, "mode": modes[present], "last": last,
             "width": np.diff(times), "flow": flows_of(part.kinematics),
         }  # fmt: skip
-        strain, of_modes = self._code(used, given, asked.normal)
+        strain, of_modes = self._code(used, given, asked.whole)
         places = np.arange(len(times))[:, None], sample
         found = np.moveaxis(strain[places], -1, 0) + given_way[:, *places]
-        if not asked.normal:
+        if not asked.whole:
             return found[..., None]
         own = np.moveaxis(of_modes[places], -1, 0)
-        beside = normal_stress_differences(part.kinematics, imposed[:, *places], own)
-        return np.concatenate([found[..., None], beside], axis=-1)
+        beside = imposed[:, *places]
+        return np.concatenate([found[..., None], beside[..., None], own], axis=-1)

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
@@ -21,7 +20,6 @@ from discover.forward.side_by_side.kernel import Kernel
 from discover.forward.side_by_side.predictors import Asked, LanePredictor, flows_of, modes_in_use
 from discover.forward.side_by_side.step import WEIGHTS
 from discover.programs.lanes import LANES
-from discover.protocols.kinematics import normal_stress_differences
 
 # Vectors of the same times from which on weights of the steps are worth a table
 _MANY = 8
@@ -84,6 +82,8 @@ def intervals(part: TransientFlows) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     width = np.diff(times)
     held = np.ones(width.shape, np.int64)
     whole, least = width.copy(), width.copy()
+    if not part.own_widths:
+        return held, whole, least
     behind = np.asarray(part.cycle)[:, 1]
     for row, (own, at) in enumerate(zip(times, sample, strict=True)):
         jumps = np.flatnonzero(width[row] <= jump[row])
@@ -145,7 +145,7 @@ class SideBySide(LanePredictor):
         self._known_table: tuple | None = None
 
     def predict(self, asked: Asked) -> Float[np.ndarray, "trials runs n kinds"]:
-        """Return what is recorded of the runs that are no padding, and N1 and N2 if asked for."""
+        """Return what is recorded of the runs that are no padding; see `Asked.whole`."""
         times, counts = np.unique(asked.thetas[:, 1], return_counts=True)
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
@@ -187,15 +187,14 @@ class SideBySide(LanePredictor):
             "rate": rate, "shared": shared, "mode": modes, "limit": asked.limits,
             "table": tabled, **{name: getattr(laid_out, name) for name in _OF_RUNS},
         }  # fmt: skip
-        stress, felt, of_modes, goes_on = self._code(runs, declared, used, given, asked.normal)
+        stress, felt, of_modes, goes_on = self._code(runs, declared, used, given, asked.whole)
         if not goes_on:
             stress[:] = np.nan
         places = np.arange(runs)[:, None], laid_out.sample[:runs]
         at_samples, beside = stress[places], []
-        if asked.normal:
-            flow = jax.tree.map(lambda leaf: leaf[:runs], part.kinematics)
-            own = (np.moveaxis(of, -1, 0) for of in (at_samples, of_modes[places]))
-            beside = [normal_stress_differences(flow, *own)]
+        if asked.whole:
+            own = (at_samples[:, :, None], of_modes[places])
+            beside = [np.moveaxis(of, -1, 0) for of in own]
         if not (laid_out.in_shear and np.any(thetas[:, self._distorting])):
             return np.concatenate([np.moveaxis(at_samples, -1, 0)[..., None], *beside], axis=-1)
         if np.any(laid_out.held > 1):

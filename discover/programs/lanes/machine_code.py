@@ -32,6 +32,10 @@ _ALIGNED = 8
 # how far LLVM optimises what is written here, and the machine code that it makes of it, 0 to 3
 _LEVELS = 2, 2
 
+# Of code with large products of matrices, as a network's: else it takes four times as long to make,
+# and three quarters of the time to run
+_LEVELS_OF_LARGE = 1, 0
+
 
 class Writing:
     """A function of counts and of arrays while it is being written.
@@ -103,12 +107,13 @@ class Writing:
         builder.branch(head)
         builder.position_at_end(after)
 
-    def compiled(self) -> bytes:
+    def compiled(self, is_large: bool = False) -> bytes:
         """Return the machine code of the function."""
         self.builder.ret_void()
-        module, machine = llvm.parse_assembly(str(self.module)), _machine()
+        of_passes, of_machine = _LEVELS_OF_LARGE if is_large else _LEVELS
+        module, machine = llvm.parse_assembly(str(self.module)), _machine(of_machine)
         module.verify()
-        tuning = llvm.create_pipeline_tuning_options(speed_level=_LEVELS[0])
+        tuning = llvm.create_pipeline_tuning_options(speed_level=of_passes)
         # all is in lanes already, and the loops are long
         tuning.slp_vectorization = tuning.loop_vectorization = tuning.loop_unrolling = False
         passes = llvm.create_pass_builder(machine, tuning)
@@ -121,7 +126,7 @@ def callable_of(code: bytes, counts: int, arrays: int) -> Callable[..., None]:
 
     `code`: from `Writing.compiled`. `counts`, `arrays`: how many of each it takes.
     """
-    machine = _machine()
+    machine = _machine(_LEVELS[1])
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
@@ -147,7 +152,9 @@ def kept(made_from: Any, write: Callable[[], tuple[bytes, bool]]) -> bytes:
     if folder is None:
         return write()[0]
     try:
-        name = fingerprint(("lanes", _LEVELS, *_processor(), made_from), False).hex()
+        name = fingerprint(
+            ("lanes", _LEVELS, _LEVELS_OF_LARGE, *_processor(), made_from), False
+        ).hex()
     except (NotDescribable, TypeError, ValueError) as reason:
         _LOGGER.debug("machine code is made at every start: %s", reason)
         return write()[0]
@@ -160,12 +167,12 @@ def kept(made_from: Any, write: Callable[[], tuple[bytes, bool]]) -> bytes:
     return code
 
 
-def _machine() -> llvm.TargetMachine:
+def _machine(level: int) -> llvm.TargetMachine:
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     cpu, features = _processor()
     target = llvm.Target.from_default_triple()
-    return target.create_target_machine(cpu=cpu, features=features, opt=_LEVELS[1])
+    return target.create_target_machine(cpu=cpu, features=features, opt=level)
 
 
 @cache
