@@ -16,7 +16,7 @@ from discover.compilation_cache import enable_compilation_cache, is_ours_alone
 from discover.dataset import Run
 from discover.effects import make_effect
 from discover.forward import AugmentedModel, DeclaredModel, make_batch
-from discover.identify.physics_flows import steady_shear
+from discover.identify.structure import with_sensitivities
 from discover.laws import Fluid, make_law
 from discover.programs import compiled, forget_programs
 from discover.programs.program_cache import put_together, take_apart
@@ -271,7 +271,7 @@ def _square(x):
 
 
 def test_it_is_pickled_by_its_name_as_a_function_is():
-    assert pickle.loads(pickle.dumps(steady_shear)) is steady_shear
+    assert pickle.loads(pickle.dumps(with_sensitivities)) is with_sensitivities
 
 
 @pytest.mark.slow
