@@ -140,7 +140,7 @@ def readable(term: str) -> str:
 
 
 _EFFECTS = {
-    "giesekus_mobility": "Giesekus mobility",
+    "giesekus_mobility": "Giesekus",
     "non_affine_motion": "non-affine motion",
     "ptt_linear": "linear PTT",
     "ptt_exponential": "exponential PTT",

@@ -97,7 +97,7 @@ class Constant:
     def interval(self) -> str:
         """95 % interval, or a dash, or that it is not determined."""
         if not self.determined:
-            return "not determined"
+            return "not determined alone"
         if (other := self.reciprocal) is not self:
             return other.interval
         if self.bound:
@@ -179,32 +179,55 @@ class Constant:
 
         The interval is over all laws that fit as well, in which it may be far from that value.
         """
-        if not self.has_interval or self.ci95 is None:
+        one = self.reciprocal  # as it is told
+        if not one.has_interval or one.ci95 is None:
             return False
-        low, high = self.ci95
-        return not _NEAR_END < (self.value - low) / (high - low) < 1.0 - _NEAR_END
+        low, high = one.ci95
+        return not _NEAR_END < (one.value - low) / (high - low) < 1.0 - _NEAR_END
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether its interval spans more than a decade."""
+        return (
+            self.has_interval
+            and self.ci95 is not None
+            and 0.0 < _DECADE * self.ci95[0] < self.ci95[1]
+        )
 
     @property
     def bound(self) -> str:
-        """Bound that remains of a value at an end of its physical range; empty of one inside."""
+        """Bound that remains of a value at an end of its physical range; empty of one inside.
+
+        Also of a value at an end of an interval of decades, the other end of which says no more.
+        """
         one = self.reciprocal
-        if not one.end or one.ci95 is None or not one.has_interval:
+        if one.ci95 is None or not (one.at_limit or one.is_wide):
             return ""
         low, high = one.ci95
+        if not one.at_limit:
+            share = math.log(one.value / low) / math.log(high / low)
+            if _NEAR_END < share < 1.0 - _NEAR_END:
+                return ""
         sign, value = ("≥", low) if one.end == "high" else ("≤", high)
         return f"{sign} {one._plain(value)}"
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether its value is at an end of what is physical."""
+        return bool(self.end) and self.has_interval
 
 
 _MINUS = "−"
 _OTHER_END: Mapping[str, Literal["", "low", "high"]] = {"": "", "low": "high", "high": "low"}
+_DECADE = 10.0
 _NEAR_END = 0.1
 """Share of an interval at its ends in which a value is not near its middle."""
 _RECIPROCAL = {"s": "1/s", "1/s": "s", "1/Pa": "Pa", "1": "1"}
 _SYMBOLS = {
     "modulus_Pa": ("G", "modulus"),
     "relaxation_time_s": ("λ", "relaxation time"),
-    "modulus_factor": ("G/G_0", "over the moduli of the sweep; the modes below contain it"),
-    "relaxation_time_factor": ("λ/λ_0", "over the times of the sweep; the modes below contain it"),
+    "modulus_factor": ("G/G_0", "moduli of the sweep times this are those of the modes"),
+    "relaxation_time_factor": ("λ/λ_0", "times of the sweep times this are those of the modes"),
     "eta_s": ("η_s", "Newtonian viscosity"),
     "L2": ("L²", "extensibility"),
     "yield_stress_Pa": ("τ_y", "yield stress"),
@@ -267,7 +290,7 @@ class Suspect:
     @property
     def is_separate(self) -> bool:
         """Whether the runs give it a size of its own."""
-        return self.is_established and not any(one.bound for one in self.constants[:1])
+        return self.is_established and not any(one.at_limit for one in self.constants[:1])
 
 
 @dataclass(frozen=True)
@@ -296,13 +319,13 @@ class ExpectedError:
     `inside`, `beyond`: inside the rates of the data and beyond them; None where unknown.
     `beyond_at`: how fast that is, and whether it was measured there: ``measured at 3 1/s``.
     `missing`: what stands in place of a number that is unknown.
-    `note`: why it is unknown, or on what it rests: ``if Giesekus; untested``.
+    `note`: why it is unknown, or on what it rests: ``not measured; constants alone``.
     """
 
     inside: float | None = None
     beyond: float | None = None
     beyond_at: str = ""
-    missing: Literal["untested", "not determined", "not modelled"] = "untested"
+    missing: Literal["not measured", "not determined"] = "not measured"
     note: str = ""
     is_measured: bool = True  # whether records of this quantity tell it, or only the law does
     is_residual: bool = False  # of fitted runs, which is no error to expect
@@ -325,7 +348,7 @@ class Discrepancy:
     ci95: Span
     by_run: Mapping[str, float] = field(default_factory=dict)  # by name of the run
     grows_with_rate: float | None = None
-    unseen: str = ""  # which runs the law had not seen, such as ``left-out runs``; empty: none
+    unseen: str = ""  # ``unseen runs`` where it is the error of such; empty: of fitted ones
 
 
 @dataclass(frozen=True)
@@ -338,10 +361,11 @@ class Answer:
         them.
     `modes`, `solvent_viscosity_Pa_s`: linear part of the fluid.
     `temperature_C`: of its moduli and times; None where unknown.
-    `shift_factors`: of times, by temperature in °C, where runs were shifted to that temperature.
+    `shift_factors`: a_T, relaxation times over those at `temperature_C`, by temperature of the runs
+        in °C, where these were shifted.
     `error`, `noise`: relative residual of the fitted runs, and relative noise, mean over runs.
-    `discrepancy`: size of what it leaves besides noise; None where unknown.
-    `expected_error`: by quantity of `QUANTITIES`; one that is missing is untested.
+    `discrepancy`: size of what it leaves, noise removed; None where unknown.
+    `expected_error`: by quantity of `QUANTITIES`; one that is missing is not measured.
     `equation`: law written out; None where it cannot be.
     `shown`: law as a page shows it where it cannot be written out, constants that differ from mode
         to mode at their mean.

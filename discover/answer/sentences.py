@@ -1,6 +1,7 @@
-"""Sentences of an answer: at most sixty words on a first screen."""
+"""Sentences of an answer; the first lines have at most sixty words."""
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
@@ -29,17 +30,10 @@ def quality(answer: Any) -> str:
     """Return what follows the law: how well it describes, what else there is, where to use it."""
     behind = answer.alternative if answer.is_empirical else ""
     parts = [description(answer), answer.failed, where(answer), behind]
-    return _level_once(answer, " ".join(filter(None, parts)))
+    return " ".join(filter(None, parts))
 
 
 _LEVEL = f"{LEVEL} "
-"""Level of intervals, which a first screen says once."""
-
-
-def _level_once(answer: Any, text: str) -> str:
-    """Return text that follows the law, without a level of intervals that has been said."""
-    said, first, rest = ("", "", text) if LEVEL in law(answer) else text.partition(f"({LEVEL}")
-    return said + first + rest.replace(f"({LEVEL}, ", "(").replace(f"({_LEVEL}", "(")
 
 
 def law(answer: Any) -> str:
@@ -47,21 +41,22 @@ def law(answer: Any) -> str:
     if not answer.title:
         return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
-    # of a sum without a name the table has the constants
+    # of a sum without a name the table has the constants; there moduli and times come first
     several = len(answer.modes) > 1
     own = [
         one for one in answer.constants
-        if (not several if one.name in _OF_MODES else answer.law is not None)
+        if (not several if one.name in _OF_MODES else not answer.is_empirical)
     ]  # fmt: skip
-    own = sorted(own, key=lambda one: one.name in _OF_MODES)
-    named = constants(own[:_MOST_CONSTANTS])
+    own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
+    certain = [one for one in own if one.determined and not one.is_wide]
+    named = constants(certain[:_MOST_CONSTANTS])
     if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
-    elif answer.modes and not several and not named and not _is_plain(answer):
+    elif answer.modes and not several and not own and not _is_plain(answer):
         (mode,) = answer.modes
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
-    if answer.temperature_C is not None:
+    if answer.temperature_C is not None and not answer.shift_factors:  # else the rates say it
         named.append(f"at {degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
@@ -77,10 +72,21 @@ def constants(several: Sequence[Any]) -> list[str]:
     return [one.with_interval(_LEVEL if one is first else "") for one in several]
 
 
-def shifts(answer: Any) -> list[tuple[str, str]]:
+def shifts(answer: Any) -> list[tuple[float, float]]:
     """Return temperatures of shifted runs with their factors: of many the first and the last."""
-    found = [(degrees(at), significant(one, 3)) for at, one in answer.shift_factors.items()]
+    found = [*answer.shift_factors.items()]
     return found if len(found) <= _MOST_SHIFTS else [found[0], found[-1]]
+
+
+def reduced_to(answer: Any) -> str:
+    """Return the temperature to which times and rates of shifted runs were reduced."""
+    return "one temperature" if answer.temperature_C is None else degrees(answer.temperature_C)
+
+
+def shortened(factor: float) -> str:
+    """Return what a shift factor does to times, in words."""
+    by, way = (1.0 / factor, "shorter") if factor < 1.0 else (factor, "longer")
+    return f"{significant(by, 3)} times {way}"
 
 
 _MOST_SHIFTS = 3
@@ -90,9 +96,11 @@ def shifted(answer: Any) -> str:
     """Return to which temperature times and rates were shifted, and how far; empty if not."""
     if not answer.shift_factors:
         return ""
-    where = "one temperature" if answer.temperature_C is None else degrees(answer.temperature_C)
-    said = [f"{factor} at {place}" for place, factor in shifts(answer)]
-    return f"Times and rates as at {where}: a_T = {', '.join(said)}."
+    said = [
+        f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
+        for at, factor in shifts(answer)
+    ]
+    return f"Times and rates are reduced to {reduced_to(answer)}; times are {', '.join(said)}."
 
 
 def is_a_set(answer: Any) -> bool:
@@ -129,7 +137,7 @@ def description(answer: Any) -> str:
     one = answer.expected("sigma12")
     faster = ""
     if one.beyond is not None and one.beyond_at.startswith(MEASURED_AT):
-        faster = f", faster runs {_at_most(one.beyond)}"
+        faster = f", faster ones {_at_most(one.beyond)}"
     return f"Error: {found.unseen} {size}{faster}{besides}."
 
 
@@ -162,14 +170,18 @@ def where(answer: Any) -> str:
         found += [] if one.frequency_rad_s is None else [f"{span(one.frequency_rad_s)} rad/s"]
     if not found:
         return ""
-    place = ", ".join([flows_of(answer.range.flows), *found])
+    reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
+    place = f"{', '.join([flows_of(answer.range.flows), *found])}{reduced}"
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
     one = answer.expected("uniaxial")
     missed = (one.inside if one.is_measured else None) or 0.0
-    if missed > _USELESS and "uniaxial" not in answer.range.flows:  # else it was fitted
-        place += f", not in {SYMBOLS['uniaxial']}"
-    return f"Use in {place}."
+    known_to_miss = missed > _USELESS and "uniaxial" not in answer.range.flows  # else it was fitted
+    extension = ["extension"] if known_to_miss else []
+    if "shear" in answer.range.flows and not answer.expected("N1").is_known:
+        not_for = " or ".join([SYMBOLS["N1"], *extension])
+        return f"Use for {place.replace('shear', 'the shear stress', 1)}; not for {not_for}."
+    return f"Use in {place}{', not in extension' * known_to_miss}."
 
 
 def _is_plain(answer: Any) -> bool:
@@ -180,7 +192,9 @@ def _is_plain(answer: Any) -> bool:
 def span(ends: tuple[float, float]) -> str:
     """Return a range in numbers of two digits."""
     low, high = map(_short, ends)
-    return low if low == high else f"{low}–{high}"
+    # else the power of the one would be taken for that of both
+    dash = " to " if "×" in high and "×" not in low else "–"
+    return low if low == high else f"{low}{dash}{high}"
 
 
 def _short(value: float) -> str:
@@ -188,49 +202,67 @@ def _short(value: float) -> str:
 
 
 def linear_part(answer: Any) -> str:
-    """Return moduli, times and solvent of a law, as far as they fit on a line."""
-    times = [mode.relaxation_time_s for mode in answer.modes]
-    if len(times) == 1:
-        modulus = f"G = {significant(answer.modes[0].modulus_Pa, 3)} Pa"
-        found = [modulus, f"λ = {significant(times[0], 3)} s"]
-    else:
-        moduli = [mode.modulus_Pa for mode in answer.modes]
-        found = [f"G = {span((min(moduli), max(moduli)))} Pa"] if times else []
-        found += [f"λ = {span((min(times), max(times)))} s"] if times else []
+    """Return moduli, times and solvent of a law: of few modes all, of more from where to where."""
+    found = []
+    modes = in_order(answer)
+    for letter, unit, values in (
+        ("G", "Pa", [mode.modulus_Pa for mode in modes]),
+        ("λ", "s", [mode.relaxation_time_s for mode in modes]),
+    ):
+        if len(values) > FEW_MODES:
+            low, high = (f"{_short(end)} {unit}" for end in (min(values), max(values)))
+            found.append(f"{letter} from {low} to {high}")
+        elif values:
+            told = listed([as_constant(answer, one) for one in values])
+            found.append(f"{letter} = {told} {unit}")
     if answer.solvent_viscosity_Pa_s:
-        found.append(f"η_s = {significant(answer.solvent_viscosity_Pa_s, 3)} Pa s")
+        found.append(f"η_s = {as_constant(answer, answer.solvent_viscosity_Pa_s)} Pa s")
     return ", ".join(found)
+
+
+FEW_MODES = 3
+"""Relaxation modes up to which all are listed."""
+
+
+def in_order(answer: Any) -> list[Any]:
+    """Return the modes from the shortest time to the longest."""
+    return sorted(answer.modes, key=lambda mode: mode.relaxation_time_s)
+
+
+def as_constant(answer: Any, value: float) -> str:
+    """Return a modulus, time or viscosity with the digits that it has among the constants."""
+    own = (one for one in answer.constants if math.isclose(one.value, value, rel_tol=1e-6))
+    one = next(own, None)
+    return significant(value, 3 if one is None else one.digits)
 
 
 def tolerance(answer: Any) -> str:
     """Return whether the tolerance is met, where, and for which quantities."""
     if answer.adequate is None:
         return ""
-    over = len(_over_tolerance(answer))
-    found: dict[str, list[str]] = {}
+    over, every = len(_over_tolerance(answer)), len(_by_run(answer))
+    found: list[str] = []
     for name, symbol in SYMBOLS.items():
         one, within = answer.expected(name), answer.within_tolerance(name)
         if name == "sigma12":
             within = answer.adequate if within is None else within
-            runs = "" if not over else f" {'except ' * bool(within)}in {counted(over, 'run')}"
-            state = (
-                f"{'met' if within else 'not met'}{' by the fitted runs' * one.is_residual}{runs}"
-            )
-        elif within is None:
-            continue
-        elif one.is_measured:
-            state = "met" if within else "not met"
-        else:
-            state = "met if this law holds" if within else "untested"
-        found.setdefault(state, []).append(symbol)
-    said = [f"{listed(symbols)} {state}" for state, symbols in found.items()]
-    return f"Tolerance {percent_of(answer.tolerance)}: {'; '.join(said)}."
+            runs = f"{over} of {counted(every, 'run')}"
+            state = f"misses it in {runs}" if over else "meets it" if within else "misses it"
+            found.append(f"{symbol} {state}{' (fitted runs)' * one.is_residual}")
+        elif within is not None:
+            misses = "meets it" if within else "misses it"
+            found.append(f"{symbol} {misses if one.is_measured else one.missing}")
+    return f"Tolerance {percent_of(answer.tolerance)}: {'; '.join(found)}."
 
 
 def _over_tolerance(answer: Any) -> dict[str, float]:
     """Return runs that are missed by more than the tolerance, with their discrepancy."""
-    by_run = {} if answer.discrepancy is None else answer.discrepancy.by_run
-    return {name: size for name, size in by_run.items() if size > answer.tolerance}
+    return {name: size for name, size in _by_run(answer).items() if size > answer.tolerance}
+
+
+def _by_run(answer: Any) -> Mapping[str, float]:
+    """Return the discrepancy by run; empty where it is unknown."""
+    return {} if answer.discrepancy is None else answer.discrepancy.by_run
 
 
 def worst_run(answer: Any) -> tuple[str, str] | None:
@@ -245,7 +277,7 @@ def worst_run(answer: Any) -> tuple[str, str] | None:
 def error_title(answer: Any) -> str:
     """Return what the errors by quantity are: a residual of fitted runs is not to be expected."""
     of = "Fit residual" if answer.expected("sigma12").is_residual else "Expected error"
-    return f"{of} besides noise"
+    return f"{of}, noise removed"
 
 
 def expected(one: Any, place: str) -> str:
@@ -253,7 +285,7 @@ def expected(one: Any, place: str) -> str:
     value = one.inside if place == "inside" else one.beyond
     if value is not None:
         return _at_most(value) if value else "within noise"
-    return "–" if one.is_known else one.missing
+    return "not measured" if one.is_known else one.missing
 
 
 def _at_most(value: float) -> str:
@@ -289,7 +321,7 @@ def separable(answer: Any) -> bool:
 
 def further(answer: Any) -> list[str]:
     """Return what stands below the table: another law, and the tolerance."""
-    behind = "" if answer.is_empirical else _level_once(answer, answer.alternative)
+    behind = "" if answer.is_empirical else answer.alternative
     return [one for one in (behind, tolerance(answer)) if one]
 
 

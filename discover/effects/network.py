@@ -283,7 +283,7 @@ RELAXATION_MODE = RelaxationMode(
     name="relaxation_mode", complexity=2,
     parameters=(
         EffectParameter(
-            "G", "G_+", "Pa", meaning="modulus of the added mode, the last below", low=0.0,
+            "G", "G_+", "Pa", meaning="modulus of the added mode", low=0.0,
             high=1e10, scale="stress", first_trial=0.05,
             range_source="Ferry 1980, ch. 2: glasses have 1e9 Pa, and nothing that flows has more",
         ),

@@ -10,7 +10,6 @@ import numpy as np
 from discover.answer import (
     Answer,
     Constant,
-    ExpectedError,
     Mode,
     Suspect,
 )
@@ -97,7 +96,7 @@ def loop_answer(result: Any) -> Answer:
         result.verdict in EXPLAINED,
         with_unseen(result),
         range_of(result.records, equation),
-        errors_by_quantity(result, title.partition(" with ")[0] if law else ""),
+        errors_by_quantity(result),
         following,
         tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
@@ -116,14 +115,18 @@ def loop_answer(result: Any) -> Answer:
 
 
 def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
-    """Return the factors on the times of shifted runs by temperature in °C, the hottest first."""
+    """Return a_T of shifted runs by their temperature in °C, the hottest first.
+
+    Relaxation times there over those at the temperature to which runs were shifted: times of the
+    instrument over those of the law.
+    """
     found = {}
     for record in records:
         told = (record.conditions.get(key) for key in TEMPERATURE)
         at = next((one for one in told if one is not None), None)
         end = len(record.time) - 1
         if at is not None and record.time[end] != record.instrument_time[end]:
-            found[float(round(at))] = float(record.time[end] / record.instrument_time[end])
+            found[float(round(at))] = float(record.instrument_time[end] / record.time[end])
     return dict(sorted(found.items(), reverse=True))
 
 
@@ -162,7 +165,6 @@ def rest_of_h(equations: Sequence[str]) -> str:
 def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answer:
     """Return the answer for a yield stress, a viscous fluid or a solid."""
     found = range_of(result.records)
-    inelastic = ExpectedError(missing="not modelled")
     to_noise = result.error_after.fit <= _TO_NOISE * result.noise_floor
     left = of_fitted(result.records, result.error_after.fit, result.noise_floor)
     answer = Answer(
@@ -174,7 +176,7 @@ def _of_material(result: Any, material: SimpleMaterial, following: str) -> Answe
         fits_to_the_noise=to_noise,
         discrepancy=None if to_noise else left,
         range=found,
-        expected_error={"sigma12": of_stress(result), "N1": inelastic, "N2": inelastic},
+        expected_error={"sigma12": of_stress(result)},
         next_test=following,
         failed=_failed(result),
         tolerance=result.tolerance,
@@ -209,7 +211,19 @@ def _alternative(result: Any) -> str:
     near = result.nearest_law
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
-    return f"Best classical law: {', '.join(said)}, error {percent_of(near.size)}."
+    maximum = " (flow curve with a maximum)" if _has_maximum(near) else ""
+    return f"Best classical law: {', '.join(said)}{maximum}, error {percent_of(near.size)}."
+
+
+_MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}
+"""Constant above which the shear stress of a mode falls with the rate   [Giesekus 1982, J.
+Non-Newtonian Fluid Mech. 11, 69; Johnson & Segalman 1977, J. Non-Newtonian Fluid Mech. 2, 255]."""
+
+
+def _has_maximum(near: Any) -> bool:
+    """Return whether the flow curve of each mode of a classical law has a maximum."""
+    name, least = _MAXIMUM.get(near.law, ("", 0.0))
+    return name in near.constants and near.constants[name].value > least
 
 
 def _law(result: Any, equation: Equation | None) -> tuple[str | None, str, tuple[Constant, ...]]:
@@ -319,7 +333,7 @@ def _of_mean_mode(one: Any, meaning: str) -> str:
     """Return what a constant is; of one that differs from mode to mode, of which it is shown."""
     if not isinstance(one, ConstantByMode) or not one.degree:
         return meaning
-    place = f"at λ = {significant(one.mean_time_s, 2)} s"
+    place = f"at λ = {significant(one.mean_time_s, 2)} s; all under “Constants by mode”"
     return f"{meaning}, {place}" if meaning else place
 
 

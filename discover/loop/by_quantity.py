@@ -24,8 +24,7 @@ _WORTH_SAYING = 0.05
 FASTER = 1.01
 """Rate over the fastest fitted one, from which on a run lies beyond the range."""
 
-_UNSEEN, _HELD, _FITTED = "unseen runs", "held-out runs", "fitted runs"
-_LEFT_OUT = "left-out runs"
+_UNSEEN, _FITTED = "unseen runs", "fitted runs"
 
 _TWICE = f"predicted at {BEYOND:g}× the rate"
 
@@ -61,16 +60,19 @@ def with_unseen(result: Any) -> Discrepancy | None:
         size=size,
         ci95=(float(ends[0]) * size, float(ends[1]) * size),
         by_run={**found.by_run, **left, **held},
-        unseen=_which(result),
+        unseen=_UNSEEN,
     )
 
 
-def _which(result: Any) -> str:
-    """Return which runs of the range no fit saw; empty where there are none."""
-    left_out = result.folds or result.left_out_error is not None
-    if left_out and (result.folds or not _held_inside(result)):
-        return _LEFT_OUT
-    return _UNSEEN if left_out else _HELD if _held_inside(result) else ""
+def _which(result: Any, errors: Sequence[float]) -> str:
+    """Return that errors are of unseen runs; the two means where some were held out, not all."""
+    held = [] if result.folds else [_missed(record, result) for record in _held_inside(result)]
+    turns = errors[: len(errors) - len(held)]
+    if not held or not turns:
+        return _UNSEEN if errors else ""
+    kinds = ("left out in turn", _mean(turns)), ("held out", _mean(held))
+    said = [f"{kind} {percent_of(one)}" for kind, one in kinds if one is not None]
+    return f"{_UNSEEN}: {', '.join(said)}"
 
 
 def unseen_errors(result: Any) -> list[float]:
@@ -105,11 +107,8 @@ def _missed(record: RunRecord, result: Any) -> float:
     return beyond_noise(float(record.errors[-1]), result.noise_floor)
 
 
-def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
-    """Return expected errors: of what was measured, else by how far equally good laws differ.
-
-    `name`: law on which they rest; empty of one without a name.
-    """
+def errors_by_quantity(result: Any) -> dict[str, ExpectedError]:
+    """Return expected errors: of what was measured, else by how far equally good laws differ."""
     found = {"sigma12": of_stress(result)}
     settled = normal_stress_settled(result)
     for kind in ("N1", "N2", "uniaxial"):
@@ -122,12 +121,12 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
         if kind == "N1" and settled:
             beyond = result.spread_of_laws[kind].beyond
             beyond = None if beyond is None else max(beyond, apart)
-            note = f"{_given(name)}; untested"
+            note = "not measured; constants alone"
             found[kind] = ExpectedError(apart, beyond, _TWICE, note=note, is_measured=False)
-        elif kind == "N1":
+        elif kind == "N1" and differ:
             found[kind] = ExpectedError(missing="not determined", note=differ)
         elif kind == "N2":
-            found[kind] = _second_difference(result, settled, differ, name)
+            found[kind] = _second_difference(result, differ)
         elif apart is not None and apart >= _APART:
             found[kind] = ExpectedError(missing="not determined", note=differ)
         else:
@@ -135,22 +134,16 @@ def errors_by_quantity(result: Any, name: str) -> dict[str, ExpectedError]:
     return found
 
 
-def _second_difference(result: Any, settled: bool, differ: str, name: str) -> ExpectedError:
+def _second_difference(result: Any, differ: str) -> ExpectedError:
     """Return what is said of N2 where nothing measured it: that of the law, unless laws differ."""
     apart, spread = differing(result, "N2"), result.spread_of_laws.get("N2")
     if apart and apart > _WORTH_SAYING:
         return ExpectedError(missing="not determined", note=f"{differ} of N1")
     ratio = None if spread is None else spread.over_n1
     if ratio is None:
-        return ExpectedError(missing="not determined", note="not measured")
+        return ExpectedError()
     share = "0" if abs(ratio) < _NOTHING else f"{percent_of(ratio)} of N1".replace("-", "−")
-    missing = "untested" if settled else "not determined"
-    return ExpectedError(missing=missing, note=f"{share} {_given(name)}")
-
-
-def _given(name: str) -> str:
-    """Return the condition on which a prediction rests, that the law is the right one."""
-    return f"if {name}" if name else "by this law"
+    return ExpectedError(note=f"{share} by this law")
 
 
 _NOTHING = 1e-3
@@ -193,7 +186,7 @@ def of_stress(result: Any) -> ExpectedError:
     if inside is None and result.material is not None:
         inside = beyond_noise(result.error_after.fit, result.noise_floor)
         return ExpectedError(inside, beyond, at, note=_FITTED, is_residual=True)
-    return ExpectedError(inside, beyond, at, note=_which(result))
+    return ExpectedError(inside, beyond, at, note=_which(result, errors))
 
 
 def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> ExpectedError | None:
@@ -211,7 +204,7 @@ def measured(records: Sequence[RunRecord], kind: str, noise: float | None) -> Ex
     inside, beyond = (
         _mean([beyond_noise(float(r.errors[-1]), noise) for r in some]) for some in (slow, fast)
     )
-    note = _HELD if held else _FITTED
+    note = _UNSEEN if held else _FITTED
     return ExpectedError(inside, beyond, _measured_at(fast), note=note, is_residual=not held)
 
 

@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import permutation_test, rankdata
 
 from discover.loop.run_record import RunRecord
+from discover.statistics.noise.noise_model import rms
 from discover.words import p_value, percent_of
 
 HARMONICS = 5
@@ -300,6 +301,8 @@ def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]
         return ()
     found = []
     for name, values in coordinates(records).items():
+        if name == "stress" and _predicts_nothing(records, model):
+            continue
         every = np.concatenate(values)
         if np.ptp(every) == 0.0:
             continue
@@ -321,6 +324,17 @@ def _collapses(records: Sequence[RunRecord], model: int) -> tuple[Collapse, ...]
             left += float(np.mean((row - predicted[place]) ** 2))
         found.append(Collapse(name, max(0.0, 1.0 - left / total)))
     return tuple(sorted(found, key=lambda c: -c.share))
+
+
+def _predicts_nothing(records: Sequence[RunRecord], model: int) -> bool:
+    """Return whether predictions are about zero: a residual is the stress, sign reversed."""
+    return all(
+        rms(record.predicted[model]) < _ABOUT_ZERO * rms(record.measured) for record in records
+    )
+
+
+_ABOUT_ZERO = 0.1
+"""Prediction over measurement, root mean square, below which there is none to speak of."""
 
 
 def _edges(values: np.ndarray) -> Float[np.ndarray, " bins"]:

@@ -18,18 +18,24 @@ from markupsafe import Markup, escape
 from discover._version import __version__
 from discover.answer import Answer, Constant, ExpectedError, Suspect
 from discover.answer.sentences import (
+    FEW_MODES,
     NOT_SEPARABLE,
     SUSPECTED,
     SYMBOLS,
+    as_constant,
+    degrees,
     error_title,
     expected,
     further,
+    in_order,
     is_a_set,
     law,
     linear_part,
     quality,
+    reduced_to,
     separable,
     shifts,
+    shortened,
     worst_run,
 )
 from discover.effects import StateEffect
@@ -121,6 +127,7 @@ def _environment() -> Environment:
         file_name=_file_name,
         safe_svg=Markup,
         as_link=_as_link,
+        in_units=in_units,
     )
     return environment
 
@@ -181,7 +188,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "errors": error_title(answer).lower(),
         "open": not answer.title or answer.adequate is False,
         "law": "", "constants": (), "suspects": (), "suspected": SUSPECTED.lower(),
-        "expected": (), "modes": (), "linear": "", "solvent": 0.0, "set": False,
+        "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
         "lines": list(map(_unbroken, further(answer))),
@@ -189,9 +196,10 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     }  # fmt: skip
     if not answer.title:
         return found
+    solvent = answer.solvent_viscosity_Pa_s
     rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     symbols = [one.symbol for one in answer.constants]
-    if (shown := answer.equation or answer.shown) is not None and not _is_plain(shown):
+    if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
         for i, one in enumerate(answer.constants):
             if one.is_term:
@@ -203,17 +211,26 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
             (symbol, _unbroken(_said(one)), _in_cell(one.number), _in_cell(one.interval))
             for symbol, one in zip(symbols, answer.constants, strict=True)
         ]
-        + [("a_T", f"shift of times at {at}", factor, "–") for at, factor in shifts(answer)],
+        + [
+            (
+                "a_T",
+                f"at {degrees(at)}: times {shortened(one)} than at {reduced_to(answer)}",
+                significant(one, 3),
+                "",
+            )
+            for at, one in shifts(answer)
+        ],
         "set": is_a_set(answer),
         "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
         "suspected": SUSPECTED.lower() + _clock(answer),
         "expected": _expected(rows) + _worst(answer),
         "modes": [
-            (significant(mode.modulus_Pa, 3), significant(mode.relaxation_time_s, 3))
-            for mode in answer.modes
+            tuple(as_constant(answer, one) for one in (mode.modulus_Pa, mode.relaxation_time_s))
+            for mode in in_order(answer)
         ],
         "linear": _unbroken(linear_part(answer)),
-        "solvent": answer.solvent_viscosity_Pa_s,
+        "few": FEW_MODES,
+        "solvent": _in_cell(f"{as_constant(answer, solvent)} Pa s") if solvent else "",
         "copies": (copies := _copies(answer)),
         "missing": _not_there(copies),
     }
@@ -227,7 +244,7 @@ def _clock(answer: Answer) -> str:
 
 def _said(one: Constant) -> str:
     """Return what a constant is, and that its value is at an end of what is physical."""
-    return "; ".join(filter(None, [one.said, "at its physical limit" if one.bound else ""]))
+    return "; ".join(filter(None, [one.said, "at its physical limit" if one.at_limit else ""]))
 
 
 def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]:
@@ -255,7 +272,7 @@ def _worst(answer: Answer) -> list[dict[str, Any]]:
     if worst is None:
         return []
     note, error = worst
-    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "–", "beyond_at": "",
+    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "", "beyond_at": "",
              "known": True, "note": note}]  # fmt: skip
 
 
@@ -263,7 +280,7 @@ def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:
     """Return the row of an effect of the instrument, its amplitude if it has one of its own."""
     title = effect_title(one.effect)
     if one.amplitude is None or not separable:
-        return title, "", "–" if separable else NOT_SEPARABLE, "–"
+        return title, "", "" if separable else NOT_SEPARABLE, ""
     note = one.amplitude.meaning if one.amplitude.unit == "%" else ""
     note = note if one.is_established else "; ".join(filter(None, [note, "may be zero"]))
     return title, note, _in_cell(one.amplitude.number), _in_cell(one.amplitude.interval)
@@ -278,7 +295,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
     names = listed([one["name"] for one in grey])
     if any(one["name"] in reason for one in grey):
         return f"{reason}."
-    return f"Not {names}: {reason[:1].lower()}{reason[1:]}."
+    return f"Cannot be exported to {names}: {reason[:1].lower()}{reason[1:]}."
 
 
 _TOGETHER = re.compile(
@@ -289,12 +306,13 @@ _TOGETHER = re.compile(
 
 def _unbroken(text: str) -> str:
     """Return text whose numbers keep to one line with their units and symbols."""
-    return _TOGETHER.sub("\N{NO-BREAK SPACE}", text).replace("–", "–\N{WORD JOINER}")
+    whole = _TOGETHER.sub("\N{NO-BREAK SPACE}", in_units(text))
+    return whole.replace("–", "–\N{WORD JOINER}")
 
 
-def _is_plain(equation: Equation) -> bool:
-    """Return whether a law is dimensionless: one mode of 1 Pa and 1 s."""
-    return (equation.modulus, equation.relaxation_time) == ((1.0,), (1.0,))
+def in_units(text: str) -> str:
+    """Return text whose reciprocal units cannot be read as a number: 3 s⁻¹ for 3 1/s."""
+    return re.sub(r" 1/(s|Pa)\b", "\N{NARROW NO-BREAK SPACE}\\1⁻¹", text)
 
 
 _LOWERED = re.compile(r"(?<!\w)([^\W\d_]\u0307?)_([^\W_]|\+)(?!\w)")
@@ -375,7 +393,7 @@ def _formulas(lines: Sequence[str]) -> str:
 
 def _law(equation: Equation, rest: bool = False) -> str:
     """Return the law typeset, in Pa and s where its modes have units; empty where it has none."""
-    modes = 0 if _is_plain(equation) else len(equation.modulus)
+    modes = len(equation.modulus)
     solvent = equation.solvent_viscosity > 0.0
     try:
         law = law_element(
@@ -403,7 +421,7 @@ def _copies(answer: Answer) -> list[Mapping[str, str]]:
     """Return the law in every format that a button copies, or why it is not there."""
     found = []
     for name, form in _COPIED.items():
-        text, reason = answer.written.get(form, ""), "This law cannot be written in this format."
+        text, reason = answer.written.get(form, ""), "It cannot be written out."
         if (equation := answer.equation or answer.classical) is not None:
             try:
                 text = FORMATS[form](equation)

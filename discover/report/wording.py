@@ -157,7 +157,7 @@ _WHAT = {
 
 def free_form_sentence(found: FreeForm) -> str:
     """Return what a free function is and where it stands, without a full stop."""
-    effects = " and ".join(map(effect_title, found.beside)) or "the law as declared"
+    effects = " and ".join(map(effect_title, found.beside)) or "your model"
     shape = f", near to a {found.nearest} form" if found.nearest else ", near to no closed form"
     what = _WHAT[found.slot].format(variable=found.variable)
     return f"{what}{shape}, with {effects} explains the residual"

@@ -233,7 +233,7 @@ def test_two_states_at_once_multiply():
 
 def test_rheotool_and_a_simulation_of_one_mode_are_refused_in_words():
     equation = equation_of("thixotropy", CASES["thixotropy"][0])
-    with pytest.raises(InputError, match="the whole fluid a state: rheoTool has no such state"):
+    with pytest.raises(InputError, match="exported to rheoTool: it has a structure variable"):
         write_equation(equation, "rheotool")
     with pytest.raises(InputError, match="no law of one mode carries"):
         equation.fluid()

@@ -159,9 +159,10 @@ MOST_RANKED = 12
 
 def waterfall_picture(result: LoopResult) -> Picture:
     """Return the errors after each stage."""
-    labels = ["as declared", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
+    labels = ["your model", *(f"+ {effect_title(stage.effect)}" for stage in result.stages)]
     pairs = [result.error_before, *(stage.error for stage in result.stages)]
-    with figure(1, 1, width=8.0, height=2.8) as (drawing, axes):
+    # from top to bottom and no wider than a phone shows with legible letters
+    with figure(1, 1, width=5.2, height=1.1 + 0.42 * len(labels)) as (drawing, axes):
         panel = axes[0, 0]
         positions = np.arange(len(labels))
         held_out = [p.held_out for p in pairs if p.held_out is not None]
@@ -171,18 +172,16 @@ def waterfall_picture(result: LoopResult) -> Picture:
             series.append(("held-out runs", HELD_COLOUR, held_out, 0.19))
         for label, colour, values, shift in series:
             heights = 100.0 * np.array(values, dtype=float)
-            bars = panel.bar(positions + shift, heights, 0.36, color=colour, label=label)
+            bars = panel.barh(positions + shift, heights, 0.36, color=colour, label=label)
             panel.bar_label(bars, [percent(h / 100.0) for h in heights], fontsize=8, padding=2)
             _draw_ranges(panel, result, held_out=label != "fitted runs", shift=shift)
-        panel.axhline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
-        make_percentage(panel.yaxis)
+        panel.axvline(100.0 * result.noise_floor, color=GREEN, lw=1.2, ls="--", label="noise")
+        make_percentage(panel.xaxis)
         heights = [100.0 * value for _, _, values, _ in series for value in values]
-        panel.set_ylim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
-        panel.set_xticks(positions, labels)
-        panel.set_xlim(-0.6, max(len(labels), 2) - 0.4)  # a bar alone would fill the picture
-        if len(labels) > 4:  # long names side by side would run into one another
-            panel.tick_params(axis="x", labelsize=8, labelrotation=15)
-        panel.set_ylabel("relative error (%)")
+        panel.set_xlim(0.4 * min(*heights, 100.0 * result.noise_floor or 1.0), 2.0 * max(heights))
+        panel.set_yticks(positions, labels)
+        panel.set_ylim(max(len(labels), 2) - 0.4, -0.6)  # a bar alone would fill the picture
+        panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
         return picture(
             drawing,
@@ -212,8 +211,8 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     if len(errors) < 2:
         return
     table = 100.0 * np.stack(errors)
-    places = np.arange(table.shape[1]) + shift - 0.16  # next to the label of the bar
-    panel.vlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
+    places = np.arange(table.shape[1]) + shift - 0.14  # next to the label of the bar
+    panel.hlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
 def ranking_picture(result: LoopResult) -> Picture | None:
@@ -265,5 +264,5 @@ def run_error_picture(result: LoopResult) -> Picture:
         make_percentage(panel.xaxis)
         panel.set_xlabel("relative error (%)")
         legend_above(drawing, axes)
-        told = "without and with effects" if added else "of the law as declared"
+        told = "without and with effects" if added else "of your model"
         return picture(drawing, "run_errors", f"Error of each run, {told}.")

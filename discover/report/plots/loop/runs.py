@@ -176,7 +176,7 @@ def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
     return [(0, AS_DECLARED), *augmented]
 
 
-AS_DECLARED, WITH_EFFECTS = "law as declared", "law with effects"
+AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
 """The two models of a closed loop, as pictures name them."""
 
 
@@ -345,7 +345,7 @@ def rivals_picture(result: LoopResult) -> Picture | None:
                     label="held out" if record.held_out else "fitted",
                 )  # fmt: skip
                 limit = max(limit, float(np.percentile(np.abs(relative), 98)))
-            names = "\n+ ".join(map(effect_title, one.effects)) or "the law as declared"
+            names = "\n+ ".join(map(effect_title, one.effects)) or "your model"
             found = ", found by the search" if one is chosen else ""
             panel.set_title(f"{names}\n({percent(one.probability)}{found})", fontsize=8)
             panel.axhline(0.0, color=INK, lw=0.6)
