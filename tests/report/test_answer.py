@@ -446,7 +446,7 @@ def test_a_best_classical_law_whose_flow_curve_has_a_maximum_says_so(alpha, told
     stress = wi * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
     assert bool(np.any(np.diff(stress) < 0.0)) is told
     near = NearestLaw(
-        "giesekus", {"alpha": StageParameter(alpha, (0.0, 1.0), "1")}, 0.18, (0.1, 0.2)
+        "giesekus", {"alpha": StageParameter(alpha, (0.0, 1.0), "1")}, 0.18, Equation(())
     )
     said = replace(loop_result(), verdict="unexplained", nearest_law=near).answer.alternative
     assert ("(flow curve with a maximum)" in said) is told
