@@ -139,3 +139,17 @@ def test_a_perfect_prediction_has_no_reading():
     reading = read_residual([start_up(rate, lambda t, g, rng: 0.0 * t) for rate in RATES])
     assert reading.collapses == ()
     assert reading.sentences == []
+
+
+@pytest.mark.parametrize(("predicted", "read"), [(0.0, False), (0.5, True)])
+def test_where_nothing_is_predicted_a_residual_is_not_read_along_the_stress_that_it_is(
+    predicted, read
+):
+    # half of the stress is a wrong gain, which is read
+    lot, time = np.random.default_rng(0), np.linspace(0.0, 1.0, 200)
+    runs = []
+    for k in range(3):
+        measured = lot.standard_normal(200)
+        left = (predicted - 1.0) * measured
+        runs.append(record(f"{k}", time, time, np.ones(200), measured, left))
+    assert ("stress" in [one.coordinate for one in read_residual(runs).collapses]) is read

@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from test_loop_report import loop_result
 
@@ -17,6 +18,8 @@ from discover.equations.spelling.markup import law_element
 from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.answering import rest_of_h
+from discover.loop.constants import StageParameter
+from discover.loop.parts import NearestLaw
 from discover.report.loop.report import write_loop
 from discover.report.mathtext import formula
 from discover.report.page import answer_screen, render
@@ -266,7 +269,7 @@ def test_a_tolerance_is_neither_met_nor_missed_by_what_nothing_measured():
 
 def test_constants_far_from_the_middle_of_their_intervals_are_a_set():
     skewed, even = Constant("epsilon", 0.80, (0.17, 0.82)), Constant("alpha", 0.2, (0.1, 0.3))
-    note = "best&nbsp;fit: use these values together"
+    note = "best&nbsp;fit: use these<br>values together"
     pair = replace(MELT, constants=(skewed, even))
     assert note in render("answer.html", screen=answer_screen(pair))
     assert note not in render("answer.html", screen=answer_screen(replace(pair, constants=(even,))))
@@ -414,7 +417,7 @@ def test_the_reciprocal_of_a_rate_is_told_as_the_rate():
     assert slow.number.endswith(" 1/s")
     assert float(slow.number.split()[0]) == pytest.approx(0.02)
     assert slow.interval == "0.010–0.040"
-    small = replace(slow, name="time", letter=r"\lambda", value=3.0, ci95=(0.006, 3.7))
+    small = replace(slow, name="time", letter=r"\lambda", value=0.5, ci95=(0.006, 3.7))
     assert small.interval == "0.006–3.7"  # no zero for what cannot be zero
     ordinary = replace(slow, letter=r"\lambda")
     assert ordinary.number.endswith(" s")
@@ -429,6 +432,24 @@ def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_
     assert fit.headline.endswith(law)  # where to use it is said of the fit
     assert fit.lines.count(law) == 0
     assert law in named.lines
+
+
+@pytest.mark.parametrize(("alpha", "told"), [(0.49, False), (0.51, True)])
+def test_a_best_classical_law_whose_flow_curve_has_a_maximum_says_so(alpha, told):
+    # σ12 of a Giesekus mode in steady shear, in closed form [Giesekus 1982], rises with the rate
+    # as long as α ≤ 1/2
+    wi = np.geomspace(0.1, 1e4, 400)
+    chi2 = (np.sqrt(1.0 + 16.0 * alpha * (1.0 - alpha) * wi**2) - 1.0) / (
+        8.0 * alpha * (1.0 - alpha) * wi**2
+    )
+    f = (1.0 - np.sqrt(chi2)) / (1.0 + (1.0 - 2.0 * alpha) * np.sqrt(chi2))
+    stress = wi * (1.0 - f) ** 2 / (1.0 + (1.0 - 2.0 * alpha) * f)
+    assert bool(np.any(np.diff(stress) < 0.0)) is told
+    near = NearestLaw(
+        "giesekus", {"alpha": StageParameter(alpha, (0.0, 1.0), "1")}, 0.18, Equation(())
+    )
+    said = replace(loop_result(), verdict="unexplained", nearest_law=near).answer.alternative
+    assert ("(flow curve with a maximum)" in said) is told
 
 
 def test_a_maxwell_fluid_with_a_structure_is_called_thixotropic():

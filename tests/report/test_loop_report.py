@@ -312,10 +312,10 @@ def test_a_mean_of_held_out_runs_says_which_are_in_it_alone():
 def test_effects_are_named_only_where_some_were_added():
     with_stage, without = loop_result(), without_stages()
     for draw in (runs_picture, residual_picture, loop_residual_map, run_error_picture):
-        assert "law with effects" in draw(with_stage).svg
+        assert "with effects" in draw(with_stage).svg
         drawn = draw(without).svg
-        assert "law with effects" not in drawn
-        assert "declared" in drawn
+        assert "with effects" not in drawn
+        assert "your model" in drawn
         assert "→" not in drawn
 
 

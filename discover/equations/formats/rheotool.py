@@ -146,9 +146,9 @@ def rheotool_text(
     """
     if equation.states:
         raise InputError(
-            "Cannot be exported to rheoTool: it has a structure variable "
-            f"({', '.join(part.effect for part in equation.states)}). Write --format python or "
-            "ufl, which have its equation."
+            f"{', '.join(part.effect for part in equation.states)}: cannot be exported to "
+            "rheoTool: it has a structure variable. Write --format python or ufl, which have its "
+            "equation."
         )
     models = [rheotool_model(equation.mode(k), tolerance) for k in range(len(equation.modulus))]
     notes = dict.fromkeys(note for model in models for note in model.notes)

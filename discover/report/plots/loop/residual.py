@@ -211,7 +211,7 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     if len(errors) < 2:
         return
     table = 100.0 * np.stack(errors)
-    places = np.arange(table.shape[1]) + shift - 0.14  # next to the label of the bar
+    places = np.arange(table.shape[1]) + shift - 0.19  # next to the label of the bar
     panel.hlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
 
 
