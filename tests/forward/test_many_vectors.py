@@ -60,14 +60,16 @@ def test_effects_of_every_kind_follow_their_equations(asked):
     found = model.predictions(vectors, batch)
     largest = np.max(np.abs(found), axis=2, keepdims=True)
     assert np.all(np.isfinite(found))
-    shaped = [model.positions(name)[0] for name in ("rate_rise_time", "transducer_lag")]
+    shaped = [
+        model.positions(name)[0] for name in ("rate_rise_time", "transducer_lag", "viscous_heating")
+    ]
     for row, run in enumerate(runs()[1:], start=1):
         any_of_them = ContinuousFluid(model, vectors[0], run.protocol.kinematics)
         for number in range(1, len(vectors), 2):  # those with one effect
             fluid = any_of_them.of(vectors[number])
             own = found[number, row, : len(run)] / largest[number, row]
-            # the error of the steps: what gives way, and what the instrument shapes, is of second
-            # order in them, the modes of fourth
+            # the error of the steps: what gives way, what the instrument shapes, and heat, which is
+            # the work of each step, are of first or second order in them, the modes of fourth
             slow = fluid.slip or fluid.compliance or np.any(vectors[number][shaped])
             exact = fluid.recorded(run) / largest[number, row]
             np.testing.assert_allclose(own, exact, atol=4e-3 if slow else 2e-5)

@@ -61,7 +61,11 @@ def test_all_effects_together_at_zero_amplitude_leave_maxwell():
     np.testing.assert_allclose(oscillation, exact, atol=1e-4 * MODULUS)
 
 
-@pytest.mark.parametrize("name", sorted(named_effects()))
+# an error of the normal force leaves a shear stress as it is (tests/inference/test_transducers.py)
+OF_SHEAR = sorted(n for n, one in named_effects().items() if not getattr(one, "of_force", False))
+
+
+@pytest.mark.parametrize("name", OF_SHEAR)
 def test_every_effect_changes_the_record_and_composes_with_another(name):
     size = 10 * MODEL.first_trial[MODEL.positions(name)[0]]
     size = min(size, 0.5 * MODEL.high[MODEL.positions(name)[0]])
