@@ -167,21 +167,27 @@ def where(answer: Any) -> str:
         found += [] if one.deborah is None else [f"De = {numeral} = {span(one.deborah)}"]
     else:
         found += [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
-        found += [] if one.frequency_rad_s is None else [f"{span(one.frequency_rad_s)} rad/s"]
+        if (frequencies := one.frequency_rad_s) is not None:
+            alone = "oscillating at " * (frequencies[0] == frequencies[1])
+            found.append(f"{alone}{span(frequencies)} rad/s")
     if not found:
         return ""
     reduced = f" reduced to {reduced_to(answer)}" if answer.shift_factors else ""
     place = f"{', '.join([flows_of(answer.range.flows), *found])}{reduced}"
     if answer.adequate is False and answer.size > _USELESS:
         return f"Do not use to predict; fitted in {place}."
-    one = answer.expected("uniaxial")
-    missed = (one.inside if one.is_measured else None) or 0.0
-    known_to_miss = missed > _USELESS and "uniaxial" not in answer.range.flows  # else it was fitted
-    extension = ["extension"] if known_to_miss else []
-    if "shear" in answer.range.flows and not answer.expected("N1").is_known:
-        not_for = " or ".join([SYMBOLS["N1"], *extension])
+    sheared_alone = "shear" in answer.range.flows and "uniaxial" not in answer.range.flows
+    uniaxial, normal = answer.expected("uniaxial"), answer.expected("N1")
+    missed = uniaxial.is_measured and (uniaxial.inside or 0.0) > _USELESS
+    extension = sheared_alone and (missed or uniaxial.missing == "not determined")
+    # what the law alone says of N1 is to be as good as what is asked of the shear stress
+    unknown = not normal.is_known or (
+        not normal.is_measured and (normal.inside or 0.0) > answer.tolerance
+    )
+    if "shear" in answer.range.flows and unknown:
+        not_for = " or ".join([SYMBOLS["N1"], *["extension"] * extension])
         return f"Use for {place.replace('shear', 'the shear stress', 1)}; not for {not_for}."
-    return f"Use in {place}{', not in extension' * known_to_miss}."
+    return f"Use in {place}{', not in extension' * extension}."
 
 
 def _is_plain(answer: Any) -> bool:

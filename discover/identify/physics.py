@@ -118,7 +118,7 @@ def see(
 def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
     """Return the checks of a fluid. `names`: of the flows along which stresses are looked at."""
     fluid = replace(seen.fluid, law=in_shared_form(seen.fluid.law))
-    along, names = seen.along.some(list(names)), list(names.values())
+    along, titles = seen.along.some(list(names)), list(names.values())
     times = np.asarray(fluid.relaxation_time)
     rates = SHEAR_RATES / physics_flows.time_scale(fluid)
     shear = [
@@ -126,8 +126,8 @@ def check_physics(seen: Seen, names: Mapping[int, str]) -> PhysicsReport:
         for number, own in enumerate(np.outer(times, rates))
     ]
     found = {
-        "conformation tensor positive definite": _conformation(along, names),
-        "dissipation non-negative": _free_energy(along, names),
+        "conformation tensor positive definite": _conformation(along, titles),
+        "dissipation non-negative": _free_energy(along, titles),
         "work over a cycle non-negative": _work(seen),
         "flow curve monotonic": _flow_curve(fluid, shear, rates, seen.weissenberg),
         "steady extension bounded": _extension(fluid),

@@ -166,8 +166,10 @@ def cycles(scale: float, weissenberg: Sequence[float], deborah: Sequence[float])
     """Return the cycles of every pair of Wi and De. `scale`: the time, in s, that these are of."""
     pairs = [(wi, de) for wi in weissenberg for de in deborah]
     samples = np.linspace(0.0, _CYCLES * 2.0 * np.pi, _CYCLES * _SAMPLES_A_CYCLE + 1)
+    numbers = np.array(pairs)
     return Cycles(
-        *np.transpose(pairs),
+        numbers[:, 0],
+        numbers[:, 1],
         tuple(oscillatory_shear(wi / scale, de / scale) for wi, de in pairs),
         tuple(samples * scale / de for _, de in pairs),
     )

@@ -321,8 +321,8 @@ def strains(protocol: FlowProtocol, times: Float[np.ndarray, " n"]) -> Float[np.
     n = len(times)
     entries, size = (1 << (k - 1).bit_length() for k in (protocol.table_times.shape[0], n))
     padded = _padded(protocol, entries, protocol.amplitudes.shape[0])
-    times = on_device(np.pad(times, (0, size - n), mode="edge"))
-    return np.asarray(_strains(padded, times))[:n]
+    held = on_device(np.pad(times, (0, size - n), mode="edge"))
+    return np.asarray(_strains(padded, held))[:n]
 
 
 @compiled
@@ -334,6 +334,7 @@ def strains_in_table(
     protocol: FlowProtocol, times: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """Return the strains of the table at many times, such as amplitudes, shape (n,)."""
+    assert protocol.table_strains is not None
     return _in_table(times, protocol.table_times, protocol.table_strains)
 
 

@@ -278,7 +278,7 @@ def test_a_loop_whose_fluid_has_a_state_leaves_with_its_equation(tmp_path):
     assert read_result_laws(tmp_path)["augmented"].states == (part,)
     refused = invoke("export", tmp_path, "--format", "rheotool")
     assert refused.exit_code == 2
-    assert "rheoTool has no such state" in refused.stderr
+    assert "cannot be exported to rheoTool: it has a structure" in refused.stderr
 
 
 def test_an_export_does_not_write_over_the_result_that_it_reads(results):

@@ -71,6 +71,15 @@ def test_the_first_line_has_law_constants_error_and_range():
     assert "extension." not in replace(MELT, expected_error=stretched, range=pulled).headline
     known = replace(MELT, expected_error={**stretched, "N1": ExpectedError(0.01)}).headline
     assert "Use in shear, 0.003–3 1/s, not in extension." in known
+    # what the law alone says of N1 counts where it is as good as what is asked
+    for inside, place in ((0.03, "in shear"), (0.17, "for the shear stress")):
+        alone = ExpectedError(inside, note="not measured; constants alone", is_measured=False)
+        assert f"Use {place}" in replace(MELT, expected_error={"N1": alone}).headline
+    one_frequency = replace(MELT.range, frequency_rad_s=(1.0, 1.0))
+    assert "3 1/s, oscillating at 1 rad/s;" in replace(MELT, range=one_frequency).headline
+    spread = ExpectedError(missing="not determined", note="laws that fit as well differ by 41 %")
+    open_ = {**MELT.expected_error, "uniaxial": spread}
+    assert "not for N1 or extension." in replace(MELT, expected_error=open_).headline
     exact = replace(MELT, fits_to_the_noise=True, noise=0.01, discrepancy=None)
     assert "Fits within noise (1 %)." in exact.headline
 
