@@ -8,8 +8,6 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from discover.batch.status import (
     STATES,
     SUMMARY_FILES,
@@ -95,23 +93,10 @@ def _compare(study: Study, seed: int | None, folder: RunFolder, part: Progress) 
     """Run both learners of a study and write the comparison report."""
     from discover.comparison.run_comparison import compare
     from discover.report.comparison.report import write_comparison
-    from discover.report.overlay import comparison_overlays, read_overlays
-    from discover.study.data import load_study_data
-    from discover.study.declared_model import declared_model
 
-    sources = read_overlays(study)
     comparison = compare(study, seed, part, folder)
     part("drawing", 1.0)
-    overlays = ()
-    if sources:
-        model = declared_model(study, load_study_data(study, seed).dataset)
-        fluid = model.fluid
-        if comparison.known is not None:
-            modes = np.array(comparison.known.modulus), np.array(comparison.known.relaxation_time)
-            fluid = replace(model, modulus=modes[0], relaxation_time=modes[1]).fluid
-        overlays = comparison_overlays(sources, comparison.flows, fluid)
-    relaxes = study.model.known_relaxation
-    write_comparison(comparison, folder, relaxes, study.text, overlays=overlays)
+    write_comparison(comparison, folder, study.model.known_relaxation, study.text)
     return comparison.answer.lines
 
 
@@ -120,12 +105,10 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
     from discover.dataset.run_table import material_and_temperature
     from discover.loop.loop import run_loop_on
     from discover.report.loop.report import write_loop
-    from discover.report.overlay import loop_overlays, read_overlays
     from discover.study.data import load_study_data, temperature
     from discover.study.declared_model import declared_model, forward_model
 
     part("loading data", 0.0)
-    sources = read_overlays(study)
     data_of_study = load_study_data(study, seed)
     model = declared_model(study, data_of_study.dataset)
     declared = forward_model(model)
@@ -151,10 +134,7 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
         f"{f'{model.source} ' if model.source else ''}{dataset.left_out} {dataset.thinned}"
     ).strip()
     conditions = material_and_temperature(dataset, study.data.material)
-    overlays = loop_overlays(sources, result.records, dataset, model.fluid)
-    write_loop(
-        result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays
-    )
+    write_loop(result, folder, study.name, summary, study.text, conditions=conditions)
     return result.answer.lines
 
 

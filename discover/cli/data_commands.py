@@ -161,7 +161,7 @@ def shift(
         ),
     ] = None,
     vertical: Annotated[
-        bool, typer.Option("--vertical", help="Shift moduli as well as times and frequencies.")
+        bool, typer.Option("--vertical", help="Shift moduli as well as frequencies.")
     ] = False,
     between: Annotated[
         tuple[float, float] | None,
@@ -170,10 +170,9 @@ def shift(
     as_json: JsonOption = False,
     overwrite: OverwriteOption = False,
 ) -> None:
-    """Move linear tests at several temperatures to one, and say how well that holds."""
-    from discover.dataset.linear.linear_tests import read_linear_tests
-    from discover.dataset.linear.superposition import move_tests, shift_table
-    from discover.dataset.load import DATA_VARIABLE, TESTS_FILE, folder_roots
+    """Move linear sweeps at several temperatures to one, and say how well that holds."""
+    from discover.dataset.linear.superposition import read_sweeps, superpose
+    from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.report.data import superposition_page, superposition_words
     from discover.study.atomic import make_folder, remove_file, write_text
 
@@ -185,23 +184,21 @@ def shift(
             f"{folder} holds no {TESTS_FILE}, which lists tests at several temperatures. Import "
             f"them together, or correct the name; it may also be one under {DATA_VARIABLE}."
         )
-    found = move_tests(read_linear_tests(root), reference, vertical, between)
-    files = {f"{kind}.csv": found.master(kind) for kind in found.tests}
+    sweeps = read_sweeps(root)
+    if between is not None:
+        sweeps = {t: one for t, one in sweeps.items() if min(between) <= t <= max(between)}
+    found = superpose(sweeps, reference, vertical)
     if out.resolve() == root.resolve():
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
-    names = (*files, "shift_factors.csv", "report.html")
+    names = (SWEEP_FILE, "shift_factors.csv", "report.html")
     _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
-    write_text(out / "shift_factors.csv", shift_table(found))
+    write_text(out / "shift_factors.csv", found.table().to_csv(index=False))
     page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
-    written, without = [], []
-    for name, table in files.items():
-        if table is None:
-            remove_file(out / name)
-            without.append(name)
-        else:
-            write_text(out / name, table.to_dataframe().to_csv(index=False))
-            written.append(name)
+    if (master := found.master()) is None:
+        remove_file(out / SWEEP_FILE)
+    else:
+        write_text(out / SWEEP_FILE, master.to_dataframe().to_csv(index=False))
     words = superposition_words(found)
     if as_json:
         laws = [{"law": one.name, **one.values, "intervals": one.intervals} for one in found.laws]
@@ -209,8 +206,8 @@ def shift(
         return
     for sentence in words:
         say(sentence)
-    lacking = f"no {' and no '.join(without)}; " if without else ""
-    say(f"{out}: {lacking}{', '.join([*written, 'shift_factors.csv'])} and {page} written.")
+    sweep = f"no {SWEEP_FILE};" if master is None else f"{SWEEP_FILE},"
+    say(f"{out}: {sweep} shift_factors.csv and {page} written.")
 
 
 @data_app.command("import")

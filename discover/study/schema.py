@@ -11,7 +11,6 @@ from discover.dataset.run import LARGEST
 from discover.effects.registry import known_effects
 from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS
-from discover.learners.registry import learner_names
 from discover.learners.settings import DEFAULT_DEGREE
 from discover.protocols.kinematics import FLOW_CLASSES, FlowClass
 from discover.study.key_values import (
@@ -323,50 +322,6 @@ class Loop(Section):
         return self
 
 
-Modes = Positive | Annotated[tuple[Positive, ...], Field(min_length=1)] | None
-"""One number, or one for each mode."""
-
-
-def _count(modes: Modes) -> int:
-    return len(modes) if isinstance(modes, tuple) else int(modes is not None)
-
-
-class OverlayAsked(Section):
-    """A curve that the user wants beside the others: a law, or what a file holds."""
-
-    label: Annotated[str, Field(max_length=60)] = ""
-    """Name of the curve."""
-    law: SyntheticLaw | None = None
-    """Law that is drawn."""
-    parameters: dict[str, float] = Field(default_factory=dict)
-    """Its parameters."""
-    modulus_Pa: Modes = None
-    """Its modulus in Pa, or one of each mode; the declared ones where left out."""
-    relaxation_time_s: Modes = None
-    """Its relaxation time in s, or one of each mode."""
-    file: Annotated[str, Field(min_length=1, max_length=1000)] | None = None
-    """File with the columns of `predictions.csv`, in place of a law."""
-
-    @model_validator(mode="after")
-    def _one_kind(self):
-        if (self.law is None) == (self.file is None):
-            raise ValueError('an overlay has either law = "..." or file = "...", not both or none')
-        if self.file is not None and (self.parameters or self.modulus_Pa or self.relaxation_time_s):
-            raise ValueError("parameters and modes belong to a law, and this overlay is a file")
-        if _count(self.modulus_Pa) != _count(self.relaxation_time_s):
-            raise ValueError("modulus_Pa and relaxation_time_s go together, with as many values")
-        if self.label in ("declared", "augmented", *learner_names()):
-            raise ValueError(f"the label {self.label!r} names a curve of the report itself")
-        return self
-
-
-class Report(Section):
-    """What the page shows beside the results."""
-
-    overlay: Annotated[tuple[OverlayAsked, ...], Field(max_length=4)] = ()
-    """Curves drawn with those of the report."""
-
-
 class Verdict(Section):
     """Size of the discrepancy that the user accepts."""
 
@@ -385,8 +340,6 @@ class Study(Section):
     """How far `discover close-loop` goes."""
     compare: Compare = Compare()
     """What `discover compare` runs."""
-    report: Report = Report()
-    """What the page shows besides."""
     verdict: Verdict = Verdict()
     """What is accepted."""
     _path: Path | None = PrivateAttr(default=None)

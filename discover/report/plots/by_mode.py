@@ -9,14 +9,18 @@ from discover.report.plots.style import (
     BEFORE,
     NETWORK,
     SHADE,
+    Panel,
     Picture,
-    figure,
-    legend_above,
     literal,
-    make_logarithmic,
-    picture,
+    row_of_panels,
 )
 from discover.words import effect_title, readable, significant
+
+# whether a constant is left open, colour and filling of its mark, and what that is called
+_KINDS = (
+    (False, NETWORK, NETWORK, "fitted"),
+    (True, BEFORE, "none", "not determined by these data"),
+)
 
 
 def by_mode_picture(
@@ -29,36 +33,29 @@ def by_mode_picture(
     """
     if not constants:
         return None
-    with figure(1, len(constants), width=9.0, height=2.8) as (drawing, axes):
-        for panel, (name, constant) in zip(axes[0], constants.items(), strict=True):
-            told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
-            if told:
-                times, low, high = np.array(sorted(told)).T
-                panel.fill_between(times, low, high, color=SHADE, label="95 % interval")
-            for left_open, colour, fill in ((False, NETWORK, NETWORK), (True, BEFORE, "none")):
-                shown = [mode for mode in constant.modes if mode.left_open is left_open]
-                panel.plot(
-                    [mode.relaxation_time_s for mode in shown],
-                    [mode.value for mode in shown],
-                    "o", ms=5.0, color=colour, mfc=fill, ls="none",
-                    label="not determined by these data" if left_open else "fitted",
-                )  # fmt: skip
-            make_logarithmic(panel.xaxis)
-            panel.set_xlabel("relaxation time (s)")
-            panel.set_ylabel(literal(readable(effect_title(name))))
-        legend_above(drawing, axes)
-        said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
-        doubt = ""
-        if is_unexplained:
-            doubt = (
-                " The data are not explained, so these are the values that come nearest, and no "
-                "constants of the fluid."
-            )
-        return picture(
-            drawing,
-            "by_mode",
-            f"{said}{doubt} Intervals take it that the law is the fluid's.",
+    panels = []
+    for name, constant in constants.items():
+        told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
+        bands = [(*np.array(sorted(told)).T, {"color": SHADE, "label": "95 % interval"})]
+        points = {"marker": "o", "ms": 5.0, "ls": "none"}
+        curves = []
+        for left_open, colour, fill, label in _KINDS:
+            shown = [mode for mode in constant.modes if mode.left_open is left_open]
+            times = [mode.relaxation_time_s for mode in shown]
+            style = {**points, "color": colour, "mfc": fill, "label": label}
+            curves.append((times, [mode.value for mode in shown], style))
+        label = literal(readable(effect_title(name)))
+        settings = {"xscale": "log", "xlabel": "relaxation time (s)", "ylabel": label}
+        panels.append(Panel(curves, settings, bands if told else ()))
+    said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
+    doubt = ""
+    if is_unexplained:
+        doubt = (
+            " The data are not explained, so these are the values that come nearest, and no "
+            "constants of the fluid."
         )
+    caption = f"{said}{doubt} Intervals take it that the law is the fluid's."
+    return row_of_panels("by_mode", caption, panels, 9.0, 2.8)
 
 
 def by_mode_sentence(name: str, constant: ConstantByMode) -> str:

@@ -1,18 +1,14 @@
 """Stresses in one flow: against time, as Lissajous curves, and in start-up."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
 from discover.learners.registry import learner_title
-from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE_STYLE,
     INK,
     MEASURED,
-    OVERLAY_STYLES,
     SHADE,
     SPARSE,
     TRUTH_STYLE,
@@ -48,7 +44,7 @@ def units(comparison: Comparison) -> tuple[str, str, str]:
     return " (Pa)", "t (s)", "γ̇ (1/s)"
 
 
-def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()):
+def curves(comparison: Comparison, flow: Flow):
     """Yield label, style and stresses of everything known in a flow, in drawing order."""
     before = comparison.before[flow.key]
     if before is not None:
@@ -61,12 +57,9 @@ def curves(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ())
         prediction = outcome.predictions[flow.key]
         if prediction is not None:
             yield learner_title(name), learner_style(name), prediction
-    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
-        if flow.key in overlay.curves:
-            yield literal(overlay.label), style, overlay.curves[flow.key]
 
 
-def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()) -> Picture:
+def flow_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in an oscillation: against time, against strain and against rate."""
     stress_unit, time_label, rate_label = units(comparison)
     last = last_cycle(flow)
@@ -75,7 +68,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
     shown = [q for q in QUANTITIES if any(q in s for _, _, s in curves(comparison, flow))]
     with figure(len(shown), 3, width=10.0, height=2.1) as (drawing, axes):
         for row, quantity in zip(axes, shown, strict=True):
-            for label, style, stresses in curves(comparison, flow, overlays):
+            for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     row[0].plot(flow.times, stresses[quantity], label=label, **style)
                     for panel, (along, _) in zip(row[1:], closed.values(), strict=True):
@@ -106,9 +99,7 @@ def flow_picture(comparison: Comparison, flow: Flow, overlays: Sequence[Overlay]
         )
 
 
-def start_up_picture(
-    comparison: Comparison, flow: Flow, overlays: Sequence[Overlay] = ()
-) -> Picture:
+def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
     """Return σ12, N1 and N2 in start-up, or else what was recorded, such as the strain of creep."""
     stress_unit, _, _ = units(comparison)
     quantities = QUANTITIES if flow.records_shear_stress else QUANTITIES[:1]
@@ -117,7 +108,7 @@ def start_up_picture(
         if not flow.is_truth:
             shown = np.ones_like(shown)
         for panel, quantity in zip(axes[0], quantities, strict=True):
-            for label, style, stresses in curves(comparison, flow, overlays):
+            for label, style, stresses in curves(comparison, flow):
                 if quantity in stresses:
                     panel.plot(flow.along[shown], stresses[quantity][shown], label=label, **style)
             _draw_band(panel, comparison, flow, quantity, shown)

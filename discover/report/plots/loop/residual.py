@@ -14,7 +14,6 @@ from discover.report.plots.loop.runs import (
     along_in_common,
     axis_label,
     models_of,
-    shortened,
     symbol_of,
     through_decades,
 )
@@ -242,27 +241,3 @@ def ranking_picture(result: LoopResult) -> Picture | None:
             "first order, given what is fitted already; in green the one that was added. "
             "Evidence chooses among sets of effects, so it need not be the longest bar.",
         )
-
-
-def run_error_picture(result: LoopResult) -> Picture:
-    """Return the error of every run before and after, or of the law as declared alone."""
-    records = result.records
-    added = any(len(r.errors) > 1 for r in records)
-    model = WITH_EFFECTS if added else AS_DECLARED
-    with figure(1, 1, width=8.0, height=0.8 + 0.22 * len(records)) as (drawing, axes):
-        panel = axes[0, 0]
-        for position, record in enumerate(records[::-1]):
-            before, after = 100.0 * record.errors[0], 100.0 * record.errors[-1]
-            colour = HELD_COLOUR if record.held_out else FIT_COLOUR
-            panel.plot([before, after], [position] * 2, color=colour, lw=1.0)
-            if added:
-                panel.plot(before, position, "o", mfc="none", color=BEFORE, label=AS_DECLARED)
-            label = f"{model}, {'held out' if record.held_out else 'fitted'}"
-            panel.plot(after, position, "o", color=colour, label=label)
-        panel.set_yticks(range(len(records)), [literal(shortened(r.name)) for r in records[::-1]])
-        panel.set_ylim(-0.6, len(records) - 0.4)
-        make_percentage(panel.xaxis)
-        panel.set_xlabel("relative error (%)")
-        legend_above(drawing, axes)
-        told = "without and with effects" if added else "of your model"
-        return picture(drawing, "run_errors", f"Error of each run, {told}.")

@@ -9,18 +9,17 @@ from discover.loop import RunRecord
 from discover.loop.loop_result import LoopResult
 from discover.loop.reading import oscillation
 from discover.protocols.kinematics import MODULI
-from discover.report.overlay import Overlay
 from discover.report.plots.style import (
     BEFORE,
     CHOSEN_STYLE,
     INK,
     MEASURED,
     NETWORK,
-    OVERLAY_STYLES,
     RIVAL_STYLES,
     SHADE,
     SPARSE,
     TRUTH,
+    Panel,
     Picture,
     about_middle,
     figure,
@@ -31,6 +30,7 @@ from discover.report.plots.style import (
     make_logarithmic,
     panels_of,
     picture,
+    row_of_panels,
     runs_through_decades,
     shade_between,
 )
@@ -93,14 +93,13 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
     return f" {what} {', '.join(told)}." * (len(found) > 1)
 
 
-def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture:
-    """Return every run: measured, the law as declared, with effects, and overlays."""
+def runs_picture(result: LoopResult) -> Picture:
+    """Return every run: measured, the law as declared, and with effects."""
     records = result.records
     with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
         for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
             draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
-            draw_overlays(panel, record, overlays, record.along[1], slice(None))
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -124,9 +123,7 @@ def runs_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Pictur
             "runs",
             "Measured and predicted, run by run."
             + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
-            + _what_is_drawn(records)
-            + " Overlaid laws are the study's, fitted to nothing and without effects of the "
-            "instrument." * bool(overlays),
+            + _what_is_drawn(records),
         )
 
 
@@ -158,16 +155,6 @@ def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown
         color=HELD_COLOUR if record.held_out else FIT_COLOUR,
         label=f"{WITH_EFFECTS}, {'held out' if record.held_out else 'fitted'}",
     )  # fmt: skip
-
-
-def draw_overlays(
-    panel, record: RunRecord, overlays: Sequence[Overlay], along: np.ndarray, shown: Samples
-) -> None:
-    """Draw the curves that the study asks for in one run; arguments as in `draw_run`."""
-    for overlay, style in zip(overlays, OVERLAY_STYLES, strict=False):
-        curve = overlay.of(record.name, record.quantity)
-        if curve is not None:
-            panel.plot(along[shown], curve[shown], label=literal(overlay.label), **style)
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
@@ -203,7 +190,7 @@ def shortened(name: str) -> str:
 _MOST_DRAWN = 4
 
 
-def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> Picture | None:
+def lissajous_picture(result: LoopResult) -> Picture | None:
     """Return σ12 against strain and against rate in the last cycle, or None without oscillation.
 
     The widest runs are shown, those held out before those fitted.
@@ -224,7 +211,6 @@ def lissajous_picture(result: LoopResult, overlays: Sequence[Overlay] = ()) -> P
                         label="measured, all cycles", zorder=1,
                     )  # fmt: skip
                 draw_run(panel, record, along, last, last)
-                draw_overlays(panel, record, overlays, along, last)
                 _frame(panel, record.measured)
             axes[0, column].set_title(short_title(record), fontsize=8)
             axes[0, column].set_xlabel("strain γ")
@@ -266,24 +252,17 @@ _AXES = {
 
 def free_form_picture(result: LoopResult) -> Picture | None:
     """Return each free function with its band; None where there is none."""
-    forms = result.free_form
-    if not forms:
-        return None
-    with figure(1, len(forms), width=9.0, height=2.8) as (drawing, axes):
-        for panel, one in zip(axes[0], forms, strict=True):
-            panel.fill_between(one.grid, one.low95, one.high95, color=SHADE, label="95 % band")
-            panel.plot(one.grid, one.value, color=NETWORK, lw=1.5, label="free function")
-            panel.axhline(0.0, color="0.6", lw=0.6)
-            along, up = _AXES[one.slot]
-            panel.set_xlabel(along.format(variable=one.variable))
-            panel.set_ylabel(up)
-        legend_above(drawing, axes)
-        said = "; ".join(map(free_form_sentence, forms))
-        return picture(
-            drawing,
-            "free_form",
-            f"Effect without a name: {said}. The bands assume that it depends on this alone.",
-        )
+    panels = []
+    for one in result.free_form:
+        along, up = _AXES[one.slot]
+        band = one.grid, one.low95, one.high95, {"color": SHADE, "label": "95 % band"}
+        curve = one.grid, one.value, {"color": NETWORK, "lw": 1.5, "label": "free function"}
+        zero = one.grid[[0, -1]], [0.0, 0.0], {"color": "0.6", "lw": 0.6}
+        labels = {"xlabel": along.format(variable=one.variable), "ylabel": up}
+        panels.append(Panel([curve, zero], labels, [band]))
+    said = "; ".join(map(free_form_sentence, result.free_form))
+    caption = f"Effect without a name: {said}. The bands assume that it depends on this alone."
+    return row_of_panels("free_form", caption, panels, 9.0, 2.8) if panels else None
 
 
 def next_test_picture(result: LoopResult) -> Picture | None:
@@ -292,30 +271,24 @@ def next_test_picture(result: LoopResult) -> Picture | None:
     best = following.best
     if best is None:
         return None
-    with figure(1, 1, width=7.0, height=3.2) as (drawing, axes):
-        panel = axes[0, 0]
-        lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
-        for i, (effects, probability, curve) in enumerate(lines):
-            panel.plot(
-                best.samples,
-                curve,
-                **(RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE),
-                lw=2.0 if i == 0 else 1.4,
-                label=f"{effects_title(effects)} ({percent(probability)})",
-            )
-        unit = "" if best.quantity == "strain" else " (Pa)"
-        panel.set_ylabel(FIGURE_SYMBOLS[best.quantity] + unit)
-        panel.set_xlabel("shear rate (1/s)" if best.is_flow_curve else "time (s)")
-        if best.is_flow_curve or best.quantity in MODULI:
-            panel.set_xscale("log")
-            panel.set_yscale("log")
-        legend_above(drawing, axes, columns=1)
-        return picture(
-            drawing,
-            "next_test",
-            f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
-            f"which fit these data. Assumed noise: {percent(following.noise)}.",
-        )
+    curves = []
+    lines = zip(following.explanations, following.probabilities, best.curves, strict=True)
+    for i, (effects, probability, curve) in enumerate(lines):
+        style = RIVAL_STYLES[(i - 1) % len(RIVAL_STYLES)] if i else CHOSEN_STYLE
+        label = f"{effects_title(effects)} ({percent(probability)})"
+        curves.append((best.samples, curve, {**style, "lw": 1.4 if i else 2.0, "label": label}))
+    unit = "" if best.quantity == "strain" else " (Pa)"
+    settings = {
+        "ylabel": FIGURE_SYMBOLS[best.quantity] + unit,
+        "xlabel": "shear rate (1/s)" if best.is_flow_curve else "time (s)",
+    }
+    if best.is_flow_curve or best.quantity in MODULI:
+        settings |= {"xscale": "log", "yscale": "log"}
+    caption = (
+        f"What to measure next: {best.title}. Curves: predictions of the explanations, all of "
+        f"which fit these data. Assumed noise: {percent(following.noise)}."
+    )
+    return row_of_panels("next_test", caption, [Panel(curves, settings)], 7.0, 3.2, columns=1)
 
 
 _MOST_RIVALS, _COLUMNS = 6, 3
