@@ -61,9 +61,13 @@ def fit(
 
     enable_x64()
     enable_compilation_cache()
-    ranges = {name: _bounds(name, text) for name, text in _pairs("bounds", bounds)}
+    asked = console.pairs(bounds or (), "alpha=0:0.5")
+    ranges = {name: _bounds(name, text) for name, text in asked.items()}
     numbers = [
-        {name: _number(option, name, text) for name, text in _pairs(option, given)}
+        {
+            name: console.number(text, f"--{option} {name}")
+            for name, text in console.pairs(given or (), "alpha=0.2").items()
+        }
         for option, given in (("start", start), ("fix", fixed))
     ]
     dataset = load_dataset(data)
@@ -99,25 +103,11 @@ def _write(found, out: Path, overwrite: bool) -> None:
     folder.finish()
 
 
-def _pairs(option: str, given: list[str] | None) -> list[tuple[str, str]]:
-    for text in given or []:
-        if "=" not in text:
-            raise InputError(f"--{option} takes NAME=VALUE; got {text!r}.")
-    return [(name.strip(), value) for name, _, value in (t.partition("=") for t in given or [])]
-
-
-def _number(option: str, name: str, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"--{option} {name} must be a number; got {text!r}.") from None
-
-
 def _bounds(name: str, text: str) -> tuple[float, float]:
     low, colon, high = text.partition(":")
     if not colon:
         raise InputError(f"--bounds {name} must be two numbers, low:high; got {text!r}.")
-    return _number("bounds", name, low), _number("bounds", name, high)
+    return console.number(low, f"--bounds {name}"), console.number(high, f"--bounds {name}")
 
 
 @console.guarded
