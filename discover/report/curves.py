@@ -14,9 +14,7 @@ from discover.errors import InputError
 from discover.fitting import NamedLawFit
 from discover.learners.run_prediction import RunPrediction
 from discover.loop.loop_result import LoopResult
-from discover.loop.run_record import RunRecord
-from discover.protocols.control import drawn_against
-from discover.protocols.kinematics import STATES
+from discover.loop.run_record import RunRecord, record_runs
 from discover.report.plots.loop.runs import FIT_COLOUR, HELD_COLOUR, shortened
 from discover.report.plots.style import (
     BEFORE,
@@ -110,18 +108,10 @@ def _(result: RunPrediction) -> list[Curves]:
             f"There is no run to draw: {type(result).__name__} is not fitted, or comes from a "
             "file, which holds no data. Fit it, or draw what predict(data) returns."
         )
-    found = []
     predicted = result._predict_runs(list(result.runs_))
-    for run, values in zip(result.runs_, predicted, strict=True):
-        strain = np.zeros(len(run)) if run.strain is None else run.strain
-        label, along = drawn_against(run.protocol.control, run.time, run.rate, strain)
-        states = run.protocol.control in STATES
-        line = ("law, fitted", values, {"lw": 1.5, "color": FIT_COLOUR})
-        decades = not states and runs_through_decades(run.time, np.asarray(run.rate))
-        found.append(
-            Curves(run.name, label, along, run.quantity, run.recorded, [line], states, decades)
-        )
-    return found
+    pairs = zip(result.runs_, predicted, strict=True)
+    records = [record_runs([run], values[None, None], False)[0] for run, values in pairs]
+    return [_of_record(one, "law") for one in records]
 
 
 @curves_of.register

@@ -58,31 +58,21 @@ def style_sheet() -> str:
 
 # Stand-ins, each a value of its own: CSS variables of the palette take their place where a picture
 # follows light and dark.
-TRUTH = "#101112"
-BEFORE = "#909192"
-SPARSE = "#d55e00"
-NETWORK = "#0072b2"
-MEASURED = "#707172"
-GREEN = "#009e73"
-PURPLE = "#cc79a7"
-YELLOW = "#e69f00"
-INK = "#202122"
-GRID = "#d0d1d2"
-SHADE = "#e0e1e2"
-
 _VARIABLES = {
-    TRUTH: "truth",
-    BEFORE: "before",
-    SPARSE: "sparse",
-    NETWORK: "network",
-    MEASURED: "measured",
-    GREEN: "green",
-    PURPLE: "purple",
-    YELLOW: "yellow",
-    INK: "ink",
-    GRID: "grid",
-    SHADE: "shade",
+    "#101112": "truth",
+    "#909192": "before",
+    "#d55e00": "sparse",
+    "#0072b2": "network",
+    "#707172": "measured",
+    "#009e73": "green",
+    "#cc79a7": "purple",
+    "#e69f00": "yellow",
+    "#202122": "ink",
+    "#d0d1d2": "grid",
+    "#e0e1e2": "shade",
 }
+TRUTH, BEFORE, SPARSE, NETWORK, MEASURED, GREEN, PURPLE, YELLOW, INK, GRID, SHADE = _VARIABLES
+
 _EARLY = 0.1  # share of a run that holds half of its samples, were they spaced evenly 0.5
 _DECADES = 30.0
 

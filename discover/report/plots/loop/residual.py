@@ -92,8 +92,7 @@ def reading_picture(result: LoopResult) -> Picture | None:
         readings.append((result.readings[1], WITH_EFFECTS, FIT_COLOUR))
     if not readings[0][0].collapses:
         return None
-    waves = any(reading.waves for reading, _, _ in readings)
-    with figure(1, 3 if waves else 2, width=10.0, height=2.8) as (drawing, axes):
+    with figure(1, 2, width=10.0, height=2.8) as (drawing, axes):
         names = [c.coordinate for c in readings[0][0].collapses]
         for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=False):
             shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
@@ -105,18 +104,11 @@ def reading_picture(result: LoopResult) -> Picture | None:
         axes[0, 0].set_xlim(0.0, 100.0)
         axes[0, 0].set_xlabel("squared residual in common (%)")
         _draw_run_by_run(axes[0, 1], result)
-        if waves:
-            _draw_waves(axes[0, 2], readings)
         legend_above(drawing, axes)
         caption = (
             "Left: how much of the squared residual the runs share when drawn against each "
-            "coordinate, each run predicted from the others. Right of it: the error of each run."
+            "coordinate, each run predicted from the others. Right: the error of each run."
         )
-        if waves:
-            caption += (
-                " Far right: parts of the residual of each oscillating run: fundamental in phase "
-                "with the strain and with the rate, higher harmonics, drift."
-            )
         return picture(drawing, "reading", caption)
 
 
@@ -140,16 +132,6 @@ def _draw_run_by_run(panel, result: LoopResult) -> None:
     unit = f" ({_UNITS[name]})" if name in _UNITS else ""
     panel.set_xlabel(literal(name.replace("_", " ")) + unit)
     panel.set_ylabel("relative error (%)")
-
-
-def _draw_waves(panel, readings) -> None:
-    parts = ("elastic", "viscous", "odd", "even", "drift")
-    for shift, (reading, label, colour) in zip((-0.15, 0.15), readings, strict=False):
-        for place, part in enumerate(parts):
-            sizes = [100.0 * abs(getattr(wave, part)) for wave in reading.waves]
-            panel.plot([place + shift] * len(sizes), sizes, "o", ms=4.0, color=colour, label=label)
-    panel.set_xticks(range(len(parts)), parts, rotation=30)
-    panel.set_ylabel("residual (% of fundamental)")
 
 
 MOST_RANKED = 12
