@@ -11,23 +11,9 @@ from discover.cli import console
 from discover.errors import InputError
 
 
-def _laws_like(incomplete: str) -> list[str]:
-    from discover.laws.registry import LAWS
-
-    return [name for name in LAWS if name.startswith(incomplete)]
-
-
-def _formats_like(incomplete: str) -> list[str]:
-    from discover.equations.files import FORMATS
-
-    return [name for name in FORMATS if name.startswith(incomplete)]
-
-
 @console.guarded
 def fit(
-    law: Annotated[
-        str, typer.Argument(help="Name of the law; see: discover laws.", autocompletion=_laws_like)
-    ],
+    law: Annotated[str, typer.Argument(help="Name of the law; see: discover laws.")],
     data: Annotated[Path, typer.Argument(metavar="folder", help="Data folder.")],
     held_out: Annotated[
         list[str] | None, typer.Option("--held-out", help="Run that only tests the fit.")
@@ -124,7 +110,6 @@ def export(
             "--format",
             "-f",
             help="python, sympy, latex, json, rheotool or ufl.",
-            autocompletion=_formats_like,
         ),
     ] = "python",
     law: Annotated[

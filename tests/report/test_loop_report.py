@@ -64,7 +64,7 @@ def test_the_loop_report_holds_data_residual_ranking_and_errors(written):
     assert stands_alone(page)
     assert "<i>name" not in page
     assert r"a&lt;b&gt;$\frac$.csv" in page
-    names = ("waterfall", "runs", "residual", "reading", "ranking")
+    names = ("waterfall", "runs", "residual")
     for name in names:
         assert f'<figure id="{name}">' in page
         assert (written / "figures" / f"{name}.svg").is_file()

@@ -10,8 +10,6 @@ from discover.report.loop.tables import loop_verdict
 from discover.report.page import answer_screen, made_by, render, safe_name
 from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop.residual import (
-    ranking_picture,
-    reading_picture,
     residual_picture,
     waterfall_picture,
 )
@@ -53,8 +51,6 @@ def write_loop(
         free_form_picture(result),
         residual_picture(result),
         rivals_picture(result),
-        reading_picture(result),
-        ranking_picture(result),
         by_mode_picture(result.by_mode, result.verdict == "unexplained"),
         next_test_picture(result),
     ]

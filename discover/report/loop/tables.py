@@ -14,7 +14,6 @@ from discover.loop.sentences import EXPLAINED, MOST_NAMES, doubted, several, unt
 from discover.protocols.kinematics import ONLY_STATES
 from discover.report.mathtext import formula
 from discover.report.page import safe_name
-from discover.report.plots.loop.residual import MOST_RANKED
 from discover.report.wording import free_form_sentence, percent, sentence
 from discover.statistics.noise.noise_model import rms
 from discover.statistics.residual import fast_part
@@ -310,6 +309,10 @@ def fold_row(fold: Fold) -> dict[str, Any]:
         "error_after": fold.error_after,
         "effects": ", ".join(map(effect_title, fold.effects)) or "none",
     }
+
+
+MOST_RANKED = 12
+"""Candidates of a stage that are shown, the best."""
 
 
 def ranking_rows(ranking: Sequence[CandidateScore]) -> list[dict[str, Any]]:

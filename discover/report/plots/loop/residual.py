@@ -5,12 +5,9 @@ import numpy as np
 from discover.answer.sentences import flows_of
 from discover.loop import LoopResult
 from discover.loop.by_quantity import FASTER
-from discover.loop.reading import differences
 from discover.report.plots.loop.runs import (
-    AS_DECLARED,
     FIT_COLOUR,
     HELD_COLOUR,
-    WITH_EFFECTS,
     along_in_common,
     axis_label,
     models_of,
@@ -18,22 +15,17 @@ from discover.report.plots.loop.runs import (
     through_decades,
 )
 from discover.report.plots.style import (
-    BEFORE,
     GREEN,
     INK,
     Picture,
     figure,
     legend_above,
-    literal,
     make_logarithmic,
     make_percentage,
-    panels_of,
     picture,
 )
 from discover.report.wording import percent
 from discover.words import effect_title, listed
-
-_UNITS = {"the largest shear rate": "1/s", "the largest stress": "Pa", "the duration": "s"}
 
 
 def residual_picture(result: LoopResult) -> Picture:
@@ -83,59 +75,6 @@ def residual_picture(result: LoopResult) -> Picture:
             + " It should look like noise around zero; anything else is a missing effect.",
             switched=tuple(record.name for record in records),
         )
-
-
-def reading_picture(result: LoopResult) -> Picture | None:
-    """Return on what the residual depends, before and after."""
-    readings = [(result.readings[0], AS_DECLARED, BEFORE)]
-    if result.stages:
-        readings.append((result.readings[1], WITH_EFFECTS, FIT_COLOUR))
-    if not readings[0][0].collapses:
-        return None
-    with figure(1, 2, width=10.0, height=2.8) as (drawing, axes):
-        names = [c.coordinate for c in readings[0][0].collapses]
-        for shift, (reading, label, colour) in zip((-0.2, 0.2), readings, strict=False):
-            shares = {c.coordinate: 100.0 * c.share for c in reading.collapses}
-            places = np.arange(len(names)) + shift
-            axes[0, 0].barh(
-                places, [shares.get(n, 0.0) for n in names], 0.36, color=colour, label=label
-            )
-        axes[0, 0].set_yticks(range(len(names)), [f"along {name}" for name in names])
-        axes[0, 0].set_xlim(0.0, 100.0)
-        axes[0, 0].set_xlabel("squared residual in common (%)")
-        _draw_run_by_run(axes[0, 1], result)
-        legend_above(drawing, axes)
-        caption = (
-            "Left: how much of the squared residual the runs share when drawn against each "
-            "coordinate, each run predicted from the others. Right: the error of each run."
-        )
-        return picture(drawing, "reading", caption)
-
-
-def _draw_run_by_run(panel, result: LoopResult) -> None:
-    """Draw the error of each run against what its residual follows, or the largest shear rate."""
-    varied = differences(result.records)
-    followed = [trend.quantity for trend in result.readings[1].trends]
-    name = next(iter([*followed, *varied]), None)
-    if name is None:
-        panel.set_visible(False)
-        return
-    values = varied[name]
-    for (model, label), colour in zip(
-        models_of(result.records), (BEFORE, FIT_COLOUR), strict=False
-    ):
-        errors = [100.0 * float(record.errors[model]) for record in result.records]
-        panel.plot(values, errors, "o", ms=4.0, color=colour, label=label)
-    if np.min(values) > 0 and np.max(values) > 10.0 * np.min(values):
-        panel.set_xscale("log")
-    make_percentage(panel.yaxis)
-    unit = f" ({_UNITS[name]})" if name in _UNITS else ""
-    panel.set_xlabel(literal(name.replace("_", " ")) + unit)
-    panel.set_ylabel("relative error (%)")
-
-
-MOST_RANKED = 12
-"""Candidates of a stage that are shown, the best."""
 
 
 def waterfall_picture(result: LoopResult) -> Picture:
@@ -194,32 +133,3 @@ def _draw_ranges(panel, result: LoopResult, held_out: bool, shift: float) -> Non
     table = 100.0 * np.stack(errors)
     places = np.arange(table.shape[1]) + shift - 0.19  # next to the label of the bar
     panel.hlines(places, table.min(axis=0), table.max(axis=0), color=INK, lw=1.2)
-
-
-def ranking_picture(result: LoopResult) -> Picture | None:
-    """Return what each candidate would remove of the residual, stage by stage."""
-    rankings = [ranking for ranking in result.rankings if ranking]
-    if not rankings:
-        return None
-    with panels_of(len(rankings), 3, width=10.0, height=3.0) as (drawing, _, panels):
-        for number, (panel, ranking) in enumerate(zip(panels, rankings, strict=True)):
-            best = ranking[:MOST_RANKED][::-1]
-            chosen = result.stages[number].effect if number < len(result.stages) else None
-            panel.barh(
-                [effect_title(c.effect) for c in best],
-                [100.0 * max(c.score, 0.0) for c in best],
-                color=[GREEN if c.effect == chosen else BEFORE for c in best],
-            )
-            panel.set_xlim(0, 100)
-            kept = any(c.effect == chosen for c in best)
-            said = "" if kept else ": taken later" if chosen else ": none added"
-            panel.set_title(f"stage {number + 1}{said}")
-            panel.set_xlabel("squared residual explained (%)")
-            panel.tick_params(axis="y", labelsize=7.5)
-        return picture(
-            drawing,
-            "ranking",
-            "What each candidate would explain of the squared residual of the fitted runs, to "
-            "first order, given what is fitted already; in green the one that was added. "
-            "Evidence chooses among sets of effects, so it need not be the longest bar.",
-        )
