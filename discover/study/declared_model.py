@@ -1,7 +1,8 @@
 """From a study to its declared fluid."""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -249,19 +250,21 @@ def _spectrum_of(
     times = np.array(found.equation.relaxation_time)
     if dataset.linear_sweep is None:
         return None
-    solvent = found.equation.solvent_viscosity
-    # of the sweep alone, beside a solvent that was declared, and with a number of modes given
-    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": len(times)})
-    for options in asked:
-        try:
-            spectrum = relaxation_spectrum(_usable(dataset.linear_sweep, window), **options)
-        except InputError:
-            return None  # a sweep too short for modes, which were given as numbers then
+    sweep = _usable(dataset.linear_sweep, window)
+    for spectrum in spectra_of(sweep, found.equation.solvent_viscosity, len(times)):
         if spectrum.relaxation_time.shape == times.shape:
             factor = times / spectrum.relaxation_time
             if np.ptp(factor) <= _SAME_MODES * np.max(factor):
                 return spectrum
     return None
+
+
+def spectra_of(sweep: LinearSweep, solvent: float, modes: int) -> Iterator[RelaxationSpectrum]:
+    """Yield those of a sweep alone, beside a solvent in Pa s, and of a number of modes."""
+    asked: tuple[dict[str, Any], ...] = ({}, {"solvent_viscosity": solvent}, {"modes": modes})
+    for options in asked:
+        with suppress(InputError):  # too short a sweep, of which the modes are not then
+            yield relaxation_spectrum(sweep, **options)
 
 
 def _usable(sweep: LinearSweep, window: tuple[float, float] | None) -> LinearSweep:

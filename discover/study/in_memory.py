@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from discover.dataset import Dataset, Run
-from discover.dataset.linear_viscoelasticity import RelaxationSpectrum, relaxation_spectrum
+from discover.dataset.linear_viscoelasticity import RelaxationSpectrum
 from discover.dataset.records.repeats import require_no_copies
 from discover.dataset.run import require_signal
 from discover.effects import known_effects
@@ -17,7 +17,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, spectra_of
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only tests: a data set of its own, or names of runs of the data set."""
@@ -122,14 +122,8 @@ def _spectrum(data: Dataset, base: Fluid) -> RelaxationSpectrum | None:
     """Return the spectrum of the data's linear sweep if the modes are those."""
     if data.linear_sweep is None:
         return None
-    solvent, modes = float(base.solvent_viscosity), base.n_modes
     modulus, time = np.asarray(base.modulus), np.asarray(base.relaxation_time)
-    known: dict[str, Any] = {"solvent_viscosity": solvent}
-    for options in ({}, known, {"modes": modes}):
-        try:
-            found = relaxation_spectrum(data.linear_sweep, **options)
-        except InputError:
-            continue
+    for found in spectra_of(data.linear_sweep, float(base.solvent_viscosity), base.n_modes):
         if np.array_equal(found.modulus, modulus) and np.array_equal(found.relaxation_time, time):
             return found
     return None
