@@ -19,8 +19,8 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
     from discover.dataset import LinearSweep as LinearSweep
     from discover.dataset import Run as Run
     from discover.dataset import check_folder as check_folder
+    from discover.dataset import from_dataframe as from_dataframe
     from discover.dataset import load_dataset as load_dataset
-    from discover.dataset.from_dataframe import from_dataframe as from_dataframe
     from discover.dataset.importing import register_importer as register_importer
     from discover.effects.registry import effects_table as effects
     from discover.effects.registry import register_effect as register_effect
@@ -54,8 +54,9 @@ if TYPE_CHECKING:  # what editors and type checkers see; `_PLACES` is what runs
 _PLACES = {
     "discover.loop.in_memory": ("close_loop",),
     "discover.comparison.in_memory": ("compare",),
-    "discover.dataset": ("LinearSweep", "Dataset", "Run", "check_folder", "load_dataset"),
-    "discover.dataset.from_dataframe": ("from_dataframe",),
+    "discover.dataset": (
+        "LinearSweep", "Dataset", "Run", "check_folder", "from_dataframe", "load_dataset",
+    ),
     "discover.dataset.importing": ("register_importer",),
     "discover.effects.registry": ("register_effect",),
     "discover.errors": ("InputError",),

@@ -8,8 +8,8 @@ from discover.protocols.kinematics import in_words
 from discover.report.loop import tables
 from discover.report.loop.tables import loop_verdict
 from discover.report.page import answer_screen, made_by, render, safe_name
-from discover.report.plots.by_mode import by_mode_picture
 from discover.report.plots.loop.residual import (
+    by_mode_picture,
     residual_picture,
     waterfall_picture,
 )
