@@ -19,7 +19,7 @@ from discover.report.plots.loop.residual import (
     residual_picture,
     waterfall_picture,
 )
-from discover.report.plots.loop.runs import lissajous_picture, rivals_picture, runs_picture
+from discover.report.plots.loop.runs import lissajous_picture, runs_picture
 from discover.report.plots.style import figure, in_last_cycle, make_percentage, picture
 from discover.study import RunFolder
 
@@ -358,37 +358,6 @@ def test_the_last_cycle_is_one_period_long():
     record = oscillating()
     shown = record.time[in_last_cycle(record.time, 1.0)]
     assert shown[-1] - shown[0] == pytest.approx(2.0 * np.pi, rel=0.03)
-
-
-def several_explanations():
-    """Two explanations of the same runs, the second a tenth too high."""
-    result = loop_result()
-    records = tuple(
-        replace(r, by_explanation=np.stack([r.predicted[-1], 1.1 * r.measured]))
-        for r in result.records
-    )
-    told = Explanations(
-        (
-            Explanation(("stress_gain",), 0.6, ErrorPair(0.01, 0.2), {}),
-            Explanation(("wall_slip",), 0.2, ErrorPair(0.1, 0.1), {}),
-        ),
-        0.2,
-    )
-    return replace(result, records=records, explanations=told)
-
-
-def test_the_residual_of_each_explanation_stands_beside_the_one_that_was_found():
-    result = several_explanations()
-    drawn = rivals_picture(result)
-    assert drawn is not None
-    assert len(drawn.axes) == 2
-    assert drawn.axes[0]["y"] == drawn.axes[1]["y"]  # one scale
-    # the larger residual, a tenth of each run's size at its end, sets it
-    assert drawn.axes[0]["y"][1] > 10.0
-    assert "found by the search" in drawn.svg
-    # negative control: one explanation has no rival
-    one = replace(result.explanations, likeliest_first=result.explanations.likeliest_first[:1])
-    assert rivals_picture(replace(result, explanations=one)) is None
 
 
 def test_a_short_axis_of_errors_has_a_number_to_read():

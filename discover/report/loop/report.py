@@ -19,7 +19,6 @@ from discover.report.plots.loop.runs import (
     free_form_picture,
     lissajous_picture,
     next_test_picture,
-    rivals_picture,
     runs_picture,
 )
 from discover.report.predictions import PREDICTIONS, loop_predictions, write_predictions
@@ -50,7 +49,6 @@ def write_loop(
         lissajous_picture(result),
         free_form_picture(result),
         residual_picture(result),
-        rivals_picture(result),
         by_mode_picture(result.by_mode, result.verdict == "unexplained"),
         next_test_picture(result),
     ]
