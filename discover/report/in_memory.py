@@ -13,10 +13,10 @@ from discover.fitting import NamedLawFit
 from discover.loop.loop_result import LoopResult
 from discover.plain_numbers import json_text
 from discover.report.comparison.report import write_comparison
-from discover.report.curves import curves_of, draw_curves
+from discover.report.curves import drawn
 from discover.report.loop.report import write_loop
 from discover.report.page import answer_screen, made_by, render
-from discover.report.plots.style import Picture, panels_of, picture
+from discover.report.plots.style import Picture, picture
 from discover.study.run_folder import RunFolder
 
 _PAGE = "report.html"
@@ -71,8 +71,7 @@ def fit_page(fit: NamedLawFit) -> str:
 
 def fit_picture(fit: NamedLawFit) -> Picture:
     """Return every run, measured and by the fitted law."""
-    with panels_of(len(fit.records), width=10.0, height=2.2) as (drawing, axes, panels):
-        draw_curves(curves_of(fit), drawing, axes, panels)
+    with drawn(fit) as drawing:
         caption = "Every run, measured and by the fitted law, with its relative error."
         if any(record.held_out for record in fit.records):
             caption += " Runs in orange were held out."

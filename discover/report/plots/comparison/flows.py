@@ -1,6 +1,10 @@
 """Stresses in one flow: against time, as Lissajous curves, and in start-up."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
 import numpy as np
+from matplotlib.figure import Figure
 
 from discover.comparison.comparison import Comparison
 from discover.comparison.flows import QUANTITIES, Flow
@@ -129,20 +133,30 @@ def start_up_picture(comparison: Comparison, flow: Flow) -> Picture:
 def training_picture(comparison: Comparison) -> Picture:
     """Return the data that the learners saw, and how they fit them."""
     flows = comparison.flows_of("training")
-    stress_unit, _, _ = units(comparison)
     kinds = {flow.protocol.quantity for flow in flows}
     recorded = listed([symbol for kind, symbol in FIGURE_SYMBOLS.items() if kind in kinds])
+    with drawn_records(comparison, flows) as drawing:
+        return picture(
+            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
+        )
+
+
+@contextmanager
+def drawn_records(comparison: Comparison, flows: Sequence[Flow]) -> Iterator[Figure]:
+    """Yield a figure with a panel for each flow: what was recorded of it, and every learner."""
+    stress_unit, _, _ = units(comparison)
     with panels_of(len(flows), height=1.8) as (drawing, axes, panels):
         for panel, flow in zip(panels, flows, strict=True):
-            if flow.measured is not None:
-                panel.plot(flow.along, flow.measured, ".", color=MEASURED, ms=2.5, label="data")
+            recorded = flow.measured
+            if recorded is None and flow.kind != "training" and flow.is_record:
+                recorded = flow.reference.get("sigma12")
+            if recorded is not None:
+                panel.plot(flow.along, recorded, ".", color=MEASURED, ms=2.5, label="data")
             for name, outcome in comparison.outcomes.items():
                 prediction = outcome.predictions[flow.key]
                 if prediction is not None:
-                    style = learner_style(name)
-                    panel.plot(
-                        flow.along, prediction["sigma12"], label=learner_title(name), **style
-                    )
+                    style = {**learner_style(name), "label": learner_title(name)}
+                    panel.plot(flow.along, prediction["sigma12"], **style)
             _draw_band(panel, comparison, flow, "sigma12", slice(None))
             panel.set_title(literal(flow.title), fontsize=8)
             _set_scales(panel, flow, "sigma12", truth_too=True)
@@ -154,9 +168,7 @@ def training_picture(comparison: Comparison) -> Picture:
         symbols = [FIGURE_SYMBOLS[flow.protocol.quantity] for flow in flows]
         label_rows(axes, [f"{one}{unit}" for one, unit in zip(symbols, units_of, strict=True)])
         legend_above(drawing, axes)
-        return picture(
-            drawing, "training", f"The only data that the learners saw: {recorded} of these runs."
-        )
+        yield drawing
 
 
 def _seen(comparison: Comparison, flow: Flow) -> str:

@@ -1,8 +1,11 @@
 """Pictures of the runs of a closed loop: data and predictions."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import EngFormatter
 
 from discover.loop import RunRecord
@@ -94,10 +97,37 @@ def _what_is_drawn(records: Sequence[RunRecord]) -> str:
 def runs_picture(result: LoopResult) -> Picture:
     """Return every run: measured, the law as declared, and with effects."""
     records = result.records
+    with drawn_runs(records) as drawing:
+        return picture(
+            drawing,
+            "runs",
+            "Measured and predicted, run by run."
+            + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
+            + _what_is_drawn(records),
+        )
+
+
+AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
+"""The two models of a closed loop, as pictures name them."""
+
+FITTED_LAW = "", "law"
+"""Names of a law's prediction alone, whatever it started from."""
+
+
+@contextmanager
+def drawn_runs(
+    records: Sequence[RunRecord], names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS)
+) -> Iterator[Figure]:
+    """Yield a figure with a panel for each run.
+
+    `names`: of the first and the last prediction; without the first the last alone is drawn.
+    """
+    if not names[0]:
+        records = [replace(r, predicted=r.predicted[-1:], errors=r.errors[-1:]) for r in records]
     with panels_of(len(records), width=10.0, height=2.2) as (drawing, axes, panels):
         for panel, record in zip(panels, records, strict=True):
             every = max(1, record.time.size // 60)
-            draw_run(panel, record, record.along[1], slice(None, None, every), slice(None))
+            draw_run(panel, record, record.along[1], slice(None, None, every), slice(None), names)
             low, high = float(np.min(record.measured)), float(np.max(record.measured))
             shown = np.clip(record.predicted, low - (high - low), high + 0.6 * (high - low))
             low, high = min(low, float(shown.min())), max(high, float(shown.max()))
@@ -116,53 +146,38 @@ def runs_picture(result: LoopResult) -> Picture:
                 panel.set_xlabel(record.along[0])
         label_rows(axes, [axis_label([record]) for record in records])
         legend_above(drawing, axes)
-        return picture(
-            drawing,
-            "runs",
-            "Measured and predicted, run by run."
-            + " Runs in orange were held out of all fits." * any(r.held_out for r in records)
-            + _what_is_drawn(records),
-        )
+        yield drawing
 
 
-def draw_run(panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples) -> None:
+def draw_run(
+    panel, record: RunRecord, along: np.ndarray, marked: Samples, shown: Samples,
+    names: tuple[str, str] = (AS_DECLARED, WITH_EFFECTS),
+) -> None:  # fmt: skip
     """Draw the measured stress, the law as declared and with effects in one run.
 
     `panel`: axes of matplotlib. `along`: what the stress is drawn against, shape (n,). `marked`,
-    `shown`: which samples are marked as measured, and between which the models are drawn.
+    `shown`: which samples are marked as measured, and between which the models are drawn. `names`:
+    as in `drawn_runs`.
     """
+    colour = HELD_COLOUR if record.held_out else FIT_COLOUR
     if record.band is not None:
-        low, high = record.band[:, shown]
-        shade_between(
-            panel, along[shown], low, high, alpha=0.18, lw=0,
-            color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-            label="95 % of measurements, all explanations",
-        )  # fmt: skip
-    panel.plot(
-        along[marked], record.measured[marked], "o", ms=2.5, mfc="none", mew=0.7, color=TRUTH,
-        label="measured",
-    )  # fmt: skip
-    panel.plot(
-        along[shown], record.predicted[0][shown], "-.", lw=1.1, color=BEFORE,
-        label=AS_DECLARED,
-    )  # fmt: skip
-    if len(record.predicted) == 1:  # nothing was added
-        return
-    panel.plot(
-        along[shown], record.predicted[-1][shown], lw=1.5,
-        color=HELD_COLOUR if record.held_out else FIT_COLOUR,
-        label=f"{WITH_EFFECTS}, {'held out' if record.held_out else 'fitted'}",
-    )  # fmt: skip
+        label = "95 % of measurements, all explanations"
+        style = {"color": colour, "alpha": 0.18, "lw": 0, "label": label}
+        shade_between(panel, along[shown], *record.band[:, shown], **style)
+    style = {"ms": 2.5, "mfc": "none", "mew": 0.7, "color": TRUTH, "label": "measured"}
+    panel.plot(along[marked], record.measured[marked], "o", **style)
+    if names[0]:
+        style = {"lw": 1.1, "color": BEFORE, "label": names[0]}
+        panel.plot(along[shown], record.predicted[0][shown], "-.", **style)
+    if len(record.predicted) > 1 or not names[0]:
+        label = f"{names[1]}, {'held out' if record.held_out else 'fitted'}"
+        panel.plot(along[shown], record.predicted[-1][shown], lw=1.5, color=colour, label=label)
 
 
 def models_of(records: Sequence[RunRecord]) -> list[tuple[int, str]]:
     """Return the models that a picture shows, by their place among the stages."""
     augmented = [(-1, WITH_EFFECTS)] * any(len(r.predicted) > 1 for r in records)
     return [(0, AS_DECLARED), *augmented]
-
-
-AS_DECLARED, WITH_EFFECTS = "your model", "with effects"
-"""The two models of a closed loop, as pictures name them."""
 
 
 def short_title(record: RunRecord) -> str:
