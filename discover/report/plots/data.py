@@ -38,7 +38,7 @@ from discover.words import FIGURE_SYMBOLS, counted
 _MOST_RUNS = 24
 """Panels of runs, beyond which a page is too long to look through."""
 
-_POINTS = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
+_POINTS: dict[str, Any] = {"ls": "", "ms": 3.5, "mfc": "none", "mew": 0.9}
 _MOST_POINTS = 300
 
 
@@ -136,7 +136,7 @@ def _linear_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum | None) -> Pi
         times, moduli = spectrum.relaxation_time, spectrum.modulus
         ends = np.min(moduli), np.max(moduli)
         edges = ([1.0 / edge] * 2 for edge in (omega[0], omega[-1]))
-        modes = [(edge, ends, {"color": BEFORE, **_DOTTED}) for edge in edges]
+        modes: list[Curve] = [(edge, ends, {"color": BEFORE, **_DOTTED}) for edge in edges]
         modes.append((times, moduli, {"color": GREEN, "marker": "D", **_POINTS}))
         labels = {"xlabel": "λ (s)", "ylabel": "G of each mode (Pa)"}
         panels.append(Panel(modes, {**_LOGARITHMIC, **labels}))

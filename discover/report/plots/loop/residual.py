@@ -164,7 +164,10 @@ def by_mode_picture(
     panels = []
     for name, constant in constants.items():
         told = [(mode.relaxation_time_s, *mode.ci95) for mode in constant.modes if mode.ci95]
-        bands = [(*np.array(sorted(told)).T, {"color": SHADE, "label": "95 % interval"})]
+        bands = []
+        if told:
+            times, low, high = np.array(sorted(told)).T
+            bands = [(times, low, high, {"color": SHADE, "label": "95 % interval"})]
         points = {"marker": "o", "ms": 5.0, "ls": "none"}
         curves = []
         for left_open, colour, fill, label in _KINDS:
@@ -174,7 +177,7 @@ def by_mode_picture(
             curves.append((times, [mode.value for mode in shown], style))
         label = literal(readable(effect_title(name)))
         settings = {"xscale": "log", "xlabel": "relaxation time (s)", "ylabel": label}
-        panels.append(Panel(curves, settings, bands if told else ()))
+        panels.append(Panel(curves, settings, bands))
     said = " ".join(by_mode_sentence(name, one) for name, one in constants.items())
     doubt = ""
     if is_unexplained:
