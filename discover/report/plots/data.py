@@ -134,7 +134,7 @@ def _linear_sweep(sweep: LinearSweep, spectrum: RelaxationSpectrum | None) -> Pi
             curves.append((dense, values, {"color": colour, "lw": 1.0}))
         curves.append(([], [], {"color": BEFORE, "lw": 1.0, "label": "modes"}))
         times, moduli = spectrum.relaxation_time, spectrum.modulus
-        ends = np.min(moduli), np.max(moduli)
+        ends = float(np.min(moduli)), float(np.max(moduli))
         edges = ([1.0 / edge] * 2 for edge in (omega[0], omega[-1]))
         modes: list[Curve] = [(edge, ends, {"color": BEFORE, **_DOTTED}) for edge in edges]
         modes.append((times, moduli, {"color": GREEN, "marker": "D", **_POINTS}))
@@ -165,7 +165,7 @@ def _amplitude_sweep(run: Run, sweep: LinearSweep | None) -> Picture:
     if sweep is not None:
         edges = sweep.angular_frequency
         inside = groups[(groups >= edges[0]) & (groups <= edges[-1])]
-        ends = np.min(strain), np.max(strain)
+        ends = float(np.min(strain)), float(np.max(strain))
         for values, colour in zip(sweep.measured, (NETWORK, SPARSE), strict=True):
             for level in np.interp(np.log(inside), np.log(edges), values):
                 curves.append((ends, [level, level], {"color": colour, **_DOTTED}))
