@@ -68,21 +68,27 @@ def validated(model: type[_Model], content: object, where: str) -> _Model:
     try:
         return model.model_validate(content)
     except ValidationError as error:
-        raise InputError(_explain(error, where, model)) from None
+        raise InputError(_explain(error, content, where, model)) from None
 
 
-def _explain(error: ValidationError, where: str, model: type[BaseModel]) -> str:
+def _explain(error: ValidationError, content: object, where: str, model: type[BaseModel]) -> str:
     """Return all that is wrong, a line for each key; unknown keys first."""
-    texts, at, meant = [], _by_place(error), set()
+    texts, at = [], _by_place(error)
     for place in [place for place, of in at.items() if of[0]["type"] == "extra_forbidden"]:
-        *section, key = at.pop(place)[0]["loc"]
+        *section, key = at[place][0]["loc"]
         known = _keys(model, tuple(section))
         near = nearest(key, known)
-        meant.add(_place((*section, near)))
         guess = "" if near is None else f" Did you mean {near!r}?"
         texts.append(f"unknown key {place!r}.{guess} Known keys there are: {', '.join(known)}")
+        content = _renamed(content, section, key, near)
+    if texts:  # what else is wrong shows with these keys spelled rightly, or left out
+        at = {}
+        try:
+            model.model_validate(content)
+        except ValidationError as further:
+            at = _by_place(further)
     for place, of in at.items():
-        if of[0]["type"] != "missing" or place not in meant:  # it is there, misspelled
+        if of[0]["type"] != "extra_forbidden":
             texts += _of_value(place, of)
     problems = Problems()
     for text in texts:
@@ -97,6 +103,26 @@ def _by_place(error: ValidationError) -> dict[str, list[Any]]:
     for problem in error.errors(include_url=False):
         at.setdefault(_place(problem["loc"]), []).append(problem)
     return at
+
+
+def _renamed(content: Any, section: Sequence[Any], key: Any, name: str | None) -> Any:
+    """Return nested content with a key under another name, if that is free; else without it."""
+    if section and isinstance(content, list | tuple) and isinstance(section[0], int):
+        return [
+            _renamed(part, section[1:], key, name) if i == section[0] else part
+            for i, part in enumerate(content)
+        ]
+    if not isinstance(content, dict):
+        return content
+    if section:  # a part that is no key is the branch of a union
+        first, *rest = section
+        if first not in content:
+            return _renamed(content, rest, key, name)
+        return {**content, first: _renamed(content[first], rest, key, name)}
+    left = {k: value for k, value in content.items() if k != key}
+    return (
+        left if name is None or name in left or key not in content else {**left, name: content[key]}
+    )
 
 
 def _of_value(place: str, problems: Sequence[Any]) -> list[str]:
