@@ -59,10 +59,11 @@ RATE_GAIN = RateGain(
 )  # fmt: skip
 
 
-def _torque_between_plates(interior: int = 3) -> dict[str, tuple[float, ...]]:
-    """Return radii and weights of 4 ∫ x² σ(x γ̇) dx: Gauss–Radau for σ/x, the rim a node.
+def _torque_between_plates(interior: int = 3) -> tuple[tuple[float, ...], ...]:
+    """Return radii, and weights of stress and of moduli, for 4 ∫ x² σ(x γ̇) dx.
 
-    Stress vanishes on the axis, the zero of a transducer does not: it gets what is missing to one.
+    Gauss–Radau for σ/x, with the rim as a node. Stress vanishes on the axis, the zero of a
+    transducer does not: it gets what is missing to one.
     """
     # of the interior nodes Gauss's rule has the weight (1 − x) x³
     radii, weights = roots_sh_jacobi(interior, 5, 4)
@@ -71,12 +72,13 @@ def _torque_between_plates(interior: int = 3) -> dict[str, tuple[float, ...]]:
     radii = np.array([0.0, *radii, 1.0])
     of_stress = np.array([0.0, *of_modulus[1:] / radii[1:]])
     of_stress[0] = 1.0 - np.sum(of_stress)
-    found = {"radii": radii, "of_stress": of_stress, "of_modulus": of_modulus}
-    return {name: tuple(values.tolist()) for name, values in found.items()}
+    return tuple(tuple(each.tolist()) for each in (radii, of_stress, of_modulus))
 
+
+_RADII, _OF_STRESS, _OF_MODULUS = _torque_between_plates()
 
 PARALLEL_PLATES = RadialAverage(
-    name="parallel_plates", **_torque_between_plates(),
+    name="parallel_plates", radii=_RADII, of_stress=_OF_STRESS, of_modulus=_OF_MODULUS,
     parameters=(
         EffectParameter(
             "share", "p", low=0.0, high=1.0, first_trial=0.1, ends=("high",),
