@@ -53,9 +53,7 @@ def comparison():
             "data": {"synthetic": {"law": "giesekus", "parameters": {"alpha": 0.2}, "samples": 21}},
             "compare": {
                 "high_deborah": [1.5],
-                "next": {"flows": ["laos", "uniaxial"]},
                 "library": {"degree": 0},
-                "sweep": {"laws": ["ptt_linear"], "parameter": "epsilon", "values": [0.1]},
             },
         }
     )
@@ -127,7 +125,7 @@ def test_identifiers_are_unique(page):
 
 
 def test_the_page_has_the_papers_pictures_and_tables(page):
-    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss", "sweep")
+    names = ("flow_laos_3_1.5", "flow_laos_2_1", "flow_startup_2", "high_deborah", "loss")
     maps = ("pipkin_error", "residual_map")
     for name in (*names, *maps, "training"):
         assert f'<figure id="{name}">' in page

@@ -25,7 +25,6 @@ from discover.report.plots.comparison.selection import (
     high_deborah_picture,
     loss_picture,
     selection_picture,
-    sweep_picture,
 )
 from discover.report.plots.residual_map import comparison_residual_map
 from discover.report.plots.style import Picture
@@ -54,7 +53,6 @@ def comparison_pictures(
         ("The map of residuals", partial(comparison_residual_map, comparison)),
         ("The picture of the selection", partial(selection_picture, details)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
-        ("The picture of the sweep", partial(sweep_picture, comparison)),
     ]
     loss = ("The picture of the loss", partial(loss_picture, comparison))
     return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
@@ -269,13 +267,6 @@ def _outline(
         ],
         ("next", "What to measure next", "What to measure next"): [
             ("The table of experiments", "next", table("tests", tables.next_rows))
-        ],
-        ("distillation", "Distillation: what a simpler law learns from this one", ""): [
-            (
-                "The table of distillations",
-                "distillation",
-                table("distillations", tables.distillations),
-            )
         ],
         ("structure", "What these flows could tell of any law in the library", ""): [
             ("What the flows could tell", "structure", table("structure", tables.structure))
