@@ -32,13 +32,13 @@ from discover.dataset.run_table import material_and_temperature
 from discover.laws import LAWS, Fluid
 from discover.learners.results import LearnerResult
 from discover.linear_algebra_threads import in_one_thread
-from discover.loop.loop import Found
+from discover.loop.loop import Found, titled
 from discover.loop.loop_result import LoopResult
 from discover.loop.simple import simple_result
 from discover.loop.task import Task
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
-from discover.study.data import StudyData, load_study_data, temperature
+from discover.study.data import StudyData, load_study_data
 from discover.study.declared_model import DeclaredModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
@@ -150,7 +150,7 @@ def compare(
         flows=frame.shown,
         before=frame.alone(),
         outcomes=outcomes,
-        posterior=_titled(found.result(), study, data),
+        posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=lacks_of_fit(
             outcomes, frame.shown, expectation_of(study, declared, data),
@@ -191,20 +191,10 @@ def _of_material(
         name=study.name, data_summary=data_in_words(data, study),
         known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
         flows=flows, before=before, outcomes={},
-        posterior=_titled(simple, study, data), bands=bands,
+        posterior=titled(simple, study, data), bands=bands,
         statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
         conditions=material_and_temperature(data.dataset, study.data.material),
     )  # fmt: skip
-
-
-def _titled(found: LoopResult, study: Study, data: StudyData) -> LoopResult:
-    """Return a result with the study's name, tolerance and temperature."""
-    return replace(
-        found,
-        title=study.name,
-        tolerance=study.verdict.tolerance,
-        temperature_C=temperature(study, data.dataset),
-    )
 
 
 def _told(outcome: LearnerOutcome, is_silent: bool) -> LearnerOutcome:
