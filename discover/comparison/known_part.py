@@ -14,7 +14,7 @@ from discover.comparison.flows import (
     with_each_run,
 )
 from discover.comparison.outcome import LearnerOutcome
-from discover.comparison.records import InRecord, absorbed, corrected
+from discover.comparison.records import absorbed, without_instrument
 from discover.comparison.simulated import simulated
 from discover.dataset import Run
 from discover.effects import ConstitutiveEffect, KnownEffect
@@ -32,27 +32,26 @@ _INSIDE = 1e-3
 class Frame:
     """What learners are given, and how what they find appears in the records.
 
-    `made`: the instrument in the stress of a run, by its name.
+    `added`: what the instrument adds to the records of a run, by its name.
     """
 
     model: DeclaredModel  # the known part, nothing of it left to be fitted
     data: StudyData  # the runs that they learn from, without what the instrument did
-    flows: list[Flow]  # the flows in which their laws are simulated
-    shown: list[Flow]  # the same flows with the records as they are
-    made: Mapping[str, InRecord] = field(default_factory=dict)
+    flows: list[Flow]  # the flows in which their laws are simulated, with the records as they are
+    added: Mapping[str, Stresses] = field(default_factory=dict)
     effects: tuple[KnownEffect, ...] = ()  # of the instrument, taken out of the records
 
     def recorded(self, flow: Flow, stresses: Stresses | None) -> Stresses | None:
         """Return what would be recorded of the stresses in a flow."""
-        instrument = self.made.get(flow.name) if flow.kind in MEASURED else None
-        if stresses is None or instrument is None:
+        added = self.added.get(flow.name) if flow.kind in MEASURED else None
+        if stresses is None or added is None:
             return stresses
-        return {**stresses, "sigma12": instrument.recorded(stresses["sigma12"])}
+        return {quantity: values + added[quantity] for quantity, values in stresses.items()}
 
     def outcome(self, own: LearnerOutcome) -> LearnerOutcome:
         """Return a learner's outcome with predictions of the records."""
         predictions, bands = dict(own.predictions), dict(own.bands)
-        for flow in self.flows if self.made else ():
+        for flow in self.flows if self.added else ():
             predictions[flow.key] = self.recorded(flow, predictions[flow.key])
             limits = bands.get(flow.key)
             if limits is not None:
@@ -86,20 +85,12 @@ def known_part(
     known = tuple(model.effects)
     found = known if ended.verdict != "effects_added" else (*known, *_found(ended))
     try:
-        without, made = corrected(data, found)
-    except InputError:  # what was found has a memory, or the runs are of another kind
+        without, added = without_instrument(data, ended, found)
+    except InputError:  # the runs are of another kind
         found = known
-        without, made = corrected(data, known)
-    model = replace(model, effects=())
-    shown = comparison_flows(data, high_deborah, pipkin)
-    if not made:
-        return Frame(model, without, shown, shown, effects=found)
-    commanded = {run.name: run.protocol for run in data.dataset}
-    flows = [
-        replace(flow, commanded=commanded[flow.name]) if flow.kind in MEASURED else flow
-        for flow in comparison_flows(without, high_deborah, pipkin)
-    ]
-    return Frame(model, without, flows, shown, made, found)
+        without, added = without_instrument(data, ended, known)
+    flows = comparison_flows(data, high_deborah, pipkin)
+    return Frame(replace(model, effects=()), without, flows, added, found)
 
 
 def _with_values(declared: DeclaredModel, ended: Ended) -> DeclaredModel:

@@ -147,13 +147,13 @@ def compare(
         name=study.name,
         data_summary=f"{data_in_words(data, study)}{f'. {of_spikes}' if of_spikes else ''}",
         known_part=known_in_words(declared, frame, study),
-        flows=frame.shown,
+        flows=frame.flows,
         before=frame.alone(),
         outcomes=outcomes,
         posterior=titled(found.result(), study, data),
         shares={name: one.share for name, one in proposed.items()},
         lack_of_fit=lacks_of_fit(
-            outcomes, frame.shown, expectation_of(study, declared, data),
+            outcomes, frame.flows, expectation_of(study, declared, data),
             options.use_normal_stresses,
         ),
         truth=_truth(study, declared),
@@ -189,7 +189,7 @@ def _of_material(
     why = f"A {simple.material.title} has no law for it, and it was not measured."
     return Comparison(
         name=study.name, data_summary=data_in_words(data, study),
-        known_part=known_in_words(declared, Frame(declared, data, flows, flows), study),
+        known_part=known_in_words(declared, Frame(declared, data, flows), study),
         flows=flows, before=before, outcomes={},
         posterior=titled(simple, study, data), bands=bands,
         statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
@@ -211,10 +211,10 @@ def _with_what_is_open(
 ) -> Comparison:  # fmt: skip
     """Return a comparison with bands, classical laws, rivals, and what is determined."""
     if comparison.verdict == "no_signal":
-        statements = make_statements("no_signal", frame.shown, {}, None, {})
+        statements = make_statements("no_signal", frame.flows, {}, None, {})
         return replace(comparison, statements=statements)
     runs = {run.name: run for run in data.dataset}
-    drawn = [flow for flow in frame.shown if flow.kind in DRAWN]
+    drawn = [flow for flow in frame.flows if flow.kind in DRAWN]
     bands = flow_bands(found, drawn, runs)
     best = found.posterior.fits[0][0] if found.posterior.fits else None
     terms = None if best is None else terms_of(best, found)
@@ -231,7 +231,7 @@ def _with_what_is_open(
     others = explanations_apart(found, drawn, runs)
     spread = comparison.posterior.spread_of_laws
     statements = make_statements(
-        comparison.verdict, frame.shown, bands, structure,
+        comparison.verdict, frame.flows, bands, structure,
         {name: one.inside for name, one in spread.items()}, study.compare.use_normal_stresses,
         len(terms),
     )  # fmt: skip
