@@ -207,9 +207,9 @@ class Comparison(PageView, HasAnswer, SummaryView):
             yield "Laws that these data do not tell from the one found by sparse regression:"
             yield self.rivals_table()
 
-    def known_part_of(self, learner: str) -> Equation:
-        """Return the known part below what a learner found; upper convected Maxwell if unsaid."""
-        del learner  # the same for all
+    @property
+    def known_or_maxwell(self) -> Equation:
+        """The known part below what learners found; upper convected Maxwell if unsaid."""
         return self.known or Equation(())
 
     def equation(self, learner: str) -> Equation:

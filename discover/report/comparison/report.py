@@ -189,7 +189,7 @@ def _outline(
     def laws() -> Content:
         outcomes = comparison.outcomes.values()
         drawn = [
-            tables.law(outcome, linear_relaxation, comparison.known_part_of(outcome.learner))
+            tables.law(outcome, linear_relaxation, comparison.known_or_maxwell)
             for outcome in outcomes
         ]
         return {"laws": drawn, "standing": _STANDING[comparison.verdict]}
@@ -329,7 +329,7 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     """Return ``equations.tex``: the law that each learner found, with the known part below it."""
     parts = [PREAMBLE]
     for name, outcome in comparison.outcomes.items():
-        known = comparison.known_part_of(name)
+        known = comparison.known_or_maxwell
         terms = (*known.terms, *outcome.terms)
         named, note = known.named, ""
         if named is not None and not named.is_written:
