@@ -122,7 +122,7 @@ def _as_fitted(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
         parameters=declared.parameters | dict(zip(names, map(float, free), strict=True)),
         modulus=np.asarray(fluid.modulus), relaxation_time=np.asarray(fluid.relaxation_time),
         solvent_viscosity=float(fluid.solvent_viscosity),
-        effects=tuple(known for known in effects if known not in of_fluid), free=(),
+        effects=tuple(k for k in effects if not isinstance(k.effect, ConstitutiveEffect)), free=(),
     )  # fmt: skip
 
 
