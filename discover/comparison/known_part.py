@@ -105,6 +105,8 @@ def _as_fitted(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
     model, theta = ended.posterior.problem.model, ended.theta
     effects = (
         replace(known, values=tuple(map(float, theta[model.positions(known.name)])))
+        if known.free
+        else known
         for known in declared.effects
     )
     effects = [known for known in effects if known.values[0] != 0.0]  # else it is none
