@@ -78,7 +78,6 @@ class Proposed:
 
     terms: tuple[RecoveredTerm, ...]
     share: float = 0.0
-    fit: Fit | None = None  # the hypothesis; None where a term is none that the engine knows
 
 
 def with_proposals(
@@ -123,7 +122,7 @@ def with_proposals(
             proposed[learner] = Proposed(tuple(some))
             continue
         share = shares.get(keys[learner], 0.0)
-        proposed[learner] = Proposed(_refitted(some, fit, found), share, fit)
+        proposed[learner] = Proposed(_refitted(some, fit, found), share)
     return found, proposed
 
 

@@ -16,8 +16,9 @@ from discover.laws.each_mode import differs_by_mode
 from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
-from discover.study.data import StudyData
+from discover.study.data import StudyData, parse_study
 from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, spectra_of
+from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only tests: a data set of its own, or names of runs of the data set."""
@@ -91,6 +92,20 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
     return DeclaredModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+
+
+def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
+    """Return the study that would ask for the same with files.
+
+    `asked`: sections of it besides ``[data]``. `where`: the call, as an error names it.
+    """
+    source: dict[str, Any] = {"folder": data.name or "data in memory"}
+    if isinstance(data, SyntheticDataset) and data.truth is not None:
+        found = name_of(data.truth.law)
+        if found is not None:
+            made = {"law": found[0], "parameters": found[1], "noise": data.noise}
+            source = {"synthetic": made}
+    return parse_study({"data": source, **asked}, where)
 
 
 def with_known(

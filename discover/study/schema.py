@@ -14,7 +14,6 @@ from discover.errors import Problems
 from discover.laws.registry import ANY, LAWS, make_law, starting_value
 from discover.learners.registry import learner_names
 from discover.learners.settings import DEFAULT_DEGREE
-from discover.protocols.kinematics import FLOW_CLASSES, FlowClass
 from discover.validation import Section
 from discover.words import unknown_name
 from tensor_library.closed_forms import CLOSED_FORMS
@@ -78,39 +77,18 @@ class Library(Section):
     """Closed forms besides, such as `"exp"`."""
 
 
-class Sweep(Section):
-    """The same comparison again over laws and values of one parameter, as synthetic data.
-
-    The paper's study of linear and exponential PTT over the extensibility is one.
-    """
-
-    laws: Annotated[tuple[SyntheticLaw, ...], Field(min_length=1)]
-    """Laws that make the data."""
-    parameter: str
-    """Parameter that is varied."""
-    values: Annotated[tuple[float, ...], Field(min_length=1, max_length=20)]
-    """Its values."""
-
-
-Stress = Literal["sigma12", "N1", "N2"]
 Recorded = Literal[
     "sigma12", "tensile_stress", "N1", "N2", "strain", "storage_modulus", "loss_modulus"
 ]
 
 
 class NextExperiment(Section):
-    """What the user could measure next."""
+    """Oscillations that could be measured: errors in them are mapped where the truth is known."""
 
-    flows: Annotated[tuple[FlowClass, ...], Field(min_length=1)] = FLOW_CLASSES
-    """Classes of flow that could be measured."""
-    observe: Annotated[tuple[Stress, ...], Field(min_length=1)] = ("sigma12", "N1", "N2")
-    """What could be recorded."""
     weissenberg_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.5, 1.0, 2.0, 4.0)
     """Weissenberg numbers that could be reached."""
     deborah_numbers: Annotated[tuple[Positive, ...], Field(min_length=1)] = (0.25, 0.5, 1.0, 2.0)
     """Deborah numbers that could be reached."""
-    noise: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Relative noise of the next experiment."""
 
 
 class Compare(Section):
@@ -142,12 +120,8 @@ class Compare(Section):
     """Whether measured N1 and N2 are fitted too."""
     high_deborah: tuple[Positive, ...] = (1.5, 3.0, 6.0, 12.0)
     """Deborah numbers of the Lissajous figures."""
-    sweep: Sweep | None = None
-    """The same comparison over a parameter of synthetic data."""
-    distillation: bool = False
-    """Whether simpler laws are taught by the true one."""
     next: NextExperiment = NextExperiment()
-    """What could be measured next."""
+    """Oscillations over which errors are mapped where the truth is known."""
     laws: tuple[SyntheticLaw, ...] = ()
     """Named laws that are fitted to the same runs."""
     loading: Annotated[float, Field(gt=0, le=LARGEST)] | None = None

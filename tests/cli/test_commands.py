@@ -22,7 +22,7 @@ synthetic = { law = "giesekus", parameters = { alpha = 0.2 }, noise = 0.01, samp
 [compare]
 library = { degree = 0 }
 high_deborah = [1.5]
-next = { flows = ["laos"], weissenberg_numbers = [1.0, 2.0], deborah_numbers = [1.0] }
+next = { weissenberg_numbers = [1.0, 2.0], deborah_numbers = [1.0] }
 """
 
 
@@ -33,7 +33,7 @@ folder = "one"
 [compare]
 library = { degree = 0 }
 high_deborah = [1.5]
-next = { flows = ["laos"], weissenberg_numbers = [1.0], deborah_numbers = [1.0] }
+next = { weissenberg_numbers = [1.0], deborah_numbers = [1.0] }
 """
 
 

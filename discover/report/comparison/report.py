@@ -24,7 +24,6 @@ from discover.report.plots.comparison.selection import (
     high_deborah_picture,
     loss_picture,
     selection_picture,
-    sweep_picture,
 )
 from discover.report.plots.style import Picture
 from discover.report.predictions import PREDICTIONS, comparison_predictions, write_predictions
@@ -49,7 +48,6 @@ def comparison_pictures(comparison: Comparison) -> tuple[list[Drawn], list[Drawn
         ("The map of errors", partial(error_map_picture, comparison)),
         ("The picture of the selection", partial(selection_picture, details)),
         ("The picture of high Deborah numbers", partial(high_deborah_picture, comparison)),
-        ("The picture of the sweep", partial(sweep_picture, comparison)),
     ]
     loss = ("The picture of the loss", partial(loss_picture, comparison))
     return _drawn(found), _drawn([runs, loss] if comparison.judged else [loss])
@@ -186,7 +184,7 @@ def _outline(
     def laws() -> Content:
         outcomes = comparison.outcomes.values()
         drawn = [
-            tables.law(outcome, linear_relaxation, comparison.known_part_of(outcome.learner))
+            tables.law(outcome, linear_relaxation, comparison.known_or_maxwell)
             for outcome in outcomes
         ]
         return {"laws": drawn, "standing": _STANDING[comparison.verdict]}
@@ -265,13 +263,6 @@ def _outline(
         ("next", "What to measure next", "What to measure next"): [
             ("The table of experiments", "next", table("tests", tables.next_rows))
         ],
-        ("distillation", "Distillation: what a simpler law learns from this one", ""): [
-            (
-                "The table of distillations",
-                "distillation",
-                table("distillations", tables.distillations),
-            )
-        ],
         ("structure", "What these flows could tell of any law in the library", ""): [
             ("What the flows could tell", "structure", table("structure", tables.structure))
         ],
@@ -331,7 +322,7 @@ def equations_tex(comparison: Comparison, linear_relaxation: bool) -> str:
     """Return ``equations.tex``: the law that each learner found, with the known part below it."""
     parts = [PREAMBLE]
     for name, outcome in comparison.outcomes.items():
-        known = comparison.known_part_of(name)
+        known = comparison.known_or_maxwell
         terms = (*known.terms, *outcome.terms)
         named, note = known.named, ""
         if named is not None and not named.is_written:

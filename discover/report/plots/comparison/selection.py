@@ -168,61 +168,6 @@ def high_deborah_picture(comparison: Comparison) -> Picture | None:
     return row_of_panels("high_deborah", caption, panels, 9.0, 2.8) if panels else None
 
 
-def sweep_picture(comparison: Comparison) -> Picture | None:
-    """Return stress in the test flow, and errors, over the swept parameter."""
-    points = comparison.sweep
-    if not points:
-        return None
-    from discover.laws.registry import LAWS
-    from discover.report.plots.style import TRUTH_STYLE
-
-    laws = list(dict.fromkeys(p.law for p in points))
-    values = list(dict.fromkeys(p.value for p in points))
-    stress_unit, _, rate_label = units(comparison)
-    with figure(len(laws), len(values) + 1, width=11.0, height=2.4) as (drawing, axes):
-        for row, law in zip(axes, laws, strict=True):
-            mine = [p for p in points if p.law == law]
-            for panel, point in zip(row, mine, strict=False):
-                late = point.flow.times > 0.75 * point.flow.times[-1]
-                rate = point.flow.rate[late]
-                truth = point.flow.reference["sigma12"][late]
-                panel.plot(rate, truth, label="truth", **TRUTH_STYLE)
-                for name, outcome in point.outcomes.items():
-                    prediction = outcome.predictions[point.flow.key]
-                    if prediction is not None:
-                        panel.plot(
-                            rate,
-                            prediction["sigma12"][late],
-                            label=learner_title(name),
-                            **learner_style(name),
-                        )
-                panel.set_title(f"{readable(point.parameter)} = {point.value:g}")
-                panel.set_xlabel(rate_label)
-            row[0].set_ylabel(f"{LAWS[law].title}\nσ₁₂{stress_unit}")
-            for name in mine[0].outcomes:
-                for quantity, marker in (("sigma12", "o"), ("N1", "^")):
-                    errors = [p.errors()[name][quantity] for p in mine]
-                    row[-1].semilogy(
-                        [p.value for p in mine],
-                        [np.nan if e is None else 100.0 * max(e, 1e-8) for e in errors],
-                        marker=marker,
-                        markersize=4,
-                        color=learner_style(name)["color"],
-                        label=f"error, {'σ₁₂' if quantity == 'sigma12' else 'N₁'}, "
-                        f"{learner_title(name)}",
-                    )
-            row[-1].set_title("error in this flow (%)")
-            row[-1].set_xlabel(readable(points[0].parameter))
-        legend_above(drawing, axes, columns=4)
-        return picture(
-            drawing,
-            "sweep",
-            f"The comparison again over {readable(points[0].parameter)}, "
-            f"in {points[0].flow.title}: late Lissajous curves of σ₁₂, and on the right the "
-            "relative errors of σ₁₂ and N₁.",
-        )
-
-
 _STRONGEST = 0.55  # more would drown the number in the cell
 _TOLD = 10.0  # a larger relative error is no more than that in a cell
 _LOWEST, _HIGHEST = 1e-4, 1.0
