@@ -16,7 +16,7 @@ from discover.learners.settings import known_part
 from discover.progress import Progress, checked, silent
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.study.in_memory import HeldOut, data_in_memory, declared_fluid, joined, with_known
 from discover.study.schema import Study
 
@@ -134,7 +134,7 @@ def compare(
 
 
 def _study(
-    data: StudyData, model: DeclaredModel, options: Mapping[str, Any], tolerance: float
+    data: StudyData, model: StudyModel, options: Mapping[str, Any], tolerance: float
 ) -> Study:
     """Return the study that would ask for the same with files."""
     source: dict[str, Any] = {"folder": data.dataset.name or "data in memory"}

@@ -22,7 +22,7 @@ from discover.errors import InputError
 from discover.laws.registry import make_law
 from discover.loop.from_posterior import Ended
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 
 _INSIDE = 1e-3
 """Least share of its interval by which an instant is away from a sample."""
@@ -35,7 +35,7 @@ class Frame:
     `made`: the instrument in the stress of a run, by its name.
     """
 
-    model: DeclaredModel  # the known part, nothing of it left to be fitted
+    model: StudyModel  # the known part, nothing of it left to be fitted
     data: StudyData  # the runs that they learn from, without what the instrument did
     flows: list[Flow]  # the flows in which their laws are simulated
     shown: list[Flow]  # the same flows with the records as they are
@@ -70,7 +70,7 @@ class Frame:
 
 
 def known_part(
-    declared: DeclaredModel,
+    declared: StudyModel,
     ended: Ended,
     data: StudyData,
     high_deborah: tuple[float, ...],
@@ -102,7 +102,7 @@ def known_part(
     return Frame(model, without, flows, shown, made, found)
 
 
-def _with_values(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
+def _with_values(declared: StudyModel, ended: Ended) -> StudyModel:
     """Return the declared model with numbers for what was to be fitted."""
     model, theta = ended.posterior.problem.model, ended.fit.theta
     parameters = dict(declared.parameters)

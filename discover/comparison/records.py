@@ -31,7 +31,7 @@ from discover.laws.textbook.classical import UpperConvectedMaxwell
 from discover.loop.task import require_possible
 from discover.protocols.protocol import FlowProtocol
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from tensor_library.law_terms import LawTerms
 
 ONLY_LOOP = (
@@ -42,7 +42,7 @@ ONLY_LOOP = (
 _RATES = (1.0, 2.0)
 
 
-def absorbed(declared: DeclaredModel) -> DeclaredModel:
+def absorbed(declared: StudyModel) -> StudyModel:
     """Return the declared model with known effects of the fluid in its law, modes and solvent.
 
     Its other effects are of the instrument. Raises InputError if learners cannot take an effect.
@@ -67,8 +67,8 @@ def absorbed(declared: DeclaredModel) -> DeclaredModel:
 
 
 def _with_effect(
-    declared: DeclaredModel, known: KnownEffect, effect: ConstitutiveEffect
-) -> DeclaredModel:
+    declared: StudyModel, known: KnownEffect, effect: ConstitutiveEffect
+) -> StudyModel:
     values = jnp.asarray([value for value in known.values if value is not None])
     assert len(values) == len(known.values)  # what was to be fitted has a value by now
     terms = effect.as_terms([float(value) for value in values])

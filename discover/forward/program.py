@@ -23,10 +23,10 @@ from discover.forward.flows import (
     TransientFlows,
 )
 from discover.forward.periodic_states import PHASE, first_harmonic
-from discover.forward.records import Records
 from discover.forward.side_by_side import (
     Asked,
     Kernel,
+    MadeOnce,
     PeriodicCode,
     PeriodicSideBySide,
     SideBySide,
@@ -40,9 +40,6 @@ from discover.forward.side_by_side import (
 from discover.laws import LAWS
 from discover.programs.threads import on_device
 from discover.protocols.kinematics import Kinematics, normal_stress_differences
-
-# Runs of which it is known whether vectors choose their steps in them
-_KEPT = 8
 
 
 class Program:
@@ -65,7 +62,8 @@ class Program:
         build = LAWS[structure.law_name].build if structure.free_parameters else None
         self._made_from = (structure, build)
         self._kernels: dict[Any, Any] = {}
-        self._known_parts: list[tuple[TransientFlows, bool]] = []
+        # whether runs have intervals in which vectors choose their steps
+        self._chooses_steps = MadeOnce(lambda part: bool(np.any(intervals(part)[0] > 1)))
 
     def side_by_side(self, numbers: Numbers, part: Flows) -> Any:
         """Return what predicts many vectors of runs of one control at once."""
@@ -106,21 +104,6 @@ class Program:
             return StressSideBySide(self.fluid, code, self._driven_with_series, made_from)
         kernel = code_of(Kernel, *given, **choices)
         return SideBySide(self.fluid, kernel, self._rates, self._at_samples, made_from)
-
-    def _chooses_steps(self, part: TransientFlows) -> bool:
-        """Return whether runs have intervals in which vectors choose their steps."""
-        for known, chooses in self._known_parts:
-            if known is part:
-                return chooses
-        found = bool(np.any(intervals(part)[0] > 1))
-        self._known_parts = [*self._known_parts[1 - _KEPT :], (part, found)]
-        return found
-
-    def are_judged_by_modes(self, thetas: Float[np.ndarray, "trials p"]) -> np.ndarray:
-        """Return whether nothing alters each record after the modes, or gives way in series."""
-        after = (*self._signal, *self.fluid.series)
-        at = [self.fluid.slices[effect.name].start for effect in after]
-        return ~np.any(thetas[:, at], axis=1)
 
     def _rates(self, theta, present, run: TransientFlows):
         """Return the felt rate at half steps and the tool's at steps, by the effects present."""
@@ -311,20 +294,10 @@ program_of = lru_cache(maxsize=16)(Program)
 
 
 class Trials(NamedTuple):
-    """Parameter vectors side by side, and the moduli and the limit of each."""
+    """Parameter vectors side by side, and the moduli of each."""
 
     thetas: Float[np.ndarray, "trials p"]
     moduli: Float[np.ndarray, "trials c"]
-    limits: Float[np.ndarray, " trials"]
-
-    def taken(self, which: np.ndarray) -> "Trials":
-        """Return some of them."""
-        return Trials(*(each[which] for each in self))
-
-
-_Piece = tuple[Flows, Records | None, int]
-"""Flows that a program follows at once, what judges them on the way, and how many of the runs are
-no padding."""
 
 
 class Predictor:
@@ -336,7 +309,8 @@ class Predictor:
     def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
+        # runs as a program takes them
+        self._in_shared_shape = MadeOnce(lambda part: part.in_shared_shape())
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -384,42 +358,24 @@ class Predictor:
         """Return the records of a part, and if `whole` what `Asked` says; sweeps have no more."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
-            found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)
-            return found[..., None]
+            return _of_sweeps(self._of_runs(trials, part, 0, False), batch.moduli)[..., None]
         if not isinstance(part, TransientFlows):
-            return self._of_piece(trials, (part, None, 0), whole)
-        found = self._of_piece(trials, self._piece(part, batch, batch.rows[number]), whole)
+            return self._of_runs(trials, part, 0, whole)
         runs, samples = part.sample_index.shape
-        return found[:, :runs, :samples]
+        return self._of_runs(trials, self._in_shared_shape(part), runs, whole)[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once."""
         return self.of_every_effect.side_by_side(self._numbers, part)
 
-    def _of_piece(
-        self, trials: Trials, piece: _Piece, whole: bool
+    def _of_runs(
+        self, trials: Trials, part: Flows, runs: int, whole: bool
     ) -> Float[np.ndarray, "trials runs *n_and_kinds"]:
-        program, (part, judging, runs) = self.program, piece
-        judged = program.are_judged_by_modes(trials.thetas)
-        trials = trials._replace(limits=np.where(judged, trials.limits, np.inf))
         here, there, at_rest = self._beside_every_effect
         vectors = np.tile(at_rest, (len(trials.thetas), 1))
         vectors[:, there] = trials.thetas[:, here]
-        beside = trials._replace(thetas=vectors)
-        asked = Asked(self._numbers, *beside, part=part, judging=judging, runs=runs, whole=whole)
+        asked = Asked(self._numbers, vectors, trials.moduli, part, runs, whole)
         return self.side_by_side(part).predict(asked)
-
-    def _piece(self, part: TransientFlows, batch: Batch, rows: Sequence[int]) -> _Piece:
-        """Return runs, and what judges them, as a program takes them, laid out once."""
-        for known, records, piece in self._laid_out:
-            if known is part and records is batch.records:
-                return piece
-        flows = part.in_shared_shape()
-        judging = batch.records.of_runs(rows, part.sample_index.shape[1])
-        piece = flows, judging.padded(*flows.sample_index.shape), len(rows)
-        self._laid_out.append((part, batch.records, piece))
-        del self._laid_out[:-_KEPT]
-        return piece
 
 
 def _of_sweeps(

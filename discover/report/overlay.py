@@ -12,8 +12,7 @@ from discover.comparison.flows import QUANTITIES, Flow, predict
 from discover.dataset import Dataset
 from discover.dataset.tables.table import read_table, shown
 from discover.errors import InputError
-from discover.forward import AugmentedModel, make_batch
-from discover.forward import DeclaredModel as ForwardDeclared
+from discover.forward import AugmentedModel, DeclaredModel, make_batch
 from discover.laws import LAWS, Fluid, make_law
 from discover.loop import RunRecord
 from discover.study.schema import OverlayAsked, Study
@@ -110,7 +109,7 @@ def loop_overlays(
         by_name = {run.name: run for run in dataset}
         runs = [by_name[r.name].window(np.isin(by_name[r.name].time, r.time)) for r in records]
         model = AugmentedModel(
-            ForwardDeclared(
+            DeclaredModel(
                 fluid.law,
                 np.asarray(fluid.modulus),
                 np.asarray(fluid.relaxation_time),

@@ -17,7 +17,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
 """What only tests: a data set of its own, or names of runs of the data set."""
@@ -69,7 +69,7 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
     return Dataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
-def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
+def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study; None is Maxwell with G = 1 Pa, λ = 1 s.
 
     Where the modes are those of the data's linear sweep, the error of the sweep is known.
@@ -90,15 +90,15 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     name, parameters = name_of(base.law) or (own, {})
     modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
-    return DeclaredModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+    return StudyModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
 
 
 def with_known(
-    declared: DeclaredModel,
+    declared: StudyModel,
     effects: Mapping[str, Any] | None,
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
-) -> DeclaredModel:
+) -> StudyModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
     `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
