@@ -18,6 +18,7 @@ from discover.forward.declared import DeclaredModel, Structure
 from discover.forward.flows import Batch, PeriodicFlows, make_batch
 from discover.forward.grid import STRAIN_STEP, had_gone_on
 from discover.forward.program import Predictor, Trials, program_of
+from discover.forward.side_by_side import MadeOnce
 from discover.laws.each_mode import law_of_mode
 from discover.laws.expansion import in_shared_form
 from discover.laws.multimode import Fluid
@@ -57,7 +58,7 @@ def observed(fluids: Sequence[Fluid], batch: Batch) -> Float[np.ndarray, "fluids
 
     Not finite where a law runs away, or no state is reached.
     """
-    predictor, trials = _beside_each_other(fluids)
+    predictor, trials = _BESIDE(*fluids)
     out = np.zeros((len(fluids), *batch.recorded.shape, 3))
     for number, (part, rows) in enumerate(zip(batch.parts, batch.rows, strict=True)):
         found = predictor.of_part(trials, batch, number, normal=True)
@@ -83,7 +84,7 @@ def components(fluids: Sequence[Fluid], batch: Batch) -> Float[np.ndarray, "flui
 
     The structure variables stand behind, summed as if they were stresses.
     """
-    predictor, trials = _beside_each_other(fluids)
+    predictor, trials = _BESIDE(*fluids)
     size = 4 + fluids[0].law.variables
     out = np.zeros((len(fluids), *batch.recorded.shape, size))
     for number, rows in enumerate(batch.rows):
@@ -150,7 +151,7 @@ def pieces_in_time(fluid: Fluid, runs: Sequence[Run], strain_step: float, **how:
     return pieces if np.all(np.isfinite(coarse)) else 1
 
 
-def _beside_each_other(fluids: Sequence[Fluid]) -> tuple[Predictor, Trials]:
+def _beside_each_other(*fluids: Fluid) -> tuple[Predictor, Trials]:
     """Return what predicts fluids, and the vectors that they are to it."""
     laws = [in_shared_form(fluid.law) for fluid in fluids]
     if len({jax.tree.structure(law) for law in laws}) > 1:
@@ -164,6 +165,10 @@ def _beside_each_other(fluids: Sequence[Fluid]) -> tuple[Predictor, Trials]:
     moduli = [np.append(fluid.modulus, fluid.solvent_viscosity) for fluid in fluids]
     declared = DeclaredModel(laws[0], np.asarray(first.modulus), times[0])
     return Predictor(declared, program, program), Trials(thetas, np.array(moduli))
+
+
+# flows of the same fluids are often asked for one after another
+_BESIDE = MadeOnce(_beside_each_other, kept=2)
 
 
 def _numbers_of(law: Any) -> Float[np.ndarray, " numbers"]:

@@ -362,7 +362,11 @@ class Predictor:
         if not isinstance(part, TransientFlows):
             return self._of_runs(trials, part, 0, whole)
         runs, samples = part.sample_index.shape
-        return self._of_runs(trials, self._in_shared_shape(part), runs, whole)[:, :runs, :samples]
+        # without effects no program follows that others could share
+        shared = (
+            self._in_shared_shape(part) if self.of_every_effect.fluid.structure.effects else part
+        )
+        return self._of_runs(trials, shared, runs, whole)[:, :runs, :samples]
 
     def side_by_side(self, part: Flows) -> Any:
         """Return what predicts many vectors of a part at once."""

@@ -1,6 +1,7 @@
 """What is asked of many vectors of parameters at once, and how eights of lanes take it up."""
 
 from collections.abc import Callable, Iterable, Sequence
+from operator import is_
 from typing import Any, NamedTuple
 
 import jax
@@ -61,24 +62,20 @@ def flows_of(kinematics: Any) -> Float[np.ndarray, "runs numbers"]:
     return np.concatenate([leaf.reshape(len(leaf), -1) for leaf in leaves], axis=1)
 
 
-# Of the parts of batches from which something was made
-_KEPT = 8
-
-
 class MadeOnce:
-    """What is made of a part of a batch, once for each of the last few."""
+    """What is made of something, as parts of a batch, once for each of the `kept` last."""
 
-    def __init__(self, make: Callable[[Any], Any]):
-        self._make = make
-        self._known: list[tuple[Any, Any]] = []
+    def __init__(self, make: Callable[..., Any], kept: int = 8):
+        self._make, self._kept = make, kept
+        self._known: list[tuple[tuple, Any]] = []
 
-    def __call__(self, part: Any) -> Any:
-        """Return what was made of this very part."""
+    def __call__(self, *given: Any) -> Any:
+        """Return what was made of these very objects."""
         for known, made in self._known:
-            if known is part:
+            if len(known) == len(given) and all(map(is_, known, given)):
                 return made
-        made = self._make(part)
-        self._known = [*self._known[1 - _KEPT :], (part, made)]
+        made = self._make(*given)
+        self._known = [*self._known, (given, made)][-self._kept :]
         return made
 
 
