@@ -1,6 +1,7 @@
 """Predictions of parameter vectors: rates and signal in JAX, and the code that follows modes."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
+from discover.effects import AbstractEffect, KinematicEffect, RadialAverage, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.declared import DeclaredModel, Numbers, Structure
 from discover.forward.flows import (
@@ -21,6 +22,7 @@ from discover.forward.flows import (
     SteadyFlows,
     StressFlows,
     TransientFlows,
+    at_radius,
 )
 from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.side_by_side import (
@@ -57,6 +59,7 @@ class Program:
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
+        self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
@@ -309,8 +312,9 @@ class Predictor:
     def __init__(self, declared: DeclaredModel, program: Program, of_every_effect: Program):
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
-        # runs as a program takes them
+        # runs as a program takes them, and those at the radii of an average
         self._in_shared_shape = MadeOnce(lambda part: part.in_shared_shape())
+        self._inside = MadeOnce(_inside)
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -356,6 +360,26 @@ class Predictor:
         self, trials: Trials, batch: Batch, number: int, whole: bool = True
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records of a part, and if `whole` what `Asked` says; sweeps have no more."""
+        found = self._at_rim(trials, batch, number, whole)
+        for effect in self.program.averages:
+            share = trials.thetas[:, self.program.fluid.slices[effect.name].start]
+            flows, there = self._inside(batch, batch.parts[number], effect), np.flatnonzero(share)
+            if flows is None or not len(there):
+                continue
+            is_modulus = isinstance(batch.parts[number], PeriodicFlows)
+            weights = effect.of_modulus if is_modulus else effect.of_stress
+            some, rim = Trials(*(of[there] for of in trials)), found[there, ..., 0]
+            mean = weights[-1] * rim
+            for flow, weight in zip(flows, weights[:-1], strict=True):
+                if weight:  # a modulus on the axis has none, and no strain to be measured by
+                    mean = mean + weight * self._at_rim(some, flow, number, False)[..., 0]
+            found[there, ..., 0] = rim + share[there, None, None] * (mean - rim)
+        return found
+
+    def _at_rim(
+        self, trials: Trials, batch: Batch, number: int, whole: bool
+    ) -> Float[np.ndarray, "trials rows n kinds"]:
+        """Return the records of a part without what averages over radii."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
             return _of_sweeps(self._of_runs(trials, part, 0, False), batch.moduli)[..., None]
@@ -380,6 +404,15 @@ class Predictor:
         vectors[:, there] = trials.thetas[:, here]
         asked = Asked(self._numbers, vectors, trials.moduli, part, runs, whole)
         return self.side_by_side(part).predict(asked)
+
+
+def _inside(batch: Batch, part: Flows, effect: RadialAverage) -> list[Batch] | None:
+    """Return the flows of a part at each radius below the rim; None where there are none."""
+    inside = [at_radius(part, radius) for radius in effect.radii[:-1]]
+    if any(one is None for one in inside):
+        return None
+    parts = [[one if of is part else of for of in batch.parts] for one in inside]
+    return [replace(batch, parts=tuple(own)) for own in parts]
 
 
 def _of_sweeps(
