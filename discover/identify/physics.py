@@ -111,7 +111,9 @@ def see(
     found = physics_flows.trajectories(
         fluid, [*protocols, *beyond.protocols], [*times, *beyond.times]
     )
-    along, in_cycles = map(found.some, np.split(np.arange(len(found.observed)), [len(protocols)]))
+    count = len(protocols)
+    along = found.some(range(count))
+    in_cycles = found.some(range(count, len(found.observed)))
     work = beyond.work([observed[:, 0] for observed in in_cycles.observed])
     return Seen(fluid, weissenberg, deborah, along, beyond, in_cycles, work)
 
