@@ -22,7 +22,7 @@ from discover.protocols.protocol import TEST_DURATION, TRAINING_DURATION, strain
 from discover.simulate.solve import ShearStress, SimulationError, observe, simulate
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from tensor_library.law_terms import LawTerm
 
 QUANTITIES = ("sigma12", "N1", "N2")
@@ -350,7 +350,7 @@ def with_runs(data: StudyData, change: Callable[[Iterable[Run]], Iterable[Run]])
     return replace(data, **parts)
 
 
-def require_one_known_law(declared: DeclaredModel) -> None:
+def require_one_known_law(declared: StudyModel) -> None:
     """Refuse a known part that only a closed loop can have."""
     if declared.choice:
         raise InputError(

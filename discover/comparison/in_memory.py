@@ -14,7 +14,7 @@ from discover.learners.run_prediction import RunPrediction
 from discover.learners.settings import known_part
 from discover.progress import Progress, checked, silent
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.study.in_memory import (
     HeldOut,
     data_in_memory,
@@ -139,7 +139,7 @@ def compare(
 
 
 def _study(
-    data: StudyData, model: DeclaredModel, options: Mapping[str, Any], tolerance: float
+    data: StudyData, model: StudyModel, options: Mapping[str, Any], tolerance: float
 ) -> Study:
     known = {"known_relaxation": bool(model.law.linear_relaxation)}
     asked = {"model": known, "compare": dict(options), "verdict": {"tolerance": tolerance}}

@@ -25,7 +25,7 @@ from discover.loop.final_model import augmented_fluid
 from discover.loop.from_posterior import Ended
 from discover.loop.task import require_possible
 from discover.study.data import StudyData
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 
 _INSIDE = 1e-3
 """Least share of its interval by which an instant is away from a sample."""
@@ -38,7 +38,7 @@ class Frame:
     `added`: what the instrument adds to the records of a run, by its name.
     """
 
-    model: DeclaredModel  # the known part, nothing of it left to be fitted
+    model: StudyModel  # the known part, nothing of it left to be fitted
     data: StudyData  # the runs that they learn from, without what the instrument did
     flows: list[Flow]  # the flows in which their laws are simulated, with the records as they are
     added: Mapping[str, Stresses] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class Frame:
 
 
 def known_part(
-    declared: DeclaredModel,
+    declared: StudyModel,
     ended: Ended,
     data: StudyData,
     high_deborah: tuple[float, ...],
@@ -96,7 +96,7 @@ def known_part(
     return Frame(replace(model, effects=()), without, flows, added, found)
 
 
-def _as_fitted(declared: DeclaredModel, ended: Ended) -> DeclaredModel:
+def _as_fitted(declared: StudyModel, ended: Ended) -> StudyModel:
     """Return the declared model with numbers for what was fitted.
 
     Its effects of the fluid are in its law, modes and solvent then, and the others are of the

@@ -12,14 +12,14 @@ from discover.laws import Fluid, UpperConvectedMaxwell
 from discover.learners.registry import BUILT_IN, LearningTask, learn_with
 from discover.learners.results import LearnerResult
 from discover.progress import Progress, silent
-from discover.study.declared_model import DeclaredModel
+from discover.study.declared_model import StudyModel
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from tensor_library.library import TermLibrary, build_library
 
 
 def train(
-    learner: str, study: Study, model: DeclaredModel, runs: Sequence[Run], seed: int = 0,
+    learner: str, study: Study, model: StudyModel, runs: Sequence[Run], seed: int = 0,
     progress: Progress = silent,
 ) -> tuple[LearnerResult, Fluid]:  # fmt: skip
     """Return what one learner finds in these runs, and the fluid that it makes.

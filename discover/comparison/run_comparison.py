@@ -39,7 +39,7 @@ from discover.loop.task import Task
 from discover.progress import Progress, silent
 from discover.protocols.kinematics import in_words
 from discover.study.data import StudyData, load_study_data
-from discover.study.declared_model import DeclaredModel, declared_model, forward_model
+from discover.study.declared_model import StudyModel, declared_model, forward_model
 from discover.study.run_folder import RunFolder
 from discover.study.schema import Study
 from discover.words import counted
@@ -65,7 +65,7 @@ def data_in_words(data: StudyData, study: Study) -> str:
     return f"{runs} computed from the {law} law, {noise}"
 
 
-def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
+def known_in_words(declared: StudyModel, frame: Frame, study: Study) -> str:
     """Return what was known before, and what was fitted with the likeliest hypothesis."""
     text = _law_and_modes(frame.model, study)
     if declared.free_constants:
@@ -76,7 +76,7 @@ def known_in_words(declared: DeclaredModel, frame: Frame, study: Study) -> str:
     return f"{text}. {declared.source}".rstrip(" .") if declared.source else text
 
 
-def _law_and_modes(model: DeclaredModel, study: Study) -> str:
+def _law_and_modes(model: StudyModel, study: Study) -> str:
     if not study.model.known_relaxation:
         return "upper convected Maxwell without its relaxation term (a purely elastic solid)"
     named = LAWS.get(model.law_name)
@@ -93,7 +93,7 @@ def _law_and_modes(model: DeclaredModel, study: Study) -> str:
 def compare(
     study: Study, seed: int | None = None, progress: Progress = silent,
     store: RunFolder | None = None, *, data: StudyData | None = None,
-    declared: DeclaredModel | None = None,
+    declared: StudyModel | None = None,
     made: Mapping[str, tuple[LearnerResult, Fluid]] | None = None,
     library: TermLibrary | None = None,
 ) -> Comparison:  # fmt: skip
@@ -169,7 +169,7 @@ def compare(
 
 
 def _of_material(
-    simple: LoopResult, study: Study, data: StudyData, declared: DeclaredModel, seed: int
+    simple: LoopResult, study: Study, data: StudyData, declared: StudyModel, seed: int
 ) -> Comparison:
     """Return the comparison for a yield stress, a viscous fluid or a solid: no learner is asked."""
     assert simple.material is not None
@@ -241,7 +241,7 @@ def _with_what_is_open(
     )  # fmt: skip
 
 
-def _truth(study: Study, model: DeclaredModel) -> tuple[LawTerm, ...] | None:
+def _truth(study: Study, model: StudyModel) -> tuple[LawTerm, ...] | None:
     synthetic = study.data.synthetic
     if synthetic is None or model.law_name != "ucm":
         return None

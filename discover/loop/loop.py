@@ -30,8 +30,7 @@ from discover.loop.simple import inelastic_result, simple_result
 from discover.loop.task import Say, Task
 from discover.progress import STATES, Progress, by_time
 from discover.study.data import StudyData, temperature
-from discover.study.declared_model import DeclaredModel as Declared
-from discover.study.declared_model import forward_model
+from discover.study.declared_model import StudyModel, forward_model
 from discover.study.schema import Study
 from discover.words import counted
 
@@ -105,7 +104,7 @@ def run_loop(
 def run_study(
     study: Study,
     data: StudyData,
-    declared: Declared,
+    declared: StudyModel,
     progress: Progress | None = None,
     effects: Sequence[str | AbstractEffect] | str | None = None,
 ) -> LoopResult:
@@ -143,7 +142,7 @@ def titled(result: LoopResult, study: Study, data: StudyData) -> LoopResult:
     return replace(result, title=title, tolerance=study.verdict.tolerance, temperature_C=at)
 
 
-def _described(result: LoopResult, study: Study, data: StudyData, declared: Declared) -> str:
+def _described(result: LoopResult, study: Study, data: StudyData, declared: StudyModel) -> str:
     """Return the data and the declared model in words."""
     dataset, window = data.dataset, study.loop.strain
     strain = "" if window is None else f", strain {window[0]:g} to {window[1]:g}"

@@ -17,7 +17,7 @@ from discover.laws.multimode import Fluid
 from discover.laws.registry import check_law, name_of
 from discover.simulate.synthetic import SyntheticDataset
 from discover.study.data import StudyData, parse_study
-from discover.study.declared_model import MODE_CONSTANTS, DeclaredModel, spectra_of
+from discover.study.declared_model import MODE_CONSTANTS, StudyModel, spectra_of
 from discover.study.schema import Study
 
 HeldOut = Dataset | Sequence[str] | Literal["each"]
@@ -70,7 +70,7 @@ def joined(data: Dataset, more: Sequence[Run]) -> Dataset:
     return Dataset(data.name, runs, data.linear_sweep, data.provenance)
 
 
-def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
+def declared_fluid(base: Any, data: Dataset) -> StudyModel:
     """Return a `Fluid` as the declared model of a study; None is Maxwell with G = 1 Pa, λ = 1 s.
 
     Where the modes are those of the data's linear sweep, the error of the sweep is known.
@@ -91,7 +91,7 @@ def declared_fluid(base: Any, data: Dataset) -> DeclaredModel:
     name, parameters = name_of(base.law) or (own, {})
     modes = np.asarray(base.modulus), np.asarray(base.relaxation_time)
     solvent = float(base.solvent_viscosity)
-    return DeclaredModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
+    return StudyModel(base.law, name, parameters, *modes, (), _spectrum(data, base), solvent)
 
 
 def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Study:
@@ -109,11 +109,11 @@ def study_in_memory(data: Dataset, asked: Mapping[str, Any], where: str) -> Stud
 
 
 def with_known(
-    declared: DeclaredModel,
+    declared: StudyModel,
     effects: Mapping[str, Any] | None,
     free: Sequence[str] = (),
     by_mode: Sequence[str] = (),
-) -> DeclaredModel:
+) -> StudyModel:
     """Return a declared model with effects known beside it, and with what is to be fitted of it.
 
     `effects`: as ``[model] effects``. `by_mode`: which of them may differ from mode to mode. Raises
