@@ -150,7 +150,7 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
         f"{f'; known effects: {known}' if known else ''}. "
         f"{f'{model.source} ' if model.source else ''}{dataset.left_out} {dataset.thinned}"
     ).strip()
-    conditions = material_and_temperature(dataset, study.data.material)
+    conditions = material_and_temperature(dataset, study.data.material, dataset.name)
     overlays = loop_overlays(sources, result.records, dataset, model.fluid)
     write_loop(
         result, folder, study.name, summary, study.text, conditions=conditions, overlays=overlays

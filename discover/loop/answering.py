@@ -16,7 +16,6 @@ from discover.answer import (
 from discover.answer.answer import EMPIRICAL
 from discover.answer.naming import named_law
 from discover.answer.simple_material import SimpleMaterial
-from discover.dataset.run import TEMPERATURE
 from discover.effects.base import EffectParameter
 from discover.effects.registry import parameters_of
 from discover.equations import Equation, law_parts
@@ -120,13 +119,8 @@ def _shift_factors(records: Sequence[RunRecord]) -> dict[float, float]:
     Relaxation times there over those at the temperature to which runs were shifted: times of the
     instrument over those of the law.
     """
-    found = {}
-    for record in records:
-        told = (record.conditions.get(key) for key in TEMPERATURE)
-        at = next((one for one in told if one is not None), None)
-        end = len(record.time) - 1
-        if at is not None and record.time[end] != record.instrument_time[end]:
-            found[float(round(at))] = float(record.instrument_time[end] / record.time[end])
+    shifted = [record for record in records if record.shift != 1.0]
+    found = {one.temperature_C: one.shift for one in shifted if one.temperature_C is not None}
     return dict(sorted(found.items(), reverse=True))
 
 
@@ -297,7 +291,22 @@ def _law_first(values: Mapping[str, float], found: Sequence[Constant]) -> list[C
 def _of_stage(result: Any, stage: Stage) -> tuple[Constant, ...]:
     """Return the constants of an effect that was added, with letters that no other has."""
     letters = result.letters.get(stage.effect, {})
-    return _constants(stage.parameters, stage.left_open, stage.effect, letters)
+    found = _constants(stage.parameters, stage.left_open, stage.effect, letters)
+    if stage.kind != "constitutive" or stage.effect in (*LAW_OF_EFFECT, *STRUCTURES):
+        return found
+    first, *others = found
+    meaning = "; ".join(filter(None, [first.said, f"odds for it {_odds(stage.evidence)}"]))
+    return replace(first, meaning=meaning), *others
+
+
+def _odds(evidence: float) -> str:
+    """Return odds for an effect that was added, of twice their logarithm."""
+    odds = float(np.exp(min(0.5 * evidence, 10.0)))
+    return f"> {_SURE}:1" if odds > _SURE else f"{significant(odds, 2)}:1"
+
+
+_SURE = 1000
+"""Odds from which on more say no more."""
 
 
 def _constants(

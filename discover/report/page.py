@@ -16,21 +16,22 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup, escape
 
 from discover._version import __version__
-from discover.answer import Answer, Constant, ExpectedError, Suspect
+from discover.answer import Answer, Constant, Suspect
 from discover.answer.sentences import (
     FEW_MODES,
     NOT_SEPARABLE,
     SUSPECTED,
     SYMBOLS,
     as_constant,
+    behind,
     degrees,
     error_title,
     expected,
-    further,
     in_order,
     is_a_set,
     law,
     linear_part,
+    note,
     quality,
     reduced_to,
     separable,
@@ -182,6 +183,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if answer is None:
         return None
     found: dict[str, Any] = {
+        "title": answer.title or answer.instead.partition(":")[0].lower(),
         "headline": _unbroken(law(answer)),
         "quality": _unbroken(quality(answer)),
         "level": LEVEL,
@@ -191,13 +193,12 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
-        "lines": list(map(_unbroken, further(answer))),
+        "behind": _unbroken(behind(answer)),
         "next_test": _unbroken(answer.next_test),
     }  # fmt: skip
     if not answer.title:
         return found
     solvent = answer.solvent_viscosity_Pa_s
-    rows = [(symbol, answer.expected(name)) for name, symbol in SYMBOLS.items()]
     symbols = [one.symbol for one in answer.constants]
     if (answer.equation or answer.shown) is not None:
         # terms as the equation in Pa and s has them: over the stress of a mode in units of G
@@ -223,7 +224,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "set": is_a_set(answer),
         "suspects": [_suspected(one, separable(answer)) for one in answer.suspects],
         "suspected": SUSPECTED.lower() + _clock(answer),
-        "expected": _expected(rows) + _worst(answer),
+        "expected": _expected(answer) + _worst(answer),
         "modes": [
             tuple(as_constant(answer, one) for one in (mode.modulus_Pa, mode.relaxation_time_s))
             for mode in in_order(answer)
@@ -243,21 +244,24 @@ def _clock(answer: Answer) -> str:
 
 
 def _said(one: Constant) -> str:
-    """Return what a constant is, and that its value is at an end of what is physical."""
-    return "; ".join(filter(None, [one.said, "at its physical limit" if one.at_limit else ""]))
+    """Return what a constant is, and that its value is at an end of what is possible."""
+    skewed = "at an end of its interval" if one.is_skewed or one.bound else ""
+    at_end = "at its physical limit" if one.at_limit else skewed
+    return "; ".join(filter(None, [one.said, at_end]))
 
 
-def _expected(rows: Sequence[tuple[str, ExpectedError]]) -> list[dict[str, Any]]:
+def _expected(answer: Answer) -> list[dict[str, Any]]:
     """Return the rows of expected errors; quantities that nothing is known of share one."""
     found: list[dict[str, Any]] = []
-    for symbol, one in rows:
+    for name, symbol in SYMBOLS.items():
+        one = answer.expected(name)
         row = {
             "symbol": symbol,
             "inside": _in_cell(expected(one, "inside")),
             "beyond": _in_cell(expected(one, "beyond")),
             "beyond_at": _unbroken(one.beyond_at) if one.beyond is not None else "",
             "known": one.is_known,
-            "note": _unbroken(one.note),
+            "note": _unbroken(note(answer, name)),
         }
         if found and not one.is_known and found[-1] == row | {"symbol": found[-1]["symbol"]}:
             found[-1]["symbol"] += f", {symbol}"
@@ -339,7 +343,12 @@ def _explained(text: str) -> Markup:
 
 
 def _in_cell(text: str) -> str:
-    """Return a number that breaks between a power of ten and its unit, or an interval before it."""
+    """Return a number that breaks between a power of ten and its unit, or an interval before it.
+
+    Words without a number break anywhere.
+    """
+    if not any(map(str.isdigit, text)):
+        return text
     whole = _unbroken(text).replace(" ", "\N{NO-BREAK SPACE}").replace(")\N{NO-BREAK SPACE}", ") ")
     return re.sub("(×\N{NO-BREAK SPACE}10[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]+)\N{NO-BREAK SPACE}", r"\1 ", whole)
 
