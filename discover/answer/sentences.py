@@ -229,8 +229,8 @@ def _rates(one: Any) -> str:
     """Return the rates of a range, and the frequencies of what oscillates."""
     found = [] if one.rate_1_s is None else [f"{span(one.rate_1_s)} 1/s"]
     if (frequencies := one.frequency_rad_s) is not None:
-        alone = "oscillating at " * (frequencies[0] == frequencies[1])
-        found.append(f"{alone}{span(frequencies)} rad/s")
+        several = any(sign in (told := span(frequencies)) for sign in ("–", " to "))
+        found.append(f"{'' if several else 'oscillating at '}{told} rad/s")
     return ", ".join(found)
 
 
