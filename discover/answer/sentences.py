@@ -92,14 +92,14 @@ _MOST_SHIFTS = 3
 
 
 def shifted(answer: Any) -> str:
-    """Return to which temperature times and rates were shifted, and how far; empty if not."""
+    """Return at which temperature times hold, and what shortens them; empty where nothing does."""
     if not answer.shift_factors:
         return ""
     said = [
         f"{shortened(float(factor))} at {degrees(at)} (a_T = {significant(factor, 3)})"
         for at, factor in shifts(answer)
     ]
-    return f"Times and rates are reduced to {reduced_to(answer)}; times are {', '.join(said)}."
+    return f"Moduli and times are those at {reduced_to(answer)}; times are {', '.join(said)}."
 
 
 def is_a_set(answer: Any) -> bool:

@@ -204,7 +204,7 @@ def test_shift_factors_are_times_over_those_at_the_reference_and_stand_with_the_
     factors = {-10.0: 1.0 / 131.234, -23.0: 1.0 / 14.771}
     shifted = replace(MELT, temperature_C=-35.0, shift_factors=factors)
     assert (
-        "Times and rates are reduced to −35 °C; times are 131 times shorter at −10 °C "
+        "Moduli and times are those at −35 °C; times are 131 times shorter at −10 °C "
         "(a_T = 0.00762), 14.8 times shorter at −23 °C (a_T = 0.0677)."
     ) in shifted.lines
     assert "0.003–3 1/s reduced to −35 °C." in shifted.headline
