@@ -43,6 +43,8 @@ class Answer:
     `written`: a law that is no `equation`, by format: ``latex``, ``python``, ``formula`` (LaTeX
         alone; of a law that is `shown`, what its h holds besides).
     `alternative`: what comes next to this law, one short sentence; empty where it is settled.
+    `best_classical`: the best law of the field with its constants, and its error, where this law
+        has no name.
 
     Examples
     --------
@@ -76,6 +78,7 @@ class Answer:
     written: Mapping[str, str] = field(default_factory=dict, repr=False)
     failed: str = ""  # a test that the law failed, one short sentence; empty where none
     alternative: str = ""
+    best_classical: tuple[str, float] | None = None
     instead: str = ""  # first line where there is no law to use, such as for pure noise
     tolerance: float = TOLERANCE  # relative discrepancy that is good enough
     temperature_C: float | None = None

@@ -6,8 +6,8 @@ from typing import Any
 
 from discover.words import LEVEL, counted, effect_title, listed, percent_of, significant
 
-_MOST_CONSTANTS = 3
-"""Constants that a first line names; the table has all."""
+_MOST_WORDS, _MOST_CONSTANTS = 60, 3
+"""Words of the first lines, and constants that they name where these allow it."""
 
 SYMBOLS = {"sigma12": "σ12", "N1": "N1", "N2": "N2", "uniaxial": "uniaxial extension"}
 """Quantities as text writes them."""
@@ -27,18 +27,32 @@ def headline(answer: Any) -> str:
 
 
 def quality(answer: Any) -> str:
-    """Return what follows the law: how well it describes, what else there is, where to use it."""
-    near = answer.alternative if answer.is_empirical else ""
-    return " ".join(filter(None, [description(answer), answer.failed, where(answer), near]))
+    """Return what follows the law: how well it describes, and where to use it."""
+    return " ".join(filter(None, [description(answer), answer.failed, where(answer)]))
 
 
 _LEVEL = f"{LEVEL} "
 
 
 def law(answer: Any) -> str:
-    """Return the law by name with its constants; without one, what stands in its place."""
+    """Return the law by name with its constants; without one, what stands in its place.
+
+    As many constants as leave the first lines short; the table has all.
+    """
     if not answer.title:
         return answer.instead
+    rest = " ".join([quality(answer), answer.alternative, answer.next_test])
+    told = [_law(answer, most) for most in range(_MOST_CONSTANTS, 0, -1)]
+    return next((one for one in told if words(f"{one} {rest}") <= _MOST_WORDS), told[-1])
+
+
+def words(text: str) -> int:
+    """Return how many words a text has; numbers are some, signs are none."""
+    return sum(any(map(str.isalnum, one)) for one in text.split())
+
+
+def _law(answer: Any, most: int) -> str:
+    """Return the law by name with at most so many of its constants."""
     title = answer.title[:1].upper() + answer.title[1:]
     # of a sum without a name the table has the constants; there moduli and times come first
     several = len(answer.modes) > 1
@@ -48,7 +62,7 @@ def law(answer: Any) -> str:
     ]  # fmt: skip
     own = sorted(own, key=lambda one: (one.name in _OF_MODES) is (answer.law is not None))
     certain = [one for one in own if one.determined and not one.is_wide]
-    named = constants(certain[:_MOST_CONSTANTS])
+    named = constants(certain[:most])
     if several and not answer.is_empirical:
         named.append(counted(len(answer.modes), "mode"))
     elif answer.modes and not several and not own and not _is_plain(answer):
@@ -56,7 +70,8 @@ def law(answer: Any) -> str:
         named = [f"G = {significant(mode.modulus_Pa, 3)} Pa"]
         named.append(f"λ = {significant(mode.relaxation_time_s, 3)} s")
     if answer.temperature_C is not None:
-        named.append(f"at {degrees(answer.temperature_C)}")
+        what = "times " if answer.shift_factors else ""  # the rates of use are not at this one
+        named.append(f"{what}at {degrees(answer.temperature_C)}")
     return f"{', '.join([title, *named])}."
 
 
@@ -344,6 +359,9 @@ def suspects(answer: Any) -> str:
     return f"{SUSPECTED}: {names}{'' if separable(answer) else f', {NOT_SEPARABLE}'}."
 
 
+CLASSICAL = "Best classical law"
+"""What stands before a law of the field that comes next to a sum without a name."""
+
 SUSPECTED = "Suspected in the measurement, not part of the law"
 """Heading of effects of the instrument and of the flow in the gap."""
 
@@ -354,11 +372,6 @@ NOT_SEPARABLE = "sizes not separable"
 def separable(answer: Any) -> bool:
     """Return whether the runs give each suspect a size of its own."""
     return len(answer.suspects) < 2 or all(one.is_separate for one in answer.suspects)
-
-
-def behind(answer: Any) -> str:
-    """Return what stands below the table: the law that comes next."""
-    return "" if answer.is_empirical else answer.alternative
 
 
 def lines(answer: Any) -> list[str]:
@@ -377,6 +390,9 @@ def lines(answer: Any) -> list[str]:
         if (worst := worst_run(answer)) is not None:
             parts.append("worst run {}, {}".format(*worst))
         found.append(f"{error_title(answer)}: {'; '.join(parts)}.")
-    found += [shifted(answer), suspects(answer), behind(answer)]
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        found.append(f"{CLASSICAL}: {near}, error {percent_of(error)}.")
+    found += [shifted(answer), suspects(answer), answer.alternative]
     found.append(f"Next: {answer.next_test}" if answer.next_test else "")
     return [line for line in found if line]

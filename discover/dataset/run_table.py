@@ -121,14 +121,15 @@ def temperature_of(runs: Iterable[Run]) -> float | None:
 def material_and_temperature(runs: Iterable[Run], material: str = "", otherwise: str = "") -> str:
     """Material (a study's, or of runs.csv) and temperature of runs in words, if told.
 
-    `otherwise`: what stands for the material where nobody told it.
+    `otherwise`: what stands for the material where nobody told one or two.
     """
     names, temperatures = [], set()
     for run in runs:
         names += [str(run.metadata[key]) for key in _MATERIAL if run.metadata.get(key)][:1]
         temperatures |= set() if run.temperature_C is None else {round(run.temperature_C, 0)}
-    told = [material] if material else list(dict.fromkeys(names))
-    parts = told or [otherwise] * bool(otherwise)
+    parts = [material] if material else list(dict.fromkeys(names))
+    if otherwise and not 0 < len(parts) <= 2:
+        parts = [otherwise]
     if len(parts) > 2:  # names of fillings or files, which say nothing in a title
         parts = [f"{len(parts)} samples"]
     spelled = [f"{value:.0f}".replace("-", "−") for value in sorted(temperatures)]

@@ -100,6 +100,7 @@ def loop_answer(result: Any) -> Answer:
         tuple(Suspect(stage.effect, _of_stage(result, stage)) for stage in suspected(result)),
         failed=_failed(result),
         alternative=_alternative(result),
+        best_classical=_best_classical(result),
         tolerance=result.tolerance,
         temperature_C=result.temperature_C,
         shift_factors=_shift_factors(result.records),
@@ -190,23 +191,24 @@ def _failed(result: Any) -> str:
 
 
 def _alternative(result: Any) -> str:
-    """Return what comes next: a law of the field for a sum without a name, or the next likeliest.
-
-    Empty where the law is settled.
-    """
+    """Return which explanation is the next likeliest; empty where the law is settled."""
     told = result.explanations
     own = told.holding([stage.effect for stage in result.stages])
     if result.verdict in EXPLAINED and own is not None and own.probability < _SETTLED:
         others = [effects_title(one.effects) for one in told.likeliest_first if one is not own]
         after = f"; next: {others[0] or 'the declared model'}" if others else ""
         return f"Probability of this law {percent_of(own.probability)}{after}."
-    if result.nearest_law is None:
-        return ""
-    near = result.nearest_law
+    return ""
+
+
+def _best_classical(result: Any) -> tuple[str, float] | None:
+    """Return the best law of the field, in words, and its error, for a sum without a name."""
+    if (near := result.nearest_law) is None:
+        return None
     constants = [Constant(name, one.value, one.ci95) for name, one in near.constants.items()]
     said = [LAWS[near.law].title, *(f"{one.symbol} = {one.number}" for one in constants)]
     maximum = " (flow curve with a maximum)" if _has_maximum(near) else ""
-    return f"Best classical law: {', '.join(said)}{maximum}, error {percent_of(near.size)}."
+    return f"{', '.join(said)}{maximum}", near.size
 
 
 _MAXIMUM = {"giesekus": ("alpha", 0.5), "johnson_segalman": ("xi", 0.0)}

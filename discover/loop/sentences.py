@@ -139,7 +139,7 @@ def _of_another_stress(result: Any) -> str:
             thick = stress is None or stress >= _LEAST_TENSILE_VISCOSITY * rate
             in_reach = thick and rate <= _FASTEST_EXTENSION
         if in_reach and measured(result.records, kind, None) is None:
-            apart_by = f"laws that fit as well differ in it by {percent_of(apart)}"
+            apart_by = f"equally good laws differ by {percent_of(apart)}"
             return f"{title} at {_fastest(shear)}: {apart_by}."
     return ""
 

@@ -18,12 +18,12 @@ from markupsafe import Markup, escape
 from discover._version import __version__
 from discover.answer import Answer, Constant, Suspect
 from discover.answer.sentences import (
+    CLASSICAL,
     FEW_MODES,
     NOT_SEPARABLE,
     SUSPECTED,
     SYMBOLS,
     as_constant,
-    behind,
     degrees,
     error_title,
     expected,
@@ -48,7 +48,16 @@ from discover.plain_numbers import json_text
 from discover.report.mathtext import formula
 from discover.report.plots.style import style_sheet
 from discover.report.wording import percent, percent_range
-from discover.words import LEVEL, effect_title, estimate, interval, listed, readable, significant
+from discover.words import (
+    LEVEL,
+    effect_title,
+    estimate,
+    interval,
+    listed,
+    percent_of,
+    readable,
+    significant,
+)
 
 _CALCULATES = ("numpy", "scipy", "jax", "diffrax", "optimistix", "optax", "pysindy")
 
@@ -183,7 +192,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
     if answer is None:
         return None
     found: dict[str, Any] = {
-        "title": answer.title or answer.instead.partition(":")[0].lower(),
+        "title": (answer.title or answer.instead.lower()).partition(":")[0],
         "headline": _unbroken(law(answer)),
         "quality": _unbroken(quality(answer)),
         "level": LEVEL,
@@ -193,7 +202,7 @@ def answer_screen(answer: Answer | None) -> dict[str, Any] | None:
         "expected": (), "modes": (), "linear": "", "few": 0, "solvent": "", "set": False,
         "copies": (), "missing": "",
         "copied": "Copy as" if answer.classical is None else "Copy the best classical law as",
-        "behind": _unbroken(behind(answer)),
+        "behind": _unbroken(answer.alternative),
         "next_test": _unbroken(answer.next_test),
     }  # fmt: skip
     if not answer.title:
@@ -271,13 +280,16 @@ def _expected(answer: Answer) -> list[dict[str, Any]]:
 
 
 def _worst(answer: Answer) -> list[dict[str, Any]]:
-    """Return the row of the run that is missed most, if by more than the tolerance."""
-    worst = worst_run(answer)
-    if worst is None:
-        return []
-    note, error = worst
-    return [{"symbol": "worst run", "inside": _in_cell(error), "beyond": "", "beyond_at": "",
-             "known": True, "note": note}]  # fmt: skip
+    """Return the rows of the run that is missed most, if it is, and of the best classical law."""
+    told = [] if (worst := worst_run(answer)) is None else [("worst run", *worst)]
+    if answer.best_classical is not None:
+        near, error = answer.best_classical
+        told.append((CLASSICAL.lower(), near, percent_of(error)))
+    return [
+        {"symbol": symbol, "note": _unbroken(note), "inside": _in_cell(error), "beyond": "",
+         "beyond_at": "", "known": True}
+        for symbol, note, error in told
+    ]  # fmt: skip
 
 
 def _suspected(one: Suspect, separable: bool) -> tuple[str, str, str, str]:

@@ -147,7 +147,7 @@ def test_next_comes_the_suspect_then_the_open_stress_then_the_worst_run_again():
     assert told.startswith("To confirm edge fracture, ")
     assert told.endswith("watch the edge; repeat with another cone.")
     told = what_to_measure_next(result(FITTED))
-    assert told == "Measure N1 at 1 1/s: laws that fit as well differ in it by 60 %."
+    assert told == "Measure N1 at 1 1/s: equally good laws differ by 60 %."
     normal = record("slow", 0.1, 0.05, quantity="N1")
     assert "uniaxial extension" in what_to_measure_next(result([*FITTED, normal]))
     # a normal stress that no transducer resolves is not asked for, one of twice the least is
@@ -177,7 +177,7 @@ def test_shifted_runs_are_told_by_the_rates_and_temperatures_of_the_measurement(
     assert told.by_temperature[-10.0].rate_1_s == pytest.approx((10.0, 100.0))
     found = result([*fitted, *cold])
     assert errors_by_quantity(found)["sigma12"].beyond_at == "measured at 20–50 1/s at −23 °C"
-    assert what_to_measure_next(found).startswith("Measure N1 at 100 1/s and −10 °C: laws")
+    assert what_to_measure_next(found).startswith("Measure N1 at 100 1/s and −10 °C: equally")
     # what was not shifted, or has no known temperature, is told as it is
     assert not range_of(FITTED).by_temperature
     assert not range_of([*fitted, FITTED[0]]).by_temperature

@@ -16,6 +16,7 @@ from discover.equations.spelling.plain_signs import plain
 from discover.errors import InputError
 from discover.loop.constants import StageParameter
 from discover.loop.parts import NearestLaw
+from discover.report.page import answer_screen
 from discover.study.schema import Verdict
 from discover.validation import validated
 from tensor_library.law_terms import LawTerm
@@ -91,7 +92,7 @@ def test_shifted_runs_have_their_range_at_the_temperatures_of_the_measurement():
         MELT, temperature_C=-35.0, shift_factors={-10.0: 1.0 / 131.2},
         range=replace(MELT.range, by_temperature={-10.0: hot, -23.0: cold}),
     )  # fmt: skip
-    assert "2 modes, at −35 °C. " in shifted.headline
+    assert "2 modes, times at −35 °C. " in shifted.headline
     assert "Use for σ12 only, 0.01–3 1/s at −10 °C and 1–5 1/s at −23 °C." in shifted.headline
     assert shifted.use["range"]["rate_1_s"] == [0.003, 3.0]  # that of the moduli and times
     assert shifted.use["range"]["by_temperature_C"]["-10"]["rate_1_s"] == [0.01, 3.0]
@@ -180,14 +181,14 @@ def test_the_reciprocal_of_a_rate_is_told_as_the_rate():
 
 
 def test_a_sum_without_a_name_is_an_empirical_fit_with_the_classical_law_behind_it():
-    law = "Best classical law: Giesekus, α = 0.74, error 15 %."
-    named = replace(MELT, alternative=law)
-    fit = replace(named, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None)
+    fit = replace(MELT, title="empirical fit: linear PTT with tr(σ) σ·σ", law=None,
+                  best_classical=("Giesekus, α = 0.74", 0.15))  # fmt: skip
     assert fit.headline.startswith("Empirical fit: linear PTT with tr(σ) σ·σ. Error: unseen")
     assert "Use for σ12 only" in fit.headline
-    assert fit.headline.endswith(law)  # where to use it is said of the fit
-    assert fit.lines.count(law) == 0
-    assert law in named.lines
+    assert "Best classical law: Giesekus, α = 0.74, error 15 %." in fit.lines
+    *_, row = answer_screen(fit)["expected"]
+    assert (row["symbol"], row["note"]) == ("best classical law", "Giesekus, α\xa0=\xa00.74")
+    assert row["inside"] == "15\xa0%"
 
 
 @pytest.mark.parametrize(("alpha", "told"), [(0.49, False), (0.51, True)])
@@ -204,8 +205,9 @@ def test_a_best_classical_law_whose_flow_curve_has_a_maximum_says_so(alpha, told
     near = NearestLaw(
         "giesekus", {"alpha": StageParameter(alpha, (0.0, 1.0), "1")}, 0.18, Equation(())
     )
-    said = replace(loop_result(), verdict="unexplained", nearest_law=near).answer.alternative
-    assert ("(flow curve with a maximum)" in said) is told
+    said = replace(loop_result(), verdict="unexplained", nearest_law=near).answer
+    assert said.best_classical is not None
+    assert ("(flow curve with a maximum)" in said.best_classical[0]) is told
 
 
 def test_a_maxwell_fluid_with_a_structure_is_called_thixotropic():

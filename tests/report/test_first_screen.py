@@ -38,10 +38,23 @@ def test_the_tolerance_says_whether_it_is_met_where_and_for_what(asked, adequate
 
 
 def test_the_first_lines_have_at_most_sixty_words():
+    def count(screen):
+        prose = [screen["headline"], screen["quality"], screen["behind"], screen["next_test"]]
+        return sum(any(c.isalnum() for c in one) for one in " ".join(prose).split())
+
+    # constants give way to what else there is to say
+    others = [Constant(name, 1.0, (0.9, 1.1), "Pa s") for name in ("k_b", "t_b")]
+    long = replace(
+        MELT, constants=(*MELT.constants, *others), title="linear PTT with Newtonian part",
+        suspects=(*MELT.suspects, Suspect("wall_slip")), failed="Not tested in transients.",
+        next_test="Measure N1 at 3 1/s and 160 °C: equally good laws differ by 40 %.",
+    )  # fmt: skip
+    assert count(answer_screen(long)) <= 60
+    assert "ε = 0.82" in long.headline
+    assert "k b" not in long.headline
+    assert "k b" in replace(long, next_test="", suspects=(), failed="").headline
     screen = answer_screen(MELT)
-    prose = [screen["headline"], screen["quality"], screen["behind"], screen["next_test"]]
-    words = [one for one in " ".join(prose).split() if any(c.isalnum() for c in one)]
-    assert len(words) <= 60  # numbers are words too
+    assert count(screen) <= 60  # numbers are words too
     page = render("answer.html", screen=screen)
     order = ("Linear PTT", "Next:", "<math", "answer-table", 'id="modes"', "data-copy")
     places = [page.index(text) for text in order]
@@ -67,11 +80,10 @@ def test_the_level_of_the_intervals_is_said_once():
     assert (
         declared.headline.count("(95 % CI 3.90–4.10)") == 1
     )  # α has no interval that could say it
-    behind = replace(MELT, alternative="Best classical law: Giesekus, α = 0.74 (95 % CI 0.7–0.8).")
-    screen = answer_screen(behind)
+    screen = answer_screen(MELT)
     said = " ".join([screen["headline"], screen["quality"], screen["behind"]])
     # of constants once, of an error always
-    assert said.count("(95") == 3
+    assert said.count("(95") == 2
 
 
 def test_a_law_that_cannot_be_written_out_leaves_the_best_classical_one_to_copy():
