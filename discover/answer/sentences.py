@@ -94,7 +94,8 @@ def shifts(answer: Any) -> list[tuple[float, float]]:
 
 def reduced_to(answer: Any) -> str:
     """Return the temperature to which times and rates of shifted runs were reduced."""
-    return "one temperature" if answer.temperature_C is None else degrees(answer.temperature_C)
+    at = answer.temperature_C
+    return "the reference temperature" if at is None else degrees(at)
 
 
 def shortened(factor: float) -> str:
