@@ -85,18 +85,12 @@ class Range:
 
     def to_json(self) -> dict[str, Any]:
         """Return the range as result files hold it."""
-        found: dict[str, Any] = {
-            "weissenberg": self.weissenberg,
-            "deborah": self.deborah,
-            "strain": self.strain,
-            "rate_1_s": self.rate_1_s,
-            "frequency_rad_s": self.frequency_rad_s,
-            "flows": self.flows,
-        }
-        if self.by_temperature:
-            measured = {f"{at:g}": one.to_json() for at, one in self.by_temperature.items()}
-            found["by_temperature_C"] = measured
-        return found
+        own = {key: one for key, one in vars(self).items() if key not in _NOT_WRITTEN}
+        measured = {f"{at:g}": one.to_json() for at, one in self.by_temperature.items()}
+        return own | {"by_temperature_C": measured} if measured else own
+
+
+_NOT_WRITTEN = ("oscillates", "by_temperature")
 
 
 @dataclass(frozen=True)
