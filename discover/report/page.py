@@ -315,7 +315,7 @@ def _not_there(copies: Sequence[Mapping[str, str]]) -> str:
 
 
 _TOGETHER = re.compile(
-    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/)|(?<=Pa) (?=s)"
+    r" (?=[=≤≥<] )|(?<=[=≤≥<]) |(?<=\d) (?=(?:%|Pa|1/|s|rad/s|modes?)\b|%|1/|°C)|(?<=Pa) (?=s)"
     r"|(?<=[\d)⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=×|1/|Pa|s\b|%)|(?<=×) |(?<=% CI) |(?<=%) (?=CI\b)|(?<=\() "
 )
 
