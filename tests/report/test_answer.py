@@ -244,3 +244,16 @@ def test_a_yield_stress_fluid_says_where_it_flows():
     assert "no flow up to a stress of 12 Pa" in found.written((), 0.01, 1e3)["python"]
     newtonian = material_of("newtonian", (2.0,), [(1, 3)], 0.01)
     assert ">" not in newtonian.formula
+
+
+@pytest.mark.parametrize(("evidence", "told"), [(40.0, "> 1000:1"), (2.0 * np.log(12.0), "12:1")])
+def test_an_effect_that_is_added_to_a_law_says_its_odds(evidence, told):
+    result = loop_result()
+    names = ("giesekus_mobility", "relaxation_mode")
+    stages = tuple(
+        replace(result.stages[0], effect=one, kind="constitutive", evidence=evidence)
+        for one in names
+    )
+    law, added = replace(result, stages=stages, declared_law=Equation(())).answer.constants[-2:]
+    assert "odds" not in law.said  # the law has a name of its own
+    assert f"odds for it {told}" in added.said
