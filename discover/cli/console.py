@@ -235,7 +235,10 @@ def _fail(message: str, code: int) -> None:
     raise typer.Exit(code)
 
 
-StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
+StudyArgument = Annotated[
+    Path,
+    typer.Argument(help="Study file (TOML); discover data import writes one.", show_default=False),
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]
