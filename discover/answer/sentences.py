@@ -26,24 +26,28 @@ def headline(answer: Any) -> str:
     return " ".join(filter(None, [law(answer), quality(answer)]))
 
 
+def law(answer: Any) -> str:
+    """Return the law by name with its constants; without one, what stands in its place."""
+    return _first_lines(answer)[0]
+
+
 def quality(answer: Any) -> str:
     """Return what follows the law: how well it describes, and where to use it."""
-    return " ".join(filter(None, [description(answer), answer.failed, where(answer)]))
+    return _first_lines(answer)[1]
+
+
+def _first_lines(answer: Any) -> tuple[str, str]:
+    """Return both, as short as need be: what gives way is in the table."""
+    told = "", ""
+    for most, brief in ((_MOST_CONSTANTS, False), (2, False), (1, False), (1, True)):
+        parts = description(answer, brief), answer.failed, where(answer)
+        told = _law(answer, most), " ".join(filter(None, parts))
+        if words(" ".join([*told, answer.alternative, answer.next_test])) <= _MOST_WORDS:
+            break
+    return told
 
 
 _LEVEL = f"{LEVEL} "
-
-
-def law(answer: Any) -> str:
-    """Return the law by name with its constants; without one, what stands in its place.
-
-    As many constants as leave the first lines short; the table has all.
-    """
-    if not answer.title:
-        return answer.instead
-    rest = " ".join([quality(answer), answer.alternative, answer.next_test])
-    told = [_law(answer, most) for most in range(_MOST_CONSTANTS, 0, -1)]
-    return next((one for one in told if words(f"{one} {rest}") <= _MOST_WORDS), told[-1])
 
 
 def words(text: str) -> int:
@@ -53,6 +57,8 @@ def words(text: str) -> int:
 
 def _law(answer: Any, most: int) -> str:
     """Return the law by name with at most so many of its constants."""
+    if not answer.title:
+        return answer.instead
     title = answer.title[:1].upper() + answer.title[1:]
     # of a sum without a name the table has the constants; there moduli and times come first
     several = len(answer.modes) > 1
@@ -132,8 +138,11 @@ def is_a_set(answer: Any) -> bool:
 _OF_MODES = ("modulus_Pa", "relaxation_time_s", "modulus_factor", "relaxation_time_factor")
 
 
-def description(answer: Any) -> str:
-    """Return how well the law describes the runs, corrected for what, and if that is enough."""
+def description(answer: Any, brief: bool = False) -> str:
+    """Return how well the law describes the runs, corrected for what, and if that is enough.
+
+    `brief`: without what the table has.
+    """
     if not answer.title:
         return ""
     noise = "" if answer.noise is None else percent_of(answer.noise)
@@ -148,36 +157,37 @@ def description(answer: Any) -> str:
         one = answer.expected("sigma12")
         if not found.unseen:  # of fitted runs it is no error that a prediction could have
             said = _OF_FITTED + size
-        elif one.beyond is not None and one.beyond_at.startswith(MEASURED_AT):
+        elif one.beyond is not None and one.beyond_at.startswith(MEASURED_AT) and not brief:
             said = f"Error: {found.unseen} {size}, faster ones {_at_most(one.beyond)}"
         else:
             said = f"Error: {found.unseen} {size}"
         # an error below the noise is known no better than that
         said += f"; noise {noise}" if noise and answer.noise > found.size else ""
-    parts = [", ".join(filter(None, [said, _corrected(answer)])), tolerance(answer)]
+    parts = [", ".join(filter(None, [said, _corrected(answer, brief)])), tolerance(answer, brief)]
     return f"{'; '.join(filter(None, parts))}." if said else ""
 
 
 _OF_FITTED = "Residual of the fitted runs "
 
 
-def _corrected(answer: Any) -> str:
+def _corrected(answer: Any, brief: bool) -> str:
     """Return what of the instrument the errors were corrected for; empty where for nothing."""
     names = [effect_title(one.effect) for one in answer.suspects]
-    told = listed(names) if len(names) <= _MOST_SUSPECTS else f"{len(names)} measurement errors"
+    few = len(names) <= (1 if brief else _MOST_SUSPECTS)
+    told = listed(names) if few else f"{len(names)} measurement errors"
     return f"corrected for suspected {told}" if names else ""
 
 
 _MOST_SUSPECTS = 2
 
 
-def tolerance(answer: Any) -> str:
-    """Return whether the tolerance is met by σ12, and in how many runs it is not."""
+def tolerance(answer: Any, brief: bool = False) -> str:
+    """Return whether the tolerance is met, and unless `brief`, in how many runs it is not."""
     if answer.adequate is None:
         return ""
     over, every = len(_over_tolerance(answer)), len(_by_run(answer))
     missed = f"missed in {over} of {counted(every, 'run')}"
-    state = missed if over else "met" if answer.adequate else "missed"
+    state = missed if over and not brief else "met" if answer.adequate else "missed"
     return f"tolerance {percent_of(answer.tolerance)} {state}"
 
 

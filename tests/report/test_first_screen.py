@@ -53,6 +53,15 @@ def test_the_first_lines_have_at_most_sixty_words():
     assert "ε = 0.82" in long.headline
     assert "k b" not in long.headline
     assert "k b" in replace(long, next_test="", suspects=(), failed="").headline
+    # then what the table has, of a sum whose name is long
+    sums = replace(
+        long, title="empirical fit: linear PTT with strain damping, convective constraint release, "
+        "added mode, Newtonian part and tr(σ) σ·σ", law=None, failed="", expected_error={
+            **MELT.expected_error, "sigma12": ExpectedError(0.06, 0.2, "measured at 9 1/s")},
+    )  # fmt: skip
+    assert count(answer_screen(sums)) <= 60
+    assert "faster ones" not in sums.headline
+    assert "faster ones" in replace(sums, title="linear PTT", suspects=()).headline
     screen = answer_screen(MELT)
     assert count(screen) <= 60  # numbers are words too
     page = render("answer.html", screen=screen)
