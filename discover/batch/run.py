@@ -112,7 +112,7 @@ def _close_loop(study: Study, seed: int | None, folder: RunFolder, part: Progres
     declared = declared_model(study, data.dataset)
     result = run_study(study, data, declared, part)
     part("drawing", 1.0)
-    conditions = material_and_temperature(data.dataset, study.data.material)
+    conditions = material_and_temperature(data.dataset, study.data.material, data.dataset.name)
     write_loop(result, folder, study.name, result.described, study.text, conditions=conditions)
     return result.answer.lines
 

@@ -256,7 +256,10 @@ def number(text: str, where: str) -> float:
     return float(text)
 
 
-StudyArgument = Annotated[Path, typer.Argument(help="Study file (TOML).", show_default=False)]
+StudyArgument = Annotated[
+    Path,
+    typer.Argument(help="Study file (TOML); discover data import writes one.", show_default=False),
+]
 OutOption = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; default: results/STUDY.")
 ]

@@ -213,7 +213,8 @@ def shift(
 @guarded
 def import_data(
     files: Annotated[
-        list[Path] | None, typer.Argument(help="Exported files, with one or more tests in each.")
+        list[Path] | None,
+        typer.Argument(help="Exported files, with one or more tests in each, or a folder of them."),
     ] = None,
     out: NewFolderOption = None,
     mapping: Annotated[

@@ -84,9 +84,13 @@ def _degrees(text: str) -> float:
 def sources_of(
     mapping: Mapping, path: Path | None, files: Sequence[Path]
 ) -> tuple[list[Path], list[str]]:
-    """Return the files to import, or else those of the mapping file, and which have changed."""
+    """Return the files to import, or else those of the mapping file, and which have changed.
+
+    A folder stands for the files in it.
+    """
     if files or path is None:
-        return list(files), []
+        each = (sorted(one.glob("[!.]*.*")) if one.is_dir() else [one] for one in files)
+        return [one for own in each for one in own], []
     found: list[Path] = []
     changed = []
     remedy = f"Correct [[source]] in {path.name}, or put the file there."

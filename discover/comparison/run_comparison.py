@@ -161,7 +161,9 @@ def compare(
         seed=learning.seed,
         known=known_equation(frame.model),
         known_effects=frame.effects,
-        conditions=material_and_temperature(data.dataset, study.data.material),
+        conditions=material_and_temperature(
+            data.dataset, study.data.material, data.dataset.name
+        ),
     )  # fmt: skip
     comparison = _with_what_is_open(comparison, found, frame, data, study, library)
     progress("done", 1.0)
@@ -193,7 +195,9 @@ def _of_material(
         flows=flows, before=before, outcomes={},
         posterior=titled(simple, study, data), bands=bands,
         statements=[Statement(quantity, "no", why) for quantity in ("N1", "N2")], seed=seed,
-        conditions=material_and_temperature(data.dataset, study.data.material),
+        conditions=material_and_temperature(
+            data.dataset, study.data.material, data.dataset.name
+        ),
     )  # fmt: skip
 
 

@@ -86,8 +86,9 @@ def resolve_folder(folder: str | Path, base: str | Path | None) -> Path:
         )
     else:
         why = (
-            f"The folder {said} has no {INDEX_FILE}. A data folder needs one, with a column "
-            f"'file' and one line a run, or one of the tables {', '.join(DATA_FILES[1:])}."
+            f"The folder {said} has no {INDEX_FILE}. Make a data folder of your files with: "
+            f"discover data import {said} --out FOLDER. Or write it, with a column 'file' and one "
+            f"line a run, or one of the tables {', '.join(DATA_FILES[1:])}."
         )
     raise InputError(why)
 
