@@ -74,11 +74,13 @@ def as_users_run_it() -> Iterator[None]:
 # files of a quarter of a minute and more, with slow tests or without, the longest first; what
 # shares programs stands apart, so that one worker finds what the other compiled
 _LONG = (
-    "test_notebooks.py", "test_commands.py", "test_contract_script.py",
-    "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
-    "test_comparison.py", "test_estimators.py", "test_reports.py", "test_rolie_poly_blend.py",
-    "test_modulus_errors.py", "test_flows_of_fluids.py",
-    "test_constants_by_mode.py", "test_loop.py", "test_law_choice.py",
+    "test_notebooks.py", "test_engine_worlds.py", "test_many_vectors.py", "test_import.py",
+    "test_reports.py", "test_kills_and_clusters.py", "test_transducers.py", "test_posterior.py",
+    "test_commands.py", "test_hostile_rules.py", "test_contract_script.py", "test_named_law.py",
+    "test_packages_left_out.py", "test_constants_by_mode.py", "test_loop.py", "test_pages.py",
+    "test_structure.py", "test_tbnn_training.py", "test_tensor_sindy_estimator.py",
+    "test_comparison.py", "test_estimators.py", "test_rolie_poly_blend.py",
+    "test_modulus_errors.py", "test_flows_of_fluids.py", "test_law_choice.py",
 )  # fmt: skip
 
 
@@ -97,10 +99,12 @@ _KNOWN_TO = ("0.10",)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Import what tests need where they run; compile without optimising if slow ones are left out.
+    """Import what tests need where they run; compile sooner if slow ones are left out.
 
     Most programs of the others run for milliseconds, and LLVM takes longer over them than they do.
-    A release runs the slow ones too, compiled as users have them.
+    So nothing is optimised, and code holds the effects that a model asks for and not all that
+    another may ask for, which takes a tenth of the time (`code_of_every_effect` for what is said of
+    that). A release runs the slow ones too, compiled as users have them.
     """
     if _compiles_soon(config):
         os.environ["XLA_FLAGS"] = f"{_COMPILED_SOON} {os.environ.get('XLA_FLAGS', '')}".strip()
@@ -109,6 +113,7 @@ def pytest_configure(config: pytest.Config) -> None:
         if _compiles_soon(config):
             # of a law in three modes the code runs as fast, and takes half of the time to make
             importlib.import_module("discover.programs.lanes.machine_code")._LEVELS = 0, 1
+            fewer_hypotheses.code_of_what_is_asked()
 
 
 def _leaves_tests_to_workers(config: pytest.Config) -> bool:
@@ -169,6 +174,13 @@ def without_curves() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("discover.loop.loop.free_functions", lambda posterior: [])
         yield
+
+
+@pytest.fixture
+def code_of_every_effect(monkeypatch) -> None:
+    """Let code hold every effect, as users have it, whatever a model asks for."""
+    every = importlib.import_module("discover.effects").built_in_effects()
+    monkeypatch.setattr(fewer_hypotheses, "ALSO", set(every))
 
 
 @pytest.fixture(scope="module")

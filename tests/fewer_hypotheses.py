@@ -1,4 +1,4 @@
-"""Comparisons that try few effects, and pages without pictures, where these are not asked for."""
+"""Few effects to try, code of these alone, and pages without pictures, where more is not asked."""
 
 from collections.abc import Sequence
 
@@ -39,3 +39,20 @@ def without_pictures(patch: pytest.MonkeyPatch) -> None:
         if name.endswith(("_picture", "_map")) and name != "by_mode_picture":
             patch.setattr(report, name, lambda *_: None)
     patch.setattr("discover.report.comparison.report.comparison_pictures", lambda *_: ([], []))
+
+
+ALSO: set[str] = set()
+"""Names of effects that code holds beside those that a model asks for."""
+
+
+def code_of_what_is_asked() -> None:
+    """Let code hold the effects that a model asks for, in the same order, and not all there are."""
+    from discover.forward.declared import Structure
+
+    whole = Structure.with_every_effect
+
+    def with_these(structure: Structure) -> Structure:
+        every, names = whole(structure), {effect.name for effect in structure.effects} | ALSO
+        return every._replace(effects=tuple(e for e in every.effects if e.name in names))
+
+    Structure.with_every_effect = with_these

@@ -138,6 +138,7 @@ def counted(monkeypatch):
     return kernels, programs
 
 
+@pytest.mark.usefixtures("code_of_every_effect")
 def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
     batch, declared = make_batch(runs()), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
 
