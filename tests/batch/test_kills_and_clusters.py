@@ -332,16 +332,20 @@ def test_a_worker_killed_while_it_starts_does_not_end_the_batch_and_many_are_tol
 def test_a_study_that_kills_every_worker_is_given_up_and_the_others_are_not(
     studies, tmp_path, monkeypatch
 ):
+    # as soon as it is handed the study, and of the first before the worker has imported anything
     fatal = (
-        "import os, signal\nfrom discover.batch import run\nwhole = run._TASKS['compare']\n"
-        "def compare(path, *rest):\n"
-        "    path.stem == 'two' and os.kill(os.getpid(), signal.SIGKILL)\n"
-        "    return whole(path, *rest)\n"
-        "run._TASKS['compare'] = compare\n"
+        "import os, signal, sys\n"
+        "from itertools import chain\n"
+        "from types import SimpleNamespace\n"
+        "def jobs(lines):\n"
+        "    for job in lines:\n"
+        "        b'two' in job and os.kill(os.getpid(), signal.SIGKILL)\n"
+        "        yield job\n"
+        "given = jobs(sys.stdin.buffer)\n"
+        "sys.stdin = SimpleNamespace(buffer=chain([next(given)], given))\n"
     )
-    python, safe, option, code = worker_with_stand_in(tmp_path)
-    code = code.replace("from discover.batch.worker", fatal + "from discover.batch.worker")
-    monkeypatch.setattr(workers, "_COMMAND", [python, safe, option, code])
+    *python, code = worker_with_stand_in(tmp_path)
+    monkeypatch.setattr(workers, "_COMMAND", [*python, fatal + code])
     result = batch.run_batch(studies[:2], tmp_path / "out", workers=2)
     assert [s.status for s in result.studies] == ["done", "failed"]
     assert result.studies[1].text.startswith("Several workers died")

@@ -98,14 +98,13 @@ def test_every_text_flows_as_the_law_in_shear_and_in_extension(name):
             write_equation(equation(name), "rheotool")
     else:
         texts["rheotool"] = write_equation(equation(name), "rheotool")
+    read = {form: reader(texts[form]) for form, reader in READERS.items()}
+    if name == "rolie_poly_fene":
+        del read["json"]
     for gradient in GRADIENTS.values():
         wanted = reference(name, gradient)
         scale = np.max(np.abs(wanted))
-        found = {
-            form: integrated(reader(texts[form]), gradient, TIMES)
-            for form, reader in READERS.items()
-            if not (form == "json" and name == "rolie_poly_fene")
-        }
+        found = {form: integrated(rates, gradient, TIMES) for form, rates in read.items()}
         if "rheotool" in texts:
             found["rheotool"] = by_rheotool(texts["rheotool"], gradient, TIMES)
         for form, stress in found.items():

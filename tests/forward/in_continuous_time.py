@@ -29,11 +29,9 @@ class ContinuousFluid:
         levels = [effect.levels for effect in self._fluid.states]
         self._ends = np.cumsum(levels) if levels else np.zeros(0, int)
         self._changes, self._stresses = jax.jit(self._change), jax.jit(self._stress)
-        self._slopes = jax.jit(
-            lambda theta, y, rate: jax.jvp(
-                lambda y: self._stress(theta, y), (y,), (self._change(theta, y, rate),)
-            )[1]
-        )
+        self._together = jax.jit(self._change_and_stress)
+        # as one program: step by step each operation would be compiled by itself
+        self._all_seen = jax.jit(self._stress_and_beside)
         self._turn_to(theta)
 
     def of(self, theta):
@@ -111,10 +109,14 @@ class ContinuousFluid:
             moved.append(jnp.ravel(source - decay * level))
         return jnp.concatenate([jax.vmap(of_mode)(modes, times).ravel(), *moved])
 
-    def _seen(self, states, rates):
-        own = jax.vmap(partial(self._stress, self._theta))(jnp.asarray(states))
-        beside = self._fluid.beside(self._numbers, self._theta, jnp.asarray(rates), self._flow)
-        return np.asarray(own) + np.asarray(beside)
+    def _change_and_stress(self, theta, y, rate):
+        """Return these, and the change of the stress."""
+        moved = self._change(theta, y, rate)
+        return moved, *jax.jvp(lambda y: self._stress(theta, y), (y,), (moved,))
+
+    def _stress_and_beside(self, theta, states, rates):
+        own = jax.vmap(partial(self._stress, theta))(states)
+        return own + self._fluid.beside(self._numbers, theta, rates, self._flow)
 
     def at_rate(self, tool, times):
         """Return the recorded stress and the felt rate at times after rest; NaN where none is.
@@ -131,13 +133,11 @@ class ContinuousFluid:
 
         def slope(t, y):
             rate, own = felt(t, y), y[:-1] if soft else y
-            moved = np.asarray(self._changes(self._theta, own, rate))
             if not soft:
-                return moved
-            stress = self.stress(own) + viscosity * rate
-            left = (tool(t) - rate - slip * stress) / soft - float(
-                self._slopes(self._theta, own, rate)
-            )
+                return np.asarray(self._changes(self._theta, own, rate))
+            moved, stress, grows = self._together(self._theta, own, rate)
+            stress = float(stress) + viscosity * rate
+            left = (tool(t) - rate - slip * stress) / soft - float(grows)
             return np.append(moved, left / viscosity)
 
         start = np.append(self.rest, 0.0) if soft else self.rest
@@ -145,7 +145,7 @@ class ContinuousFluid:
         reached = solve_ivp(slope, (0.0, times[-1]), start, "LSODA", times, **close)
         found = reached.y.T
         rates = np.array([felt(*each) for each in zip(reached.t, found, strict=True)])
-        stress = self._seen(found[:, : self.rest.size], rates)
+        stress = np.asarray(self._all_seen(self._theta, found[:, : self.rest.size], rates))
         missing = len(times) - len(stress)
         return tuple(np.pad(of, (0, missing), constant_values=np.nan) for of in (stress, rates))
 
@@ -179,7 +179,7 @@ class ContinuousFluid:
         commanded = tool = jnp.asarray(shear_rates(run.protocol, times))
         for effect in acting:
             if isinstance(effect, KinematicEffect):
-                tool = effect.felt_rate(self._values(effect), jnp.asarray(times), tool)
+                tool = jax.jit(effect.felt_rate)(self._values(effect), times, tool)
         rates = np.asarray(tool)
         exact = acting or run.protocol.amplitudes.size == 0
 
@@ -191,9 +191,9 @@ class ContinuousFluid:
         stress, felt = self.at_rate(at, times)
         for effect in acting:
             if isinstance(effect, SignalEffect):
-                given = (jnp.asarray(of) for of in (times, felt, stress))
-                record = Record(*given, jnp.ones(()), 0.0, commanded)
-                stress = np.asarray(effect.recorded_stress(self._values(effect), record))
+                stress = np.asarray(
+                    _distorted(effect, self._values(effect), times, felt, stress, commanded)
+                )
         return stress[np.searchsorted(times, run.time)]
 
     def modulus(self, strain, frequency, cycles):
@@ -204,3 +204,9 @@ class ContinuousFluid:
         stress, _ = self.at_rate(lambda t: strain * frequency * np.cos(frequency * t), times)
         # of what is periodic, the sum over a period is exact to all orders
         return np.mean(stress * 2j * np.exp(-1j * phase)) / strain
+
+
+@partial(jax.jit, static_argnums=0)
+def _distorted(effect, values, times, felt, stress, commanded):
+    """Return the record that an effect on the signal makes of a stress."""
+    return effect.recorded_stress(values, Record(times, felt, stress, jnp.ones(()), 0.0, commanded))

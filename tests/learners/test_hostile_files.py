@@ -33,11 +33,11 @@ def write(path, members, compression=zipfile.ZIP_DEFLATED):
 
 
 def swelling(path):
-    # 400 MB of zeros in half a megabyte
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+    # 300 MB of zeros in a megabyte
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file:
         file.writestr("estimator.json", json.dumps(HEADER))
         with file.open("array0.npy", "w", force_zip64=True) as stream:
-            for _ in range(400):
+            for _ in range(300):
                 stream.write(bytes(1_000_000))
 
 

@@ -1,5 +1,7 @@
 """Long holds of a rate on a clock that slows down change no answer; records by scipy."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from independent import Giesekus, steps
@@ -17,6 +19,7 @@ BASE = dc.Fluid(dc.make_law("ucm"), MODULUS, TIME)
 LIBRARY = build_library(degree=0)
 
 
+@cache
 def records(noise=0.01, seed=0):
     """Giesekus at a low rate for 2 s, then held at a high one for a minute."""
     generator, runs = np.random.default_rng(seed), []

@@ -107,12 +107,13 @@ def _extremes(
     times = np.linspace(0.0, end, _SAMPLES)
 
     def rate_at(t):
-        return jnp.asarray(amplitude * np.cos(frequency * t))
+        return amplitude * np.cos(frequency * t)
 
     def change(t, y):
         if next(evaluations) >= _MOST_EVALUATIONS:
             raise _Spent
-        return np.asarray(_rate(law, jnp.asarray(y), rate_at(t)))
+        # arrays of NumPy: a program takes them as they are, sooner than they are made JAX's
+        return np.asarray(_rate(law, y, np.asarray(rate_at(t))))
 
     found = solve_ivp(
         change, (0.0, end), np.asarray(law.rest()), "LSODA", times, rtol=1e-6, atol=1e-9,
