@@ -103,7 +103,7 @@ class LanePredictor:
         need.
         """
         flags = self._flags.of(thetas)
-        order = np.lexsort([*keys, *flags.T])
+        order = np.lexsort([*keys, *np.packbits(flags, axis=1).T])
 
         def found(trials: np.ndarray) -> np.ndarray:
             different = np.arange(LANES) < len(trials)

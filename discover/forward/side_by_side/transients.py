@@ -1,6 +1,8 @@
 """Transients at a given rate of many vectors of parameters, eight side by side.
 
-JAX shapes the rate and distorts the signal, where a vector asks for it.
+Where a vector asks for it NumPy shapes the rate and distorts the signal, of all vectors and runs
+together; JAX does where an effect takes its arrays alone, for other flows than shear, and for steps
+of the rate at instants that are fitted.
 """
 
 from collections.abc import Callable
@@ -40,6 +42,41 @@ _OF_RUNS = (
 )  # fmt: skip
 
 
+class _Signals(NamedTuple):
+    """Runs as effects on rates and signals take them, with an axis of runs, in arrays of NumPy.
+
+    `sample`: positions of the samples among step ends. The others as of `TransientFlows`.
+    """
+
+    times: np.ndarray
+    commanded_rate: np.ndarray
+    clock_factor: np.ndarray
+    strain_before: np.ndarray
+    sample: np.ndarray
+    kinematics: None = None
+    steps: None = None
+
+    @classmethod
+    def of(cls, part: TransientFlows, runs: int) -> "_Signals":
+        """Return the first runs."""
+        of_time = (part.times, part.commanded_rate)
+        times, rate = (np.asarray(of)[:runs] for of in of_time)
+        of_run = (part.clock_factor, part.strain_before)
+        clock, strain = (np.asarray(of)[:runs, None] for of in of_run)
+        return cls(times, rate, clock, strain, np.asarray(part.sample_index)[:runs])
+
+
+def _takes_numpy(effect: KinematicEffect | SignalEffect) -> bool:
+    """Return whether an effect says so where its function is: one put in its place may not."""
+    name = "felt_rate" if isinstance(effect, KinematicEffect) else "recorded_stress"
+    kind = next(kind for kind in type(effect).__mro__ if name in vars(kind))
+    return vars(kind).get("takes_numpy", False)
+
+
+def _before_runs(thetas: Float[np.ndarray, "lanes p"]) -> Float[np.ndarray, "p lanes 1 1"]:
+    return thetas.T[..., None, None]
+
+
 class _Runs(NamedTuple):
     """Runs as the kernel takes them, in arrays of NumPy.
 
@@ -62,7 +99,7 @@ class _Runs(NamedTuple):
     least: np.ndarray
     jump: np.ndarray
     flow: np.ndarray  # kinematics of each run
-    sample: np.ndarray  # positions of the samples among step ends
+    signals: _Signals  # what effects on rates and signals take, of runs that are no padding
     weight: np.ndarray
     recorded: np.ndarray
     rate: np.ndarray
@@ -120,8 +157,8 @@ class SideBySide(LanePredictor):
     """Predictions of transients for one structure of law and effects.
 
     `rates`: of a vector, the effects present, and a run: the felt rate at ends and middles of
-    steps, and the tool's at ends. `recorded`: of these, the stress and both rates, what samples
-    record.
+    steps, and the tool's at ends. `distorted`: of these, the stress and both rates, what would be
+    recorded at ends.
     """
 
     def __init__(
@@ -129,14 +166,22 @@ class SideBySide(LanePredictor):
         fluid: AugmentedFluid,
         code: Kernel,
         rates: Callable,
-        recorded: Callable,
+        distorted: Callable,
         made_from: tuple,
     ):
         super().__init__(fluid, code, made_from)
+        self._in_numpy = rates, distorted
         effects, still = fluid.structure.effects, KinematicEffect.felt_rate
         shaping = [e for e in effects if isinstance(e, KinematicEffect)]
-        self._shaping = self._amplitudes(e for e in shaping if type(e).felt_rate is not still)
-        self._distorting = self._amplitudes(e for e in effects if isinstance(e, SignalEffect))
+        shaping = [e for e in shaping if type(e).felt_rate is not still]
+        distorting = [e for e in effects if isinstance(e, SignalEffect)]
+        self._shaping, self._distorting = map(self._amplitudes, (shaping, distorting))
+        others = [e for e in (*shaping, *distorting) if not _takes_numpy(e)]
+        self._only_jax = self._amplitudes(others)
+
+        def recorded(theta, present, run, *signals):
+            return distorted(theta, present, run, *signals)[run.sample_index]
+
         axes = (None, None, 0), (0, None, None)
         self._rates = self._program("rates", rates, *axes, vectors_to=(-1, 0))
         axes = (None, None, 0, 0, 0, 0), (0, None, None, -1, -1, 0)
@@ -150,7 +195,7 @@ class SideBySide(LanePredictor):
         most = int(np.argmax(counts))
         table = self._table(asked.numbers, asked.part, float(times[most]), int(counts[most]))
         assert asked.judging is not None  # of transients there always is
-        laid_out = self._runs(asked.part, asked.judging)
+        laid_out = self._runs(asked.part, asked.judging, asked.runs)
 
         def eight(lanes: np.ndarray, different: np.ndarray, used: np.ndarray) -> np.ndarray:
             limits = np.where(different, asked.limits[lanes], -np.inf)
@@ -176,10 +221,9 @@ class SideBySide(LanePredictor):
         if len(modes) > declared:
             modes = modes[modes_in_use(modes[:, 0].T, declared)]
         rate, tool_rate = laid_out.rate, laid_out.tool_rate
-        present = self._fluid.present(thetas)
         is_shaped = laid_out.in_shear and np.any(thetas[:, self._shaping])
         if part.steps is not None or is_shaped:
-            rate, tool_rate = (np.asarray(array) for array in self._rates(thetas, present, part))
+            rate, tool_rate = self._shaped(thetas, part, laid_out.signals)
         time, tabled = table
         if tabled is None or np.any(thetas[:, 1] != time):
             tabled, declared = np.zeros(WEIGHTS), 0
@@ -190,7 +234,7 @@ class SideBySide(LanePredictor):
         stress, felt, of_modes, goes_on = self._code(runs, declared, used, given, asked.whole)
         if not goes_on:
             stress[:] = np.nan
-        places = np.arange(runs)[:, None], laid_out.sample[:runs]
+        places = np.arange(runs)[:, None], laid_out.signals.sample
         at_samples, beside = stress[places], []
         if asked.whole:
             own = (at_samples[:, :, None], of_modes[places])
@@ -202,12 +246,45 @@ class SideBySide(LanePredictor):
             given["held"] = np.ones_like(laid_out.held)
             stress, felt, *_ = self._code(runs, declared, used, given)
             stress[:runs] += _between(at_samples - stress[places], part)
-        beyond = np.arange(stress.shape[1]) > laid_out.last[:, None]
-        felt[beyond], stress[beyond] = rate[:, ::2][beyond], 0.0
-        found = np.asarray(self._recorded(thetas, present, part, stress, felt, tool_rate))
-        return np.concatenate([found[:, :runs, :, None], *beside], axis=-1)
+        laid = len(rate)
+        beyond = np.arange(stress.shape[1]) > laid_out.last[:laid, None]
+        felt[:laid][beyond], stress[:laid][beyond] = rate[:, ::2][beyond], 0.0
+        signals = laid_out.signals
+        found = self._at_samples(thetas, part, signals, stress, felt, tool_rate)
+        return np.concatenate([found[..., None], *beside], axis=-1)
 
-    def _runs(self, part: TransientFlows, judging: Records) -> _Runs:
+    def _is_plain(self, thetas: np.ndarray, part: TransientFlows) -> bool:
+        plain = part.steps is None and part.kinematics is None
+        return plain and not np.any(thetas[:, self._only_jax])
+
+    def _shaped(
+        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the felt rate, lanes last, and the tool's, lanes first."""
+        present = self._fluid.present(thetas)
+        if not self._is_plain(thetas, part):
+            felt, of_tool = self._rates(thetas, present, part)
+            return np.asarray(felt), np.asarray(of_tool)
+        found = self._in_numpy[0](_before_runs(thetas), present, signals)
+        felt, of_tool = (np.broadcast_to(of, (LANES, *of.shape[-2:])) for of in found)
+        return np.ascontiguousarray(np.moveaxis(felt, 0, -1)), of_tool
+
+    def _at_samples(
+        self, thetas: np.ndarray, part: TransientFlows, signals: _Signals, stress, felt, of_tool
+    ) -> Float[np.ndarray, "lanes runs n"]:
+        """Return what samples record, of stress and felt rate at ends, lanes last."""
+        present, runs = self._fluid.present(thetas), len(signals.times)
+        if not self._is_plain(thetas, part):
+            found = self._recorded(thetas, present, part, stress, felt, of_tool)
+            return np.asarray(found)[:, :runs]
+        given = (np.moveaxis(of[:runs], -1, 0) for of in (stress, felt))
+        with np.errstate(all="ignore"):  # of a vector that runs away
+            found = self._in_numpy[1](
+                _before_runs(thetas), present, signals, *given, of_tool[:, :runs]
+            )
+        return found[:, np.arange(runs)[:, None], signals.sample]
+
+    def _runs(self, part: TransientFlows, judging: Records, runs: int) -> _Runs:
         """Return runs as the kernel takes them, laid out once."""
         for known, by, found in self._known_runs:
             if known is part and by is judging:
@@ -237,7 +314,7 @@ class SideBySide(LanePredictor):
             least,
             JUMP * times[:, -1],
             flows_of(part.kinematics),
-            sample,
+            _Signals.of(part, runs),
             weight,
             recorded,
             rate,
