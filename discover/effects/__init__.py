@@ -8,6 +8,7 @@ from discover.effects.base import (
     EffectParameter,
     KinematicEffect,
     ModeEffect,
+    RadialAverage,
     Record,
     SeriesElement,
     SignalEffect,
@@ -26,9 +27,9 @@ from discover.effects.registry import (
 
 __all__ = [
     "AbstractEffect", "ConstitutiveEffect", "EffectParameter", "KinematicEffect", "KnownEffect",
-    "LibraryTerm", "ModeEffect", "Record", "SeriesElement", "SignalEffect", "StateEffect",
-    "WrittenState", "built_in_effects", "effects_table", "known_effects", "library_effects",
-    "library_term", "make_effect", "named_effects", "simplest_terms",
+    "LibraryTerm", "ModeEffect", "RadialAverage", "Record", "SeriesElement", "SignalEffect",
+    "StateEffect", "WrittenState", "built_in_effects", "effects_table", "known_effects",
+    "library_effects", "library_term", "make_effect", "named_effects", "simplest_terms",
 ]  # fmt: skip
 
 answer_calls(__name__, effects_table)

@@ -261,6 +261,21 @@ class KinematicEffect(AbstractEffect):
         return shear_rate
 
 
+@dataclass(frozen=True)
+class RadialAverage(KinematicEffect):
+    """Torque of flows at several radii, of which the fluid at each feels its own share of the rate.
+
+    With amplitude p the shear stress is 1 − p times that at the rim and p times a weighted sum.
+    `radii`: over that of the rim, where it is one. `of_stress`, `of_modulus`: weights of stresses
+    and of moduli there; those of stresses add up to one, so that the signal's own zero stays.
+    """
+
+    radii: tuple[float, ...] = ()
+    of_stress: tuple[float, ...] = ()
+    of_modulus: tuple[float, ...] = ()
+    acts_on_steady_states = True
+
+
 class SeriesElement(KinematicEffect):
     """Element in series with the fluid, which feels its stress: γ̇_felt = γ̇ − s σ − C dσ/dt.
 

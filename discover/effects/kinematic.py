@@ -7,11 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 from scipy.linalg.lapack import dtbtrs
+from scipy.special import roots_sh_jacobi
 
 from discover.effects.base import (
     EffectParameter,
     KinematicEffect,
     OfRun,
+    RadialAverage,
     SeriesElement,
     Signal,
 )
@@ -82,6 +84,42 @@ RATE_GAIN = RateGain(
     source="Macosko 1994, Rheology, ch. 8: errors of cone angle and gap",
     check="Measure a Newtonian oil; measure the gap and the cone angle.",
     visible="g_r of about 0.05.",
+)  # fmt: skip
+
+
+def _torque_between_plates(interior: int = 3) -> tuple[tuple[float, ...], ...]:
+    """Return radii, and weights of stress and of moduli, for 4 ∫ x² σ(x γ̇) dx.
+
+    Gauss–Radau for σ/x, with the rim as a node. Stress vanishes on the axis, the zero of a
+    transducer does not: it gets what is missing to one.
+    """
+    # of the interior nodes Gauss's rule has the weight (1 − x) x³
+    radii, weights = roots_sh_jacobi(interior, 5, 4)
+    weights = 4.0 * weights / (1.0 - radii)
+    of_modulus = np.array([0.0, *weights, 1.0 - np.sum(weights)])
+    radii = np.array([0.0, *radii, 1.0])
+    of_stress = np.array([0.0, *of_modulus[1:] / radii[1:]])
+    of_stress[0] = 1.0 - np.sum(of_stress)
+    return tuple(tuple(each.tolist()) for each in (radii, of_stress, of_modulus))
+
+
+_RADII, _OF_STRESS, _OF_MODULUS = _torque_between_plates()
+
+PARALLEL_PLATES = RadialAverage(
+    name="parallel_plates", radii=_RADII, of_stress=_OF_STRESS, of_modulus=_OF_MODULUS,
+    parameters=(
+        EffectParameter(
+            "share", "p", low=0.0, high=1.0, first_trial=0.1, ends=("high",),
+            range_source="0 of a cone, or after the correction of Weissenberg and Rabinowitsch, "
+            "and 1 between plates without it",
+            meaning="of the torque between plates without correction",
+        ),
+    ),
+    equation=r"\sigma_\mathrm{rec}(\dot\gamma) = (1 - p)\,\sigma(\dot\gamma)"
+    r" + 4 p \int_0^1 x^2\,\sigma(x \dot\gamma)\,dx",
+    source="Bird, Armstrong & Hassager 1987, Dynamics of Polymeric Liquids 1, eq. 10.2-15",
+    check="Repeat with a cone; see whether the export corrects the torque of plates.",
+    visible="p of about one where the stress is a tenth below a straight line.",
 )  # fmt: skip
 
 

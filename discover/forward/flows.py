@@ -360,6 +360,26 @@ Flows = TransientFlows | SteadyFlows | StressFlows | PeriodicFlows
 """Flows of one control, which share one program; of all but oscillations one row for each run."""
 
 
+def at_radius(part: Flows, radius: float) -> Flows | None:
+    """Return flows between plates at a share of the radius of the rim, whose rate is commanded.
+
+    None where that is no shear at a given rate.
+    """
+
+    def scaled(values: ArrayLike) -> Array:
+        return on_device(radius * np.asarray(values))
+
+    if isinstance(part, PeriodicFlows):
+        return replace(part, strain=scaled(part.strain))
+    if isinstance(part, StressFlows) or part.kinematics is not None:
+        return None
+    if isinstance(part, SteadyFlows):
+        return replace(part, rate=scaled(part.rate))
+    steps = part.steps and replace(part.steps, change=scaled(part.steps.change))
+    strain, rate = scaled(part.strain_before), scaled(part.commanded_rate)
+    return replace(part, commanded_rate=rate, strain_before=strain, steps=steps)
+
+
 class Batch(eqx.Module):
     """Runs of one control or several, in parts of which each has a program of its own.
 

@@ -1,6 +1,7 @@
 """Predictions of parameter vectors: rates and signal in JAX, and the code that follows modes."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -10,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from discover.effects import AbstractEffect, KinematicEffect, Record, SignalEffect
+from discover.effects import AbstractEffect, KinematicEffect, RadialAverage, Record, SignalEffect
 from discover.forward.augmented_fluid import AugmentedFluid, where_in_shear
 from discover.forward.declared import DeclaredModel, Numbers, Structure
 from discover.forward.flows import (
@@ -21,6 +22,7 @@ from discover.forward.flows import (
     SteadyFlows,
     StressFlows,
     TransientFlows,
+    at_radius,
 )
 from discover.forward.periodic_states import PHASE, first_harmonic
 from discover.forward.records import Records
@@ -60,6 +62,7 @@ class Program:
         self._upstream = [e for e in kinematic if e.shapes_command]
         self._downstream = [e for e in kinematic if not e.shapes_command]
         self._signal = [e for e in structure.effects if isinstance(e, SignalEffect)]
+        self.averages = [e for e in structure.effects if isinstance(e, RadialAverage)]
         self._of_torque = [effect for effect in self._signal if not effect.of_force]
         # a name does not tell one law from another that was registered under it in its place
         build = LAWS[structure.law_name].build if structure.free_parameters else None
@@ -118,7 +121,7 @@ class Program:
 
     def are_judged_by_modes(self, thetas: Float[np.ndarray, "trials p"]) -> np.ndarray:
         """Return whether nothing alters each record after the modes, or gives way in series."""
-        after = (*self._signal, *self.fluid.series)
+        after = (*self._signal, *self.fluid.series, *self.averages)
         at = [self.fluid.slices[effect.name].start for effect in after]
         return ~np.any(thetas[:, at], axis=1)
 
@@ -345,6 +348,7 @@ class Predictor:
         self._declared = declared
         self.program, self.of_every_effect = program, of_every_effect
         self._laid_out: list[tuple[TransientFlows, Records, _Piece]] = []
+        self._at_radii: list[tuple[Flows, RadialAverage, list[Batch] | None]] = []
 
     @cached_property
     def _numbers(self) -> Numbers:
@@ -390,6 +394,41 @@ class Predictor:
         self, trials: Trials, batch: Batch, number: int, whole: bool = True
     ) -> Float[np.ndarray, "trials rows n kinds"]:
         """Return the records of a part, and if `whole` what `Asked` says; sweeps have no more."""
+        found = self._at_rim(trials, batch, number, whole)
+        for effect in self.program.averages:
+            share = trials.thetas[:, self.program.fluid.slices[effect.name].start]
+            flows, there = self._inside(batch, number, effect), np.flatnonzero(share)
+            if flows is None or not len(there):
+                continue
+            is_modulus = isinstance(batch.parts[number], PeriodicFlows)
+            weights = effect.of_modulus if is_modulus else effect.of_stress
+            some, rim = trials.taken(there), found[there, ..., 0]
+            mean = weights[-1] * rim
+            for flow, weight in zip(flows, weights[:-1], strict=True):
+                if weight:  # a modulus on the axis has none, and no strain to be measured by
+                    mean = mean + weight * self._at_rim(some, flow, number, False)[..., 0]
+            found[there, ..., 0] = rim + share[there, None, None] * (mean - rim)
+        return found
+
+    def _inside(self, batch: Batch, number: int, effect: RadialAverage) -> list[Batch] | None:
+        """Return the flows of a part at each radius below the rim; None where there are none."""
+        part = batch.parts[number]
+        for known, by, flows in self._at_radii:
+            if known is part and by is effect:
+                return flows
+        inside = [at_radius(part, radius) for radius in effect.radii[:-1]]
+        flows = None
+        if all(one is not None for one in inside):
+            parts = [[one if of is part else of for of in batch.parts] for one in inside]
+            flows = [replace(batch, parts=tuple(own)) for own in parts]
+        self._at_radii.append((part, effect, flows))
+        del self._at_radii[:-_KEPT]
+        return flows
+
+    def _at_rim(
+        self, trials: Trials, batch: Batch, number: int, whole: bool
+    ) -> Float[np.ndarray, "trials rows n kinds"]:
+        """Return the records of a part without what averages over radii."""
         part = batch.parts[number]
         if isinstance(part, PeriodicFlows):
             found = _of_sweeps(self._of_piece(trials, (part, None, 0), False), batch.moduli)

@@ -13,6 +13,7 @@ from discover.effects import (
     ConstitutiveEffect,
     KinematicEffect,
     ModeEffect,
+    RadialAverage,
     Record,
     SeriesElement,
     SignalEffect,
@@ -59,6 +60,11 @@ def response(effect, amplitude):
                 effect.instantaneous_stress(values, jnp.array([2.0])),
             ]
         )
+    if isinstance(
+        effect, RadialAverage
+    ):  # of a stress in proportion to the third power of the rate
+        mean = np.dot(effect.of_stress, np.power(effect.radii, 3)) * SIGNAL
+        return values[0] * (mean - SIGNAL)
     if isinstance(effect, KinematicEffect):
         return effect.felt_rate(values, TIMES, SIGNAL) - SIGNAL
     assert isinstance(effect, SignalEffect)

@@ -154,12 +154,14 @@ class Search:
         for i, ((name, inner, _), prior) in enumerate(zip(asked, priors, strict=True)):
             at = problem.model.positions(name)[0]
             stiff = max(float(curvature[i]), 0.0) + 1.0 / prior.width**2
-            size = float(np.clip(slope[i] / stiff, prior.low, prior.high))
+            middle, variance = prior.centre, prior.width**2
+            size = float(np.clip((slope[i] + middle / variance) / stiff, prior.low, prior.high))
             if not usable[i] or (prior.low == 0.0 and size <= 0.0 and not problem.fits_times):
                 continue
             size = size or steps[i]  # at other times it may be there
             # within the range, and never so far that the first order means nothing
-            gain = slope[i] * size - 0.5 * stiff * size**2
+            by_prior = (size - middle) ** 2 / variance
+            gain = slope[i] * size - 0.5 * max(float(curvature[i]), 0.0) * size**2 - 0.5 * by_prior
             gain = -0.5 * count * np.log(max(1.0 - 2.0 * gain / max(total, 1e-300), 1e-4))
             score = gain - 0.5 * np.log(stiff * prior.width**2) + np.log(problem.odds(name))
             key = (name, *inner.items()) if every_start else name
