@@ -1,4 +1,4 @@
-"""Predictions of parameter vectors: rates and signal in JAX, and the code that follows modes."""
+"""Predictions of parameter vectors: rates and signal, and the code that follows modes."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
