@@ -125,7 +125,7 @@ class Program:
         at = [self.fluid.slices[effect.name].start for effect in after]
         return ~np.any(thetas[:, at], axis=1)
 
-    def _rates(self, theta, present, run: TransientFlows):
+    def _rates(self, theta, present, run):
         """Return the felt rate at half steps and the tool's at steps, by the effects present.
 
         Here and in `_distorted` one vector and run, or in arrays of NumPy many: vectors and runs
@@ -168,7 +168,7 @@ class Program:
             value,
         )
 
-    def _distorted(self, theta, present, run: TransientFlows, stress, felt, tool_rate):
+    def _distorted(self, theta, present, run, stress, felt, tool_rate):
         """Return the recorded stress at all steps, of that before the signal."""
         times = run.times[..., ::2]
         for effect in self._signal:
